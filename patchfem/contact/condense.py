@@ -1,0 +1,59 @@
+"""Static condensation of a column-by-column numbered piece to its interface by a block-tridiagonal sweep.
+
+With blocks D_j on the diagonal and E_j between columns j and j+1, the right and left Schur complements
+
+    T_j = D_j - E_j T_{j+1}^-1 E_j^T,    S_j = D_j - E_{j-1}^T S_{j-1}^-1 E_{j-1}
+
+give the diagonal blocks of the inverse, G_jj = (S_j + T_j - D_j)^-1, and the propagators P_j = -T_{j+1}^-1 E_j^T the
+rest, G_{j+1,i} = P_j G_{j,i} for i <= j. Normal and tangential compliance come out together.
+"""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_matrix
+from threadpoolctl import threadpool_limits
+
+
+def _blocks(matrix: csr_matrix, columns: int) -> tuple:
+    size = matrix.shape[0] // columns
+    block = matrix.tobsr(blocksize=(size, size))
+    block.sort_indices()
+    diagonal = np.empty((columns, size, size))
+    upper = np.empty((columns - 1, size, size))
+    for j in range(columns):
+        for k in range(block.indptr[j], block.indptr[j + 1]):
+            if block.indices[k] == j:
+                diagonal[j] = block.data[k]
+            elif block.indices[k] == j + 1:
+                upper[j] = block.data[k]
+    return diagonal, upper
+
+
+def sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
+    """Interface block (2 nx, 2 nx) of the inverse of `matrix`, unknowns (x, inward) column by column.
+
+    matrix: symmetric positive definite, (columns * size) square, its first two unknowns of a column at the interface.
+    Cost about columns^2 * size^2 * 2 flop. LinAlgError when the matrix is not positive definite.
+    """
+    with threadpool_limits(1, "blas"):
+        diagonal, upper = _blocks(matrix, columns)
+        size = diagonal.shape[1]
+        right = np.empty_like(diagonal)
+        propagate = np.empty_like(upper)
+        right[-1] = diagonal[-1]
+        for j in range(columns - 2, -1, -1):
+            propagate[j] = -cho_solve(cho_factor(right[j + 1], lower=True), upper[j].T)
+            right[j] = diagonal[j] + upper[j] @ propagate[j]
+        out = np.empty((2 * columns, 2 * columns))
+        state = np.empty((size, 2 * columns))
+        left = diagonal[0]
+        two = np.eye(size, 2)
+        for j in range(columns):
+            if j:
+                left = diagonal[j] - upper[j - 1].T @ cho_solve(cho_factor(left, lower=True), upper[j - 1])
+                state[:, :2 * j] = propagate[j - 1] @ state[:, :2 * j]
+            here = cho_factor(left + right[j] - diagonal[j], lower=True)
+            state[:, 2 * j:2 * j + 2] = cho_solve(here, two)
+            out[2 * j:2 * j + 2, :2 * j + 2] = state[:2, :2 * j + 2]
+            out[:2 * j, 2 * j:2 * j + 2] = out[2 * j:2 * j + 2, :2 * j].T
+    return (out + out.T) / 2

@@ -1,0 +1,127 @@
+"""Plane elasticity of one piece on its tensor grid (bilinear quads, scikit-fem) and the recovery of its inside.
+
+The unknowns of a node are (along x, into the piece), so both pieces of a pair obey the same matrix.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.linalg import splu
+from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad
+from skfem.helpers import ddot, sym_grad, trace
+
+from ..core import frozen_array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Layers:
+    """Young's moduli [Pa] and Poisson ratios of coating and substrate; plane is "strain" or "stress"."""
+
+    coating: tuple
+    substrate: tuple
+    plane: str
+
+
+def lame(young: float, poisson: float, plane: str) -> tuple:
+    """Lamé pair (lambda, mu) [Pa] of the plane problem; in plane stress lambda is E nu / (1 - nu^2)."""
+    mu = young / (2 * (1 + poisson))
+    if plane == "stress":
+        return young * poisson / (1 - poisson**2), mu
+    return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Piece:
+    """Assembled piece. matrix: free unknowns ordered column by column, row by row, two per node (x, inward);
+    far-face nodes are left out. cells: (t, 4) node numbers column * ny + row; is_coating: (t,)."""
+
+    x: np.ndarray
+    depth: np.ndarray
+    matrix: csr_matrix
+    cells: np.ndarray
+    is_coating: np.ndarray
+    layers: Layers
+
+
+def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
+    """Stiffness per unit width [N/m per m] of one piece held at its far face; x (nx,), depth (ny,) [m]."""
+    nx, ny = x.size, depth.size
+    mesh = MeshQuad.init_tensor(np.asarray(x), np.asarray(depth))
+    middle = mesh.p[:, mesh.t].mean(axis=1)[1]
+    coat = middle < depth[coating_rows] if coating_rows else np.zeros(mesh.t.shape[1], bool)
+    soft = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[coat.astype(int)]
+
+    @BilinearForm
+    def energy(u, v, w):
+        return w.lam * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * w.mu * ddot(sym_grad(u), sym_grad(v))
+
+    basis = Basis(mesh, ElementVector(ElementQuad1()), intorder=2)
+    points = basis.X.shape[-1]
+    lam, mu = (np.repeat(soft[:, k:k + 1], points, axis=1) for k in (0, 1))
+    stiff = energy.assemble(basis, lam=lam, mu=mu).tocsr()
+    # scikit-fem numbers vertices its own way; ours is column by column
+    place = np.searchsorted(x, mesh.p[0] - 1e-12 * np.ptp(x)) * ny + \
+        np.searchsorted(depth, mesh.p[1] - 1e-12 * depth[-1])
+    order = np.empty((nx * ny, 2), dtype=np.int64)
+    order[place] = basis.nodal_dofs.T
+    free = order.reshape(nx, ny, 2)[:, :-1].ravel()
+    return Piece(x, depth, stiff[free][:, free].tocsr(), _counter_clockwise(place[mesh.t].T, ny), coat, layers)
+
+
+def _counter_clockwise(cells, ny: int) -> np.ndarray:
+    """Every quad as (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1) in depth coordinates."""
+    first = cells.min(axis=1)
+    return np.stack([first, first + ny, first + ny + 1, first + 1], axis=1)
+
+
+def displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(frames, nx*ny, 2) displacement [m] (along x, inward) under nodal interface forces per unit width [N/m].
+
+    shear, normal: (frames, nx) acting on the piece along +x and inward; one sparse factorisation for all frames.
+    """
+    nx, ny = piece.x.size, piece.depth.size
+    frames = np.atleast_2d(normal).shape[0]
+    load = np.zeros((nx, ny - 1, 2, frames))
+    load[:, 0, 0] = np.atleast_2d(shear).T
+    load[:, 0, 1] = np.atleast_2d(normal).T
+    factor = splu(piece.matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                  options={"SymmetricMode": True})
+    u = factor.solve(load.reshape(-1, frames)).reshape(nx, ny - 1, 2, frames)
+    out = np.zeros((frames, nx, ny, 2))
+    out[:, :, :-1] = np.moveaxis(u, 3, 0)
+    return out.reshape(frames, nx * ny, 2)
+
+
+def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
+    """Stress at cell middles, tension > 0: (frames, t, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t) [Pa].
+
+    u: (frames, nodes, 2). The inward axis is kept, so xy changes sign for the piece drawn at y < 0.
+    The middle of a bilinear quad is its superconvergent point.
+    """
+    corner = u[:, piece.cells]
+    nodes = np.stack([np.repeat(piece.x, piece.depth.size), np.tile(piece.depth, piece.x.size)], axis=1)[piece.cells]
+    dx = (nodes[:, 1, 0] - nodes[:, 0, 0])[:, None]
+    dy = (nodes[:, 3, 1] - nodes[:, 0, 1])[:, None]
+    along = (corner[:, :, 1] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 3]) / (2 * dx)
+    inward = (corner[:, :, 3] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 1]) / (2 * dy)
+    exx, eyy, exy = along[..., 0], inward[..., 1], (along[..., 1] + inward[..., 0]) / 2
+    pick = piece.is_coating.astype(int)
+    pairs = np.array([lame(*piece.layers.substrate, piece.layers.plane),
+                      lame(*piece.layers.coating, piece.layers.plane)])
+    lam, mu = pairs[pick].T
+    poisson = np.array([piece.layers.substrate[1], piece.layers.coating[1]])[pick]
+    sxx = lam * (exx + eyy) + 2 * mu * exx
+    syy = lam * (exx + eyy) + 2 * mu * eyy
+    szz = poisson * (sxx + syy) if piece.layers.plane == "strain" else np.zeros_like(sxx)
+    sxy = 2 * mu * exy
+    mises = np.sqrt(((sxx - syy)**2 + (syy - szz)**2 + (szz - sxx)**2) / 2 + 3 * sxy**2)
+    return np.stack([sxx, syy, szz, sxy], axis=-1), mises
+
+
+def interface_compliance(piece: Piece) -> tuple:
+    """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (nx, nx) [m2/N], read-only."""
+    from .condense import sweep
+
+    both = sweep(piece.matrix, piece.x.size)
+    return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))

@@ -1,0 +1,173 @@
+"""The nouns that travel between stages: frozen, read-only, SI.
+
+Letters for shapes, the same everywhere: m interface points, n modes, k times, t elements.
+Signs: compression, normal stress and load > 0; slip = upper - lower; rotation > 0 opens the gap at +x.
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+import numpy as np
+
+G_N = 9.80665  # standard gravity [m s-2]
+
+
+class Outcome(StrEnum):
+    """How a run ended; `sentence` says what it means and what to do next."""
+
+    DONE = "done"
+    STEADY = "steady"
+    STUCK = "stuck"
+    TRANSIENT = "transient"
+    GROWS = "grows"
+    EXCEEDS_TRAVEL = "exceeds_travel"
+    NO_CONTACT = "no_contact"
+    NOT_CONVERGED = "not_converged"
+
+    @property
+    def sentence(self) -> str:
+        """One sentence for a person: the meaning and, where there is one, the remedy."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Outcome.DONE: "Finished as asked.",
+    Outcome.STEADY: "The motion repeats from window to window within the tolerance.",
+    Outcome.STUCK: "The interface holds: no slip in the last cycles.",
+    Outcome.TRANSIENT: "The run ended before the motion settled; ask for more cycles or read the *_steady estimates.",
+    Outcome.GROWS: "The motion still rises and no bounded steady motion was found; friction does not limit it.",
+    Outcome.EXCEEDS_TRAVEL: "The motion passed the stop of the flexure; the run ended there.",
+    Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
+    Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",
+}
+
+
+class PatchfemError(Exception):
+    """A named failure a person can act on; `code` is the exit code of the command line."""
+
+    code = 2
+
+
+class NotConverged(PatchfemError):
+    """A numerical method missed its residual after every fallback."""
+
+    code = 3
+
+
+class Missing(PatchfemError):
+    """A file, package or resource is missing or ran out."""
+
+    code = 4
+
+
+def frozen_array(values, dtype=np.float64) -> np.ndarray:
+    """`values` as a C-ordered read-only array."""
+    out = np.array(values, dtype=dtype, order="C")
+    out.setflags(write=False)
+    return out
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Interface:
+    """Points along the sliding direction. x: (m,) [m], 0 in the middle; weight: (m,) nodal areas of all pairs [m2]."""
+
+    x: np.ndarray
+    weight: np.ndarray
+    width: float
+
+    @property
+    def length(self) -> float:
+        """Length of the patch along x [m]."""
+        return float(self.x[-1] - self.x[0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Compliance:
+    """The pair of pieces seen from their interface, all pairs together.
+
+    normal: (m, m) closing per nodal normal force [m/N]; tangential: (m, m) relative slide per nodal shear force [m/N].
+    Both symmetric positive definite; far faces are held, so no rigid motion is inside.
+    """
+
+    interface: Interface
+    normal: np.ndarray
+    tangential: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pressure:
+    """A solved static contact state.
+
+    sigma_n: (m,) nodal normal stress [Pa], >= 0; gap: (m,) remaining gap [m], >= 0; approach [m] and rotation [rad]
+    of the upper holder; `residuals` from the independent check, relative.
+    """
+
+    sigma_n: np.ndarray
+    gap: np.ndarray
+    approach: float
+    rotation: float
+    load: float
+    moment: float
+    outcome: Outcome
+    iterations: int
+    residuals: MappingProxyType
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ModalBasis:
+    """n modes of equal modal mass. omega [rad/s], zeta [1], slide/base/output [1]: all (n,); mass [kg]."""
+
+    names: tuple
+    omega: np.ndarray
+    zeta: np.ndarray
+    slide: np.ndarray
+    base: np.ndarray
+    output: np.ndarray
+    mass: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BaseSine:
+    """Base acceleration +a sin(omega t) from t = 0; a [m s-2], omega [rad/s]."""
+
+    acceleration: float
+    omega: float
+
+    @property
+    def period(self) -> float:
+        """Drive period [s]."""
+        return 2 * np.pi / self.omega
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measure:
+    """One number with its unit and its numerical error (half-width; None where none is estimated)."""
+
+    value: float | None
+    unit: str
+    error: float | None = None
+    floor: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Response:
+    """Time histories of a run on its kept samples; arrays (k,) unless noted.
+
+    time [s]; modal (k, n) [m]; modal_rate (k, n) [m/s]; slide, slide_rate: interface motion; output, output_rate,
+    acceleration (absolute, at the accelerometer); force: friction resultant [N]; slip: irreversible part of `slide`.
+    `extra` holds per-frame interface fields and the energy ledger.
+    """
+
+    time: np.ndarray
+    modal: np.ndarray
+    modal_rate: np.ndarray
+    slide: np.ndarray
+    slide_rate: np.ndarray
+    output: np.ndarray
+    output_rate: np.ndarray
+    acceleration: np.ndarray
+    base_acceleration: np.ndarray
+    force: np.ndarray
+    slip: np.ndarray
+    extra: dict = field(default_factory=dict)

@@ -1,0 +1,71 @@
+"""Compiled pieces of the march: free motion of the modes over a step and the energy that the step moves."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(error_model="numpy")
+def free_slide(state, step, slide, s, c):
+    """Increment of the interface slide [m] over a step without friction; state (n, 2), step (n, 2, 5), slide (n,)."""
+    out = 0.0
+    for i in range(slide.size):
+        z1 = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 3] * s + step[i, 0, 4] * c
+        out += slide[i] * (z1 - state[i, 0])
+    return out
+
+
+@njit(error_model="numpy")
+def move(state, step, slide, mass, force, s, c):
+    """Advance the modes in place by one step under the constant interface force [N]."""
+    for i in range(slide.size):
+        f = -slide[i] * force / mass
+        z = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 2] * f \
+            + step[i, 0, 3] * s + step[i, 0, 4] * c
+        v = step[i, 1, 0] * state[i, 0] + step[i, 1, 1] * state[i, 1] + step[i, 1, 2] * f \
+            + step[i, 1, 3] * s + step[i, 1, 4] * c
+        state[i, 0] = z
+        state[i, 1] = v
+
+
+@njit(error_model="numpy")
+def step_energy(state, gauss, slide, base, damp, mass, drive, force, s, c, sines, dt, weights, out):
+    """Add to `out` (3,) the work of the base [J], the viscous loss [J] and the integral of |power in| [J] of a step.
+
+    Four Gauss points on the exact motion inside the step; damp (n,) = 2 zeta omega.
+    """
+    for k in range(weights.size):
+        power, loss = 0.0, 0.0
+        for i in range(slide.size):
+            f = -slide[i] * force / mass
+            v = gauss[k, i, 1, 0] * state[i, 0] + gauss[k, i, 1, 1] * state[i, 1] + gauss[k, i, 1, 2] * f \
+                + gauss[k, i, 1, 3] * s + gauss[k, i, 1, 4] * c
+            power -= mass * base[i] * drive * sines[k] * v
+            loss += mass * damp[i] * v * v
+        share = weights[k] * dt / 2
+        out[0] += share * power
+        out[1] += share * loss
+        out[2] += share * abs(power)
+
+
+@njit(error_model="numpy")
+def stored(state, omega, mass):
+    """Kinetic and elastic energy [J] of the modes."""
+    out = 0.0
+    for i in range(omega.size):
+        out += 0.5 * mass * (state[i, 1] * state[i, 1] + omega[i] * omega[i] * state[i, 0] * state[i, 0])
+    return out
+
+
+@njit(error_model="numpy")
+def accelerations(state, omega, damp, slide, base, mass, drive, force, s, out):
+    """Modal accelerations (n,) [m s-2] at an instant, relative to the base."""
+    for i in range(omega.size):
+        out[i] = -base[i] * drive * s - damp[i] * state[i, 1] - omega[i] ** 2 * state[i, 0] - slide[i] * force / mass
+
+
+@njit(error_model="numpy")
+def safe_point(low, high, guess):
+    """`guess` if it lies inside (low, high), their middle otherwise."""
+    if low < guess < high and np.isfinite(guess):
+        return guess
+    return 0.5 * (low + high)

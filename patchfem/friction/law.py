@@ -1,0 +1,64 @@
+"""The numbers of the bond law (report, 2.C) and the growth of the bond length (2.10)."""
+
+from dataclasses import dataclass
+from math import exp, log
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Bonds:
+    """Parameters of eq. 2.10-2.17.
+
+    static: mu_s; ratio = eps_k/eps_0 = mu_k/mu_s (2.21); length = eps_0 [m]; order = p; reading "stretch" or "report";
+    rest_growth = a_s [m s-2] (2.10 needs this unit) and slip_growth = l_k [m], None for a constant bond length;
+    rest_speed = v_h [m/s], the floor under |v| without which 2.10 has no limit at a reversal; initial = m_0.
+    """
+
+    static: float
+    length: float
+    order: float = 1.0
+    reading: str = "stretch"
+    ratio: float = 1.0
+    rest_growth: float | None = None
+    slip_growth: float | None = None
+    rest_speed: float = 1e-6
+    initial: float = 1.0
+
+    @property
+    def grows(self) -> bool:
+        """Whether the bond length evolves."""
+        return self.rest_growth is not None
+
+
+def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> tuple:
+    """(I_A, I_B): integrals over the step of a_s/max(|v|, v_h) and |v|/l_k, exact for a velocity linear in time.
+
+    v0, v1 [m/s] at the ends, dq [m] moved, dt [s]. With S(v) = v/v_h below the floor and sgn(v)(1 + ln(|v|/v_h)) above,
+    I_A = a_s dt (S(v1) - S(v0))/(v1 - v0).
+    """
+    floor = law.rest_speed
+
+    def primitive(v):
+        return v / floor if abs(v) < floor else np.sign(v) * (1 + log(abs(v) / floor))
+
+    if abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
+        rest = law.rest_growth * dt * (primitive(v1) - primitive(v0)) / (v1 - v0)
+    else:
+        rest = law.rest_growth * dt / max(abs(v0 + v1) / 2, floor)
+    return rest, abs(dq) / law.slip_growth
+
+
+def grow(law: Bonds, eps: float, v0: float, v1: float, dq: float, dt: float) -> float:
+    """Bond length after a step (2.10): exact relaxation towards (I_A eps_0 + I_B eps_k)/(I_A + I_B); stays in (0, eps_0].
+
+    A step of zero length and zero time changes nothing; at rest it is pure healing.
+    """
+    if not law.grows:
+        return law.length
+    rest, slide = growth_exponents(law, v0, v1, dq, dt)
+    total = rest + slide
+    if total == 0:
+        return eps
+    target = law.length * (rest + slide * law.ratio) / total
+    return target + (eps - target) * exp(-total)

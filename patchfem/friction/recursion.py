@@ -1,0 +1,94 @@
+"""The stretch reading of the quadrature for p = 1, summed exactly by a bond state that never grows.
+
+With k = exp(-int dR/eps) the surviving share of a bond and 1/eps frozen when it forms, the sums over all bonds
+
+    m = sum sigma k dL/eps,   z = sum sigma k u dL/eps,   s2 = sum sigma k u^2 dL/eps        [Pa, Pa m, Pa m2]
+
+obey m' = |v|(sigma - m)/eps, z' = v m - |v| z/eps, s2' = 2 v z - |v| s2/eps; tau = mu_s z/eps_0. Exact step for a bond
+length held over the step. Stored energy mu_s s2/(2 eps_0) and dissipation mu_s s2/(2 eps_0 eps) per path are never
+negative: passive for every path, pressure and bond length.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .law import Bonds, grow
+from .local import Step
+
+
+class BondState(NamedTuple):
+    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]."""
+
+    bonds: np.ndarray
+    eps: float
+
+
+def shape_functions(x):
+    """(f1, f2, exp(-x)) with f1 = (1 - exp(-x))/x and f2 = (1 - f1)/x, x >= 0, without cancellation."""
+    x = np.asarray(x, float)
+    small = x < 0.03
+    safe = np.where(small, 1.0, x)
+    f1 = -np.expm1(-safe) / safe
+    f2 = (1 - f1) / safe
+    series = 1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320)))))
+    f2 = np.where(small, series, f2)
+    f1 = np.where(small, 1 - x * f2, f1)
+    return f1, f2, np.exp(-x)
+
+
+def advance(bonds, dq, sigma, eps):
+    """New bonds (3, m), path-mean stretch zbar (m,) [Pa m], its slope (m,) [Pa], integral of s2 dR/eps (m,) [Pa m2].
+
+    bonds (3, m), dq scalar or (m,) [m], sigma (m,) [Pa] the pressure that forms the new bonds, eps [m].
+    """
+    m, z, s2 = bonds
+    path = np.abs(dq)
+    g = np.sign(dq)
+    x = path / eps
+    f1, f2, e = shape_functions(x)
+    a1, young = x * f1, sigma - m
+    mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))
+    slope = g * z * (f2 - f1) / eps + sigma * (f1 - f2) - young * (f2 - x * (f1 - f2))
+    slope = np.where(path > 0, slope, m / 2)
+    out = np.stack([sigma - young * e,
+                    z * e + g * eps * (sigma * a1 - young * x * e),
+                    e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * (2 - e * (x * x + 2 * x + 2))])
+    burnt = s2 * a1 + 2 * g * z * eps * (1 - e * (1 + x)) + m * eps**2 * (2 - e * (x * x + 2 * x + 2)) \
+        + sigma * eps**2 * (2 * x - 6 + e * (x * x + 4 * x + 6))
+    return out, mean, slope, burnt
+
+
+@dataclass(frozen=True, slots=True)
+class Recursion:
+    """Law object of the stretch reading, p = 1; the pressure may change along the increment and in time."""
+
+    law: Bonds
+
+    def start(self, sigma) -> BondState:
+        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa]."""
+        bonds = np.zeros((3, sigma.size))
+        bonds[0] = self.law.initial * sigma
+        return BondState(bonds, self.law.length)
+
+    def step(self, state: BondState, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
+        speed = dq / dt if dt > 0 else 0.0
+        middle = grow(self.law, state.eps, speed, speed, dq / 2, dt / 2)
+        out, mean, _, burnt = advance(state.bonds, dq, (s0 + s1) / 2, middle)
+        scale = self.law.static / self.law.length
+        spent = scale * burnt / 2
+        lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
+        if lost.any():
+            spent = spent + np.where(lost, scale * out[2] / 2, 0.0)
+            out = np.where(lost, 0.0, out)
+        return Step(scale * mean, spent, BondState(out, grow(self.law, state.eps, speed, speed, dq, dt)))
+
+    def traction(self, state: BondState):
+        """tau = mu_s z/eps_0 (m,) [Pa]."""
+        return self.law.static / self.law.length * state.bonds[1]
+
+    def stored(self, state: BondState):
+        """Elastic energy of the bonds per area (m,) [J/m2]."""
+        return self.law.static / (2 * self.law.length) * state.bonds[2]

@@ -1,0 +1,161 @@
+"""Which line of a TOML text holds which key, so that every mistake can name its line."""
+
+from __future__ import annotations
+
+import re
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
+_SCALAR = re.compile(r"[^,\]}\n#]*")
+_STRINGS = (
+    re.compile(r'"""(?:\\[\s\S]|[^\\])*?"{3,5}'),
+    re.compile(r"'''[\s\S]*?'{3,5}"),
+    re.compile(r'"(?:\\.|[^"\\\n])*"'),
+    re.compile(r"'[^'\n]*'"),
+)
+
+
+def key_lines(text: str) -> dict[str, int]:
+    """Dotted key path -> line (from 1) in a valid TOML text; a table has the line of its header.
+
+    Items of an array of tables count from 0 (``structure.mode.0.name``); a table that only its sub-tables or dotted
+    keys create has the line of the first of these. A text that is not TOML gives what was found before the fault.
+    """
+    scan = _Scan(text)
+    try:
+        scan.document()
+    except (_Fault, RecursionError):
+        pass
+    for path, line in list(scan.lines.items()):
+        while "." in path:
+            path = path.rpartition(".")[0]
+            scan.lines.setdefault(path, line)
+    return scan.lines
+
+
+class _Fault(Exception):
+    """The text is not TOML here."""
+
+
+class _Scan:
+    """A cursor over TOML text that notes the line of each key and skips the values."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.at, self.lines = text, 0, {}
+        self._line, self._counted = 1, 0
+        self._last: dict[str, int] = {}
+
+    def document(self) -> None:
+        prefix = ""
+        while self.peek():
+            if self.take("["):
+                prefix = self.header()
+            else:
+                self.pair(prefix)
+
+    def header(self) -> str:
+        many = self.text.startswith("[", self.at)
+        self.at += many
+        line = self.line()
+        *outer, name = self.key()
+        path = ""
+        for part in outer:
+            path = self.inside(_join(path, part))
+        path = _join(path, name)
+        self.expect("]]" if many else "]")
+        if many:
+            self.lines.setdefault(path, line)
+            self._last[path] = self._last.get(path, -1) + 1
+            path = self.inside(path)
+        self.lines[path] = line
+        return path
+
+    def inside(self, path: str) -> str:
+        return f"{path}.{self._last[path]}" if path in self._last else path
+
+    def pair(self, prefix: str) -> None:
+        self.peek()
+        line = self.line()
+        path = prefix
+        for part in self.key():
+            path = _join(path, part)
+            self.lines.setdefault(path, line)
+        self.expect("=")
+        self.value(path)
+
+    def value(self, path: str) -> None:
+        start = self.peek()
+        if start == "[":
+            self.items("]", lambda index: self.item(f"{path}.{index}"))
+        elif start == "{":
+            self.items("}", lambda _: self.pair(path))
+        elif start in ('"', "'"):
+            self.string()
+        else:
+            self.match(_SCALAR)
+
+    def item(self, path: str) -> None:
+        self.peek()
+        self.lines.setdefault(path, self.line())
+        self.value(path)
+
+    def items(self, end: str, one) -> None:
+        self.at += 1
+        index = 0
+        while not (self.peek() and self.take(end)):
+            one(index)
+            index += 1
+            self.peek()
+            if not self.take(","):
+                self.expect(end)
+                return
+
+    def key(self) -> list[str]:
+        parts = []
+        while True:
+            if self.peek() in ('"', "'"):
+                parts.append(self.string()[1:-1])
+            else:
+                parts.append(self.match(_BARE_KEY))
+            self.peek()
+            if not self.take("."):
+                return parts
+
+    def string(self) -> str:
+        for form in _STRINGS:
+            if found := form.match(self.text, self.at):
+                self.at = found.end()
+                return found[0]
+        raise _Fault
+
+    def match(self, form: re.Pattern[str]) -> str:
+        found = form.match(self.text, self.at)
+        if not found or not found[0]:
+            raise _Fault
+        self.at = found.end()
+        return found[0]
+
+    def peek(self) -> str:
+        """The next character that is neither blank nor comment; empty at the end."""
+        self.at = _BLANK.match(self.text, self.at).end()
+        return self.text[self.at : self.at + 1]
+
+    def take(self, mark: str) -> bool:
+        if not self.text.startswith(mark, self.at):
+            return False
+        self.at += len(mark)
+        return True
+
+    def expect(self, mark: str) -> None:
+        self.peek()
+        if not self.take(mark):
+            raise _Fault
+
+    def line(self) -> int:
+        self._line += self.text.count("\n", self._counted, self.at)
+        self._counted = self.at
+        return self._line
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name

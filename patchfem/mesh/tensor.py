@@ -1,0 +1,104 @@
+"""One coated piece as a graded tensor grid: uniform columns along the interface, rows growing with depth.
+
+Both pieces of a pair share the columns, so their interface nodes match and every shape of the surfaces lives in
+the gap g(x), never in the mesh.
+"""
+
+from dataclasses import dataclass
+from math import ceil, log
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..core import PatchfemError, frozen_array
+
+GROWTH = 1.1  # height of a row over the one above it; 1.15 limits the compliance to 2e-3, 1.1 to 1e-3
+COATING_ROWS = 4  # least number of rows through a coating
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TensorGrid:
+    """x: (nx,) columns [m], 0 in the middle; depth: (ny,) rows [m], 0 at the interface; coating_rows: rows of cells."""
+
+    x: np.ndarray
+    depth: np.ndarray
+    coating_rows: int
+
+    @property
+    def length(self) -> float:
+        """Extent along the interface [m]."""
+        return float(self.x[-1] - self.x[0])
+
+    @property
+    def height(self) -> float:
+        """Depth of the far face [m]."""
+        return float(self.depth[-1])
+
+    @property
+    def coating(self) -> float:
+        """Thickness of the coating [m], 0 without one."""
+        return float(self.depth[self.coating_rows])
+
+    def tributary(self) -> np.ndarray:
+        """(nx,) length of interface that belongs to each node [m]; sums to the length."""
+        cells = np.diff(self.x)
+        out = np.zeros(self.x.size)
+        out[:-1] += cells / 2
+        out[1:] += cells / 2
+        return out
+
+    def cell_is_coating(self) -> np.ndarray:
+        """(nx - 1, ny - 1) bool, cells column by column."""
+        row = np.arange(self.depth.size - 1) < self.coating_rows
+        return np.broadcast_to(row, (self.x.size - 1, row.size))
+
+
+def graded_rows(start: float, total: float, growth: float = GROWTH, least: int = 1) -> np.ndarray:
+    """Row heights (ny,) that begin near `start`, grow by at most `growth` and add up to `total` [m].
+
+    ValueError unless start and total are positive.
+    """
+    if not (start > 0 and total > 0):
+        raise ValueError("start and total must be positive")
+    start = min(start, total / least)
+    count = max(least, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
+    if count * start >= total * (1 - 1e-12):
+        return np.full(count, total / count)
+
+    def excess(ratio: float) -> float:
+        return start * np.sum(ratio ** np.arange(count)) - total
+
+    ratio = brentq(excess, 1.0, growth * (1 + 1e-6) + 1e-6, xtol=1e-15)
+    rows = start * ratio ** np.arange(count)
+    return rows * (total / rows.sum())
+
+
+def graded_grid(length: float, height: float, element_size: float, coating: float = 0.0,
+                growth: float = GROWTH) -> TensorGrid:
+    """Grid of one piece [m]: cells of `element_size` (or just below) along x, at least 4 rows in the coating.
+
+    PatchfemError when element_size exceeds the length or the coating the height.
+    """
+    if element_size > length * (1 + 1e-12):
+        raise PatchfemError(f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m")
+    if coating >= height:
+        raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in {height:.6g} m")
+    cells = max(2, ceil(length / element_size - 1e-9))
+    x = np.linspace(-length / 2, length / 2, cells + 1)
+    first = length / cells
+    rows = np.empty(0)
+    if coating > 0:
+        rows = graded_rows(min(first, coating / COATING_ROWS), coating, growth, COATING_ROWS)
+        first = rows[-1] * growth
+    under = graded_rows(first, height - coating, growth, 3)
+    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
+    if coating > 0:
+        depth[rows.size] = coating
+    depth[-1] = height
+    return TensorGrid(frozen_array(x), frozen_array(depth), int(rows.size))
+
+
+def coarser(grid: TensorGrid) -> TensorGrid:
+    """The same piece with half as many columns and rows re-graded from twice the element size."""
+    size = 2 * grid.length / (grid.x.size - 1)
+    return graded_grid(grid.length, grid.height, min(size, grid.length / 2), grid.coating)

@@ -1,0 +1,166 @@
+"""The strict unit table: ``"<number> <unit>"`` to SI and back, no arithmetic, nothing guessed.
+
+The kind comes from the key, so ``g`` is the standard gravity in an acceleration and a gram in a mass.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+
+_POUND_FORCE = 4.4482216152605
+
+# kind -> unit -> factor to SI; the first unit of each kind is its SI unit
+KINDS: dict[str, dict[str, float]] = {
+    "length": {
+        "m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
+        "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6,
+    },
+    "area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6, "um^2": 1e-12, "in^2": 6.4516e-4},
+    "force": {"N": 1.0, "kN": 1e3, "lbf": _POUND_FORCE, "kgf": 9.80665},
+    "moment": {"N m": 1.0, "N mm": 1e-3, "kN m": 1e3, "lbf in": 0.1129848290276167, "lbf ft": 1.3558179483314003},
+    "mass": {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "lb": 0.45359237},
+    "density": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/in^3": 27679.90471020312},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "in/s^2": 0.0254, "ft/s^2": 0.3048},
+    "velocity": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "um/s": 1e-6, "nm/s": 1e-9, "in/s": 0.0254},
+    "pressure": {
+        "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9,
+        "psi": 6894.757293168362, "ksi": 6894757.293168361, "Msi": 6894757293.168362,
+    },
+    "angle": {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0},
+    "temperature": {"K": 1.0},
+    "stiffness": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "N/mm": 1e3, "kN/mm": 1e6, "N/um": 1e6,
+                  "lbf/in": 175.1268352464764},
+    "rotational stiffness": {"N m/rad": 1.0, "N mm/rad": 1e-3, "kN m/rad": 1e3, "lbf in/rad": 0.1129848290276167},
+    "foundation stiffness": {"Pa/m": 1.0, "MPa/m": 1e6, "GPa/m": 1e9, "MPa/mm": 1e9, "MPa/um": 1e12, "GPa/mm": 1e12},
+    "damping": {"N s/m": 1.0, "N s/mm": 1e3, "kN s/m": 1e3, "lbf s/in": 175.1268352464764},
+    "cubic stiffness": {"N/m^3": 1.0, "kN/m^3": 1e3, "MN/m^3": 1e6, "N/mm^3": 1e9},
+    "wear coefficient": {"m^2/N": 1.0, "mm^2/N": 1e-6, "mm^3/(N m)": 1e-9, "1/Pa": 1.0, "1/MPa": 1e-6},
+    "sweep rate": {"Hz/s": 1.0, "Hz/min": 1.0 / 60.0, "kHz/s": 1e3},
+    "participation": {"rad/m": 1.0, "rad/mm": 1e3},
+    "areal density": {"1/m^2": 1.0, "1/cm^2": 1e4, "1/mm^2": 1e6, "1/um^2": 1e12},
+}
+
+EXAMPLES: dict[str, str] = {
+    "length": "12.7 mm", "area": "161 mm^2", "force": "26 lbf", "moment": "0.05 N m", "mass": "0.884 kg",
+    "density": "4370 kg/m^3", "time": "2 s", "frequency": "143 Hz", "acceleration": "5 g", "velocity": "5 mm/s",
+    "pressure": "121 GPa", "angle": "0.1 mrad", "temperature": "293.15 K", "stiffness": "5e6 N/m",
+    "rotational stiffness": "1e4 N m/rad", "foundation stiffness": "1e13 Pa/m", "damping": "10 N s/m",
+    "cubic stiffness": "1e12 N/m^3", "wear coefficient": "1e-14 m^2/N", "sweep rate": "0.5 Hz/s",
+    "participation": "2 rad/m", "areal density": "1e10 1/m^2",
+}
+
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_QUANTITY = re.compile(rf"({_NUMBER})[ \t]+(\S.*)")
+_BARE = re.compile(_NUMBER)
+_GLUED = re.compile(rf"({_NUMBER})([^\s0-9.,#+±-].*)")
+_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_LONGEST = 100
+
+
+def parse(text: object, kind: str) -> float:
+    """SI value of a quantity ``"<number> <unit>"`` of one kind (a key of KINDS), correctly rounded.
+
+    ValueError, with the kind wanted and an example, for a bare number, an unknown or ambiguous unit, a unit of
+    another kind, anything beside one number and one unit, and a value that is not finite.
+    """
+    if not isinstance(text, str):
+        raise ValueError(_not_text(text, kind))
+    words = text.strip()
+    found = _QUANTITY.fullmatch(words) if len(words) <= _LONGEST else None
+    if found is None:
+        raise ValueError(_malformed(words, kind))
+    number, unit = found.groups()
+    factor = KINDS[kind].get(_plain(unit))
+    if factor is None:
+        raise ValueError(_wrong_unit(number, unit, kind))
+    return _value(number, factor, words, kind)
+
+
+def format_si(value: float, kind: str) -> str:
+    """The value with the SI unit of its kind, such as ``"0.0127 m"``; `parse` gives back the very same float."""
+    return f"{float(value)!r} {next(iter(KINDS[kind]))}"
+
+
+def wanted(kind: str) -> str:
+    """What a key of this kind wants, with an example, as the end of a message."""
+    return f"{_article(kind)} with its unit is wanted, such as '{EXAMPLES[kind]}'"
+
+
+def _value(number: str, factor: float, words: str, kind: str) -> float:
+    rough = float(number)
+    if rough == 0.0:
+        if re.search("[1-9]", re.split("[eE]", number)[0]):
+            raise ValueError(f"'{words}' is too small for a floating-point number; {wanted(kind)}")
+        return 0.0
+    if math.isinf(rough) or math.isinf(rough * factor):
+        raise ValueError(f"'{words}' is too large for a finite number; {wanted(kind)}")
+    value = float(Fraction(number) * Fraction(repr(factor)))
+    if value == 0.0:
+        raise ValueError(f"'{words}' is too small for a floating-point number; {wanted(kind)}")
+    if kind == "temperature" and value < 0.0:
+        raise ValueError(f"'{words}' is below 0 K; {wanted(kind)}")
+    return value
+
+
+def _plain(unit: str) -> str:
+    """One spelling per unit: u for both micro signs, ^ for superscripts, one blank for a product."""
+    for sign, letter in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", " ")):
+        unit = unit.replace(sign, letter)
+    return " ".join(unit.split())
+
+
+def _not_text(value: object, kind: str) -> str:
+    if isinstance(value, bool):
+        return f"{str(value).lower()} is not a quantity; {wanted(kind)}"
+    if isinstance(value, int | float):
+        return f"a bare number without a unit; {wanted(kind)}"
+    return f"not a quantity; {wanted(kind)}"
+
+
+def _malformed(words: str, kind: str) -> str:
+    shown = words if len(words) <= 60 else words[:57] + "..."
+    if _BARE.fullmatch(words):
+        reason = f"'{shown}' is a bare number without a unit"
+    elif "±" in words or "+/-" in words or "+-" in words:
+        reason = f"'{shown}' carries a tolerance: give the nominal value alone"
+    elif _COMMA.match(words):
+        reason = f"'{shown}' has a comma: write the decimal separator as a point"
+    elif "#" in words:
+        reason = f"'{shown}': '#' is ambiguous, spell the unit out ({_list(kind)})"
+    elif re.match(r"[+-]?(nan|inf)", words, re.IGNORECASE):
+        reason = f"'{shown}' is not a finite number"
+    elif (glued := _GLUED.fullmatch(words)) and _plain(glued[2]) in KINDS[kind]:
+        reason = f"'{shown}' lacks the blank between number and unit: write '{glued[1]} {glued[2]}'"
+    else:
+        reason = f"'{shown}' is not one number and one unit ({_list(kind)})"
+    return f"{reason}; {wanted(kind)}"
+
+
+def _wrong_unit(number: str, unit: str, kind: str) -> str:
+    plain = _plain(unit)
+    example = f"such as '{EXAMPLES[kind]}'"
+    if "±" in unit or "+/-" in unit:
+        return f"'{number} {unit}' carries a tolerance: give the nominal value alone; {wanted(kind)}"
+    if kind == "force" and plain in ("lb", "lbs", "#"):
+        return f"'{unit}' is ambiguous for a force; did you mean 'lbf'? use one of {_list(kind)}, {example}"
+    if kind == "temperature" and plain.lstrip("°").removeprefix("deg") in ("C", "F"):
+        return f"'{unit}' is refused: temperatures are absolute here, 20 degC is '293.15 K'; use K, {example}"
+    others = [other for other, units in KINDS.items() if plain in units]
+    if others:
+        belongs = f"'{unit}' is a unit of {' or '.join(others)}"
+        return f"{belongs}, but this is {_article(kind)}; use one of {_list(kind)}, {example}"
+    if plain.count("/") and " " in plain.split("/", 1)[1] and "(" not in plain:
+        return f"'{unit}' is ambiguous: bracket what stands below the stroke; use one of {_list(kind)}, {example}"
+    return f"unknown unit '{unit}' for {_article(kind)}; use one of {_list(kind)}, {example}"
+
+
+def _article(kind: str) -> str:
+    return ("an " if kind[0] in "aeiou" else "a ") + kind
+
+
+def _list(kind: str) -> str:
+    return ", ".join(KINDS[kind])

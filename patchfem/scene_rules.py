@@ -1,0 +1,373 @@
+"""What a scene must satisfy beyond the limits of each key: which keys belong together, which exclude each other.
+
+Each rule looks at a `Draft`: the tables as far as they could be read (None where a value is missing or wrong), and
+what was written. A rule says every mistake it finds and stays silent about values that are not there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from pydantic import BaseModel
+
+from patchfem.scene_tables import Friction, Tables
+from patchfem.scene_types import keys
+
+# Valid in a scene but without an implementation -> what serves meanwhile. Building one means deleting its line.
+NOT_YET_BUILT: dict[str, str] = {
+    "contact.upper": "",
+    "contact.lower": "",
+    "contact.approach": "contact.load",
+    "contact.holder": "",
+    "contact.step": "",
+    "contact.profile": "",
+    "contact.asperities": "",
+    "contact.strips": "",
+    "normal.amplitude": "",
+    "normal.frequency": "",
+    "normal.phase": "",
+    "normal.width": "",
+    "friction.law=tanh": "coulomb, elastic-plastic or nonlocal",
+    "friction.law=convolution": "coulomb, elastic-plastic or nonlocal",
+    "friction.temperature": "",
+    "friction.spread": "",
+    "friction.breakaway": "",
+    "slide.kind=dwell": "constant, sine or triangle",
+    "slide.kind=file": "constant, sine or triangle",
+    "structure.mode.normal": "",
+    "structure.mode.pitch": "",
+    "structure.mode.lateral": "",
+    "structure.mode.yaw": "",
+    "structure.stiffening": "",
+    "structure.bonded": "",
+    "structure.masses": "[[structure.mode]]",
+    "structure.spring": "[[structure.mode]]",
+    "structure.damper": "[[structure.mode]]",
+    "structure.interface": "[friction]",
+    "structure.file": "[[structure.mode]]",
+    "drive.kind=force": "base",
+    "drive.kind=free": "base",
+    "drive.waveform=step": "sine",
+    "drive.waveform=sweep": "sine",
+    "drive.waveform=levels": "sine, one scene per level",
+    "drive.waveform=file": "sine",
+    "wear": "",
+    "accuracy.method=duhamel": "auto, exact or march",
+    "accuracy.method=newmark": "auto, exact or march",
+    "accuracy.method=euler": "auto, exact or march",
+    "accuracy.method=harmonic": "auto, exact or march",
+    "accuracy.harmonics": "",
+    "accuracy.convergence": "",
+    "accuracy.convergence_tolerance": "",
+    "accuracy.stick_speed": "",
+}
+
+# selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
+LAWS: dict[str, tuple[str, str]] = {
+    "coulomb": ("", "kinetic"),
+    "tanh": ("reference_speed", ""),
+    "elastic-plastic": ("bond_length", ""),
+    "nonlocal": (
+        "bond_length",
+        "kinetic reading order rest_growth slip_growth rest_speed initial_bonds breakaway spread temperature",
+    ),
+    "convolution": ("bond_length", ""),
+}
+SLIDES: dict[str, tuple[str, str]] = {
+    "constant": ("speed distance", ""),
+    "sine": ("amplitude frequency", "cycles"),
+    "triangle": ("amplitude speed", "distance cycles"),
+    "dwell": ("speed distance hold", "distance_after"),
+    "file": ("file", ""),
+}
+WAVEFORMS: dict[str, tuple[str, str]] = {
+    "sine": ("frequency", "acceleration displacement force cycles duration"),
+    "step": ("", "acceleration displacement force cycles duration"),
+    "sweep": ("from to rate", "acceleration displacement force cycles duration"),
+    "levels": ("frequency levels", "cycles duration"),
+    "file": ("file", "cycles duration"),
+}
+ASPERITIES: dict[str, tuple[str, str]] = {
+    "linear": ("normal_stiffness", "tangential_ratio"),
+    "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
+    "hertz": ("radius density height_deviation", "tangential_ratio"),
+}
+
+
+class Draft(Protocol):
+    """A scene being read: the tables so far, what was written, and where mistakes go."""
+
+    tables: Tables
+
+    def given(self, key: str) -> bool: ...
+    def say(self, key: str, message: str) -> None: ...
+    def remark(self, sentence: str) -> None: ...
+    def lacks(self, key: str, reason: str) -> None: ...
+    def lacks_table(self, name: str, reason: str) -> None: ...
+
+
+def check(draft: Draft) -> str:
+    """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
+    for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, _drive):
+        rule(draft)
+    return _kind(draft)
+
+
+def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
+    """Key and message for everything the tables name that has no implementation yet; a zero number names nothing."""
+    for entry, instead in NOT_YET_BUILT.items():
+        path, _, value = entry.partition("=")
+        use = f"use {instead} meanwhile; " if instead else ""
+        for key, found in _find(tables, path):
+            if value and found == value:
+                yield key, f"'{value}': {use}not yet built"
+            elif not value and found not in (None, (), 0, 0.0):
+                yield key, f"{use}not yet built"
+
+
+def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> set[str]:
+    """Keys of a table that the value of its selector gives no meaning, among those that depend on it."""
+    needs, can = used[getattr(table, selector)]
+    dependent = {key for pair in used.values() for keys in pair for key in keys.split()}
+    return (dependent - set(needs.split()) - set(can.split())) & keys(type(table)).keys()
+
+
+def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
+    name, _, rest = path.partition(".")
+    value = getattr(table, name, None)
+    at = f"{at}.{name}" if at else name
+    if not rest:
+        yield at, value
+    elif isinstance(value, tuple):
+        for index, item in enumerate(value):
+            yield from _find(item, rest, f"{at}.{index}")
+    elif value is not None:
+        yield from _find(value, rest, at)
+
+
+def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]) -> None:
+    """Missing keys that the selector's value needs; remarks on those it gives no meaning."""
+    value = getattr(table, selector, None)
+    if value not in used:
+        return
+    for key in used[value][0].split():
+        if not draft.given(f"{at}.{key}"):
+            draft.lacks(f"{at}.{key}", f"{selector} '{value}' needs it")
+    for key in sorted(unused(table, selector, used)):
+        if draft.given(f"{at}.{key}") and key != "kinetic":
+            draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")
+
+
+def _contact(draft: Draft) -> None:
+    contact = draft.tables.contact
+    if contact is None:
+        return
+    load, approach = draft.given("contact.load"), draft.given("contact.approach")
+    if load and approach:
+        draft.say("contact.approach", "[contact.approach] and contact.load exclude each other: keep one")
+    if not load and not approach:
+        draft.lacks("contact.load", "" if "contact.approach" in NOT_YET_BUILT else "or [contact.approach] instead")
+    if contact.element_size and contact.length and contact.element_size > contact.length:
+        draft.say("contact.element_size", f"{contact.element_size} m is longer than contact.length {contact.length} m")
+    pieces = [("contact.coating", contact.coating, contact.height)]
+    for name in ("upper", "lower"):
+        if piece := getattr(contact, name):
+            own = piece.coating if piece.coating is not None else contact.coating
+            at = f"contact.{name}.coating" if piece.coating is not None else f"contact.{name}"
+            pieces.append((at, own, piece.height or contact.height))
+    for at, coating, height in pieces:
+        thickness = getattr(coating, "thickness", None)
+        if thickness and height and thickness >= height:
+            key = f"{at}.thickness" if at.endswith("coating") else f"{at}.height"
+            draft.say(key, f"coating of {thickness} m must be thinner than the height {height} m of its piece")
+    if contact.holder and not draft.given("contact.holder.rotational_stiffness"):
+        if not draft.given("contact.holder.tangential_stiffness"):
+            draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are wanted")
+    if contact.step and contact.step.at is not None and contact.length and abs(contact.step.at) >= contact.length / 2:
+        draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is wanted")
+    if contact.asperities:
+        _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
+
+
+def _load_line(draft: Draft) -> None:
+    contact = draft.tables.contact
+    line = contact and contact.load_line
+    if not line:
+        return
+    at = "contact.load_line"
+    offset, moment = draft.given(f"{at}.offset"), draft.given(f"{at}.moment")
+    if offset and moment:
+        draft.say(f"{at}.moment", "offset and moment exclude each other: keep one")
+    if not offset and not moment:
+        draft.lacks(f"{at}.offset", "or load_line.moment instead")
+    if draft.given("contact.tilt.angle") and not draft.given("contact.holder"):
+        draft.say(at, "stands beside contact.tilt.angle without [contact.holder]: a piece free to rotate has no "
+                      "prescribed angle; keep one of the two or add the holder's spring")  # fmt: skip
+    half = contact.length / 2 if contact.length else None
+    if half and line.offset is not None and abs(line.offset) >= half:
+        draft.say(f"{at}.offset", f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is wanted")
+    if half and line.moment and contact.load is not None and abs(line.moment) >= half * contact.load:
+        draft.say(f"{at}.moment", f"{line.moment} N m over the load {contact.load} N lies outside the patch: "
+                                  f"|moment|/load < length/2 = {half} m is wanted")  # fmt: skip
+
+
+def _normal(draft: Draft) -> None:
+    if draft.tables.normal is None:
+        return
+    if draft.given("normal.amplitude") and not draft.given("normal.frequency"):
+        draft.lacks("normal.frequency", "an amplitude needs it")
+    for key in ("frequency", "phase"):
+        if draft.given(f"normal.{key}") and not draft.given("normal.amplitude"):
+            draft.lacks("normal.amplitude", f"{key} needs it")
+
+
+def _frictions(draft: Draft) -> None:
+    if draft.tables.friction is not None:
+        _friction(draft, "friction", draft.tables.friction)
+    if draft.tables.structure is not None:
+        for index, interface in enumerate(draft.tables.structure.interface or ()):
+            _friction(draft, f"structure.interface.{index}", interface)
+
+
+def _friction(draft: Draft, at: str, law: Friction) -> None:
+    _needs(draft, at, law, "law", LAWS)
+    if draft.given(f"{at}.kinetic") and law.law not in ("coulomb", "nonlocal", None):
+        draft.say(f"{at}.kinetic", f"law '{law.law}' has one coefficient only; kinetic belongs to coulomb and nonlocal")
+    elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
+        draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
+    for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
+        if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
+            draft.lacks(f"{at}.{other}", f"{key} needs it; leave both out for a constant bond length")
+    if law.order is not None and (law.order <= -1 or (law.order < 0 and law.reading == "stretch")):
+        wanted = ">= 0 (reading 'stretch')" if law.reading == "stretch" else "> -1 (reading 'report')"
+        draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
+    contact = draft.tables.contact
+    if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.shear:
+        draft.say(f"{at}.reading", "'report' is refused beside [contact.shear]; use 'stretch' or leave out the shear")
+
+
+def _slide(draft: Draft) -> None:
+    slide = draft.tables.slide
+    if slide is None:
+        return
+    _needs(draft, "slide", slide, "kind", SLIDES)
+    if slide.kind in ("constant", "dwell") and slide.distance == 0.0:
+        draft.say("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
+
+
+def _structure(draft: Draft) -> None:
+    structure = draft.tables.structure
+    if structure is None:
+        return
+    forms = [key for key in ("mode", "masses", "file") if draft.given(f"structure.{key}")]
+    if len(forms) > 1:
+        draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
+    if not forms:
+        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted")
+    if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
+        draft.lacks("structure.moving_mass", "")
+    if "masses" not in forms:
+        for key in ("spring", "damper", "interface", "output_mass"):
+            if draft.given(f"structure.{key}"):
+                draft.lacks("structure.masses", f"structure.{key} needs them")
+    _modes(draft)
+
+
+def _modes(draft: Draft) -> None:
+    modes = draft.tables.structure.mode or ()
+    names: set[str] = set()
+    for index, mode in enumerate(modes):
+        if mode.name is not None and mode.name in names:
+            draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
+        names.add(mode.name)
+    bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
+             for index, mode in enumerate(modes)]  # fmt: skip
+    squares = [(base or 0.0) * (base or 0.0) for base in bases]
+    if sum(squares) > 1 + 1e-9:
+        at = f"structure.mode.{squares.index(max(squares))}"
+        key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
+        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is wanted (base is the share of "
+                       "the base motion; the first mode's is its slide unless given)")  # fmt: skip
+
+
+def _drive(draft: Draft) -> None:
+    drive = draft.tables.drive
+    if drive is None:
+        return
+    if drive.kind in ("base", "force"):
+        _needs(draft, "drive", drive, "waveform", WAVEFORMS)
+    cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
+    if cycles and duration:
+        draft.say("drive.duration", "cycles and duration exclude each other: keep one")
+    if not cycles and not duration and (drive.kind == "free" or drive.waveform in ("sine", "step", "levels")):
+        draft.lacks("drive.cycles", "or drive.duration instead")
+    _drive_level(draft, drive)
+
+
+def _drive_level(draft: Draft, drive: Any) -> None:
+    levelled = drive.waveform in ("sine", "step", "sweep")
+    acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
+    if drive.kind == "base" and levelled:
+        if acceleration and displacement:
+            draft.say("drive.displacement", "acceleration and displacement exclude each other: keep one")
+        if not acceleration and not displacement:
+            draft.lacks("drive.acceleration", "or drive.displacement instead")
+    if drive.kind == "force" and levelled and not draft.given("drive.force"):
+        draft.lacks("drive.force", "kind 'force' needs it")
+    if drive.kind == "free" and not displacement:
+        draft.lacks("drive.displacement", "kind 'free' needs it: released from there")
+    for key in drive_unused(drive):
+        if draft.given(f"drive.{key}"):
+            draft.remark(f"drive.{key} has no meaning for kind '{drive.kind}' and is not used")
+
+
+def drive_unused(drive: Any) -> list[str]:
+    """Keys of [drive] that its kind gives no meaning, whatever the waveform."""
+    without = {
+        "base": ["force", "mass"],
+        "force": ["acceleration", "displacement"],
+        "free": ["acceleration", "force", "frequency", "from", "to", "rate", "levels", "file", "waveform"],
+    }
+    return without.get(drive.kind, [])
+
+
+def _kind(draft: Draft) -> str:
+    """The kind of run from the tables that stand together, or a mistake for each one missing or in the way."""
+    has = {name for name in ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
+           if draft.given(name)}  # fmt: skip
+    if draft.given("structure.interface"):
+        for name in sorted(has & {"friction", "normal", "contact"}):
+            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: an interface carries its own")
+        has |= {"friction", "normal"}
+    if {"contact", "normal"} <= has:
+        draft.say("normal", "[contact] and [normal] exclude each other: keep one source of the normal load")
+        has.discard("normal")
+    moves, pressed = has & {"structure", "drive"}, has & {"contact", "normal"}
+    if "slide" in has and moves:
+        draft.say("slide", "[slide] prescribes the motion, [structure] with [drive] computes it: keep one")
+        return ""
+    if has == {"contact"}:
+        return "patch"
+    if has == {"structure", "drive"}:
+        return "linear"
+    return _with_friction(draft, has, pressed, moves)
+
+
+def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[str]) -> str:
+    if not has:
+        draft.lacks_table("contact", "a scene needs [contact], or [structure] with [drive], or both with [friction]")
+        return ""
+    if moves and "drive" not in has:
+        draft.lacks_table("drive", "[structure] needs it")
+    if moves and "structure" not in has:
+        draft.lacks_table("structure", "[drive] needs it")
+    friction = pressed or has & {"friction", "slide", "wear"}
+    if friction and "friction" not in has:
+        others = ", ".join(f"[{name}]" for name in sorted(has))
+        draft.lacks_table("friction", f"{others} without it are no kind of run")
+    if friction and not pressed:
+        draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
+    if friction and not moves and "slide" not in has:
+        draft.lacks_table("slide", "friction needs a motion, [slide] or [structure] with [drive]")
+    return "bench" if "slide" in has else "rig"

@@ -1,0 +1,133 @@
+"""The unit table: exact values, exact round trips, and every trap refused with what was wanted."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.quantities import EXAMPLES, KINDS, format_si, parse
+
+
+@pytest.mark.parametrize(
+    "text, kind, value",
+    [
+        ("12.7 mm", "length", 0.0127),
+        ("6 mil", "length", 0.0001524),
+        ("1 in", "length", 0.0254),
+        ("1 um", "length", 1e-6),
+        ("1 µm", "length", 1e-6),
+        ("1 μm", "length", 1e-6),
+        ("-0.5 mm", "length", -5e-4),
+        (".5 mm", "length", 5e-4),
+        ("+5.e-1 mm", "length", 5e-4),
+        ("  3   nm ", "length", 3e-9),
+        ("1 lbf", "force", 4.4482216152605),
+        ("1 kgf", "force", 9.80665),
+        ("5 g", "acceleration", 49.03325),
+        ("5 g", "mass", 0.005),
+        ("180 deg", "angle", math.pi),
+        ("1 µrad", "angle", 1e-6),
+        ("1e-5 mm³/(N·m)", "wear coefficient", 1e-14),
+        ("1 1/MPa", "wear coefficient", 1e-6),
+        ("0.05 N·m", "moment", 0.05),
+        ("10 m/s²", "acceleration", 10.0),
+        ("0 N", "force", 0.0),
+        ("0e999999999 N", "force", 0.0),
+        ("0 K", "temperature", 0.0),
+    ],
+)
+def test_exact_values(text, kind, value):
+    assert parse(text, kind) == value
+
+
+def test_exact_pound_force_per_inch_and_its_relatives():
+    pound, inch, gravity = Fraction("0.45359237"), Fraction("0.0254"), Fraction("9.80665")
+    assert parse("1 lbf", "force") == float(pound * gravity)
+    assert parse("1 lbf/in", "stiffness") == float(pound * gravity / inch)
+    assert parse("1 lbf in", "moment") == float(pound * gravity * inch)
+    assert parse("1 lbf ft", "moment") == float(pound * gravity * inch * 12)
+    assert parse("1 psi", "pressure") == float(pound * gravity / inch**2)
+    assert parse("1 ksi", "pressure") == float(1000 * pound * gravity / inch**2)
+    assert parse("1 Msi", "pressure") == float(10**6 * pound * gravity / inch**2)
+    assert parse("1 lb/in^3", "density") == float(pound / inch**3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_every_kind_has_its_si_unit_first_and_a_valid_example(kind):
+    assert next(iter(KINDS[kind].values())) == 1.0
+    assert parse(EXAMPLES[kind], kind) > 0.0
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from([k for k in KINDS if k != "temperature"]))
+def test_always_the_si_text_gives_back_the_same_float(value, kind):
+    assert parse(format_si(value, kind), kind) == value
+
+
+@given(st.text(max_size=40), st.sampled_from(list(KINDS)))
+def test_always_a_finite_float_or_a_value_error(text, kind):
+    try:
+        assert math.isfinite(parse(text, kind))
+    except ValueError as error:
+        assert str(error)
+
+
+@given(st.sampled_from(list(KINDS)), st.data())
+def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
+    unit = data.draw(st.sampled_from(list(KINDS[kind])))
+    assert parse(f"1 {unit}", kind) == KINDS[kind][unit]
+
+
+@pytest.mark.parametrize(
+    "text, kind, says",
+    [
+        (5, "force", "a bare number without a unit; a force with its unit is wanted, such as '26 lbf'"),
+        (5.0, "length", "such as '12.7 mm'"),
+        ("26", "force", "'26' is a bare number without a unit"),
+        (True, "force", "true is not a quantity"),
+        ([1], "force", "not a quantity"),
+        (None, "force", "not a quantity"),
+        ("26 lb", "force", "did you mean 'lbf'"),
+        ("26#", "force", "'#' is ambiguous"),
+        ("26 #", "force", "use one of N, kN, lbf, kgf"),
+        ("0,5 mm", "length", "has a comma: write the decimal separator as a point"),
+        ("12 mm ± 0.1", "length", "carries a tolerance"),
+        ("12 ± 0.1 mm", "length", "carries a tolerance"),
+        ("1e-5 mm³/N·m", "wear coefficient", "'mm³/N·m' is ambiguous"),
+        ("3 Ra", "length", "unknown unit 'Ra' for a length; use one of m, km, cm, mm, um, nm, in, ft, mil"),
+        ("1 volt/0.001 in", "length", "use one of m, km"),
+        ("305.626 A", "length", "unknown unit 'A'"),
+        ("6 mil", "force", "'mil' is a unit of length, but this is a force; use one of N, kN, lbf, kgf"),
+        ("4 g", "length", "'g' is a unit of mass or acceleration, but this is a length"),
+        ("5 m", "acceleration", "but this is an acceleration"),
+        ("nan mm", "length", "not a finite number"),
+        ("inf mm", "length", "not a finite number"),
+        ("-Infinity mm", "length", "not a finite number"),
+        ("1e999 m", "length", "too large"),
+        ("1e308 km", "length", "too large"),
+        ("1e-999 m", "length", "too small"),
+        ("1e-999999999 m", "length", "too small"),
+        ("1e-320 nm", "length", "too small"),
+        ("12mm", "length", "write '12 mm'"),
+        ("12 13 mm", "length", "unknown unit '13 mm'"),
+        ("1_000 mm", "length", "not one number and one unit"),
+        ("٣ mm", "length", "not one number and one unit"),
+        ("0x10 mm", "length", "not one number and one unit"),
+        ("mm", "length", "not one number and one unit"),
+        ("", "length", "not one number and one unit"),
+        ("1" * 5000 + " mm", "length", "not one number and one unit"),
+        ("20 degC", "temperature", "temperatures are absolute here"),
+        ("20 °C", "temperature", "'293.15 K'"),
+        ("-1 K", "temperature", "below 0 K"),
+        ("1 MM", "length", "unknown unit 'MM'"),
+    ],
+)
+def test_refuses_traps(text, kind, says):
+    with pytest.raises(ValueError) as caught:
+        parse(text, kind)
+    assert says in str(caught.value)
+    assert EXAMPLES[kind] in str(caught.value)
+    assert len(str(caught.value)) < 400

@@ -1,0 +1,185 @@
+"""Scenes: what a valid one holds in SI, that its resolved text is the same scene, that nothing else escapes."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
+
+from patchfem.lines import key_lines
+from patchfem.materials import MATERIALS
+from patchfem.scene import Scene, SceneError, load, loads
+
+
+def test_exact_rig_in_si():
+    scene = loads(RIG, "folder/a.toml")
+    assert (scene.kind, scene.title, scene.remarks) == ("rig", "143 Hz, 5 g", [])
+    assert scene.contact.length == 0.0127 and scene.contact.load == 115.653761996773  # 26 lbf
+    assert scene.contact.coating.thickness == 0.0001524 and scene.contact.coating.material.young == 250e9
+    assert scene.contact.substrate.name == "Ti-8Al-1Mo-1V" and scene.contact.tilt.angle == 1e-4
+    assert scene.drive.acceleration == 49.03325 and scene.drive.cycles == 200.0
+    assert scene.normal is None and scene.slide is None and scene.contact.shear is None
+    assert scene.beside("before.csv").as_posix() == "folder/before.csv"
+
+
+def test_exact_defaults():
+    scene = loads(RIG)
+    contact, friction = scene.contact, scene.friction
+    assert (contact.pairs, contact.plane, contact.element_size, contact.tilt.on) == (1, "strain", None, "upper")
+    assert (friction.reading, friction.order, friction.initial_bonds, friction.breakaway) == ("stretch", 1.0, 1.0, 0.0)
+    assert friction.kinetic == friction.static == 0.3
+    assert [(mode.base, mode.output) for mode in scene.structure.mode] == [(0.8, 0.8), (0.0, 0.0)]
+    assert (scene.accuracy.tolerance, scene.accuracy.method, scene.accuracy.steps_per_cycle) == (1e-3, "auto", None)
+    assert scene.drive.waveform == "sine"
+    slide = loads(BENCH).slide
+    assert (slide.cycles, slide.distance, slide.frequency) == (1.0, 0.0, None)
+
+
+def test_exact_kinetic_only_where_the_law_has_one():
+    assert loads(BENCH).friction.kinetic == 0.3
+    plastic = loads(BENCH, sets=["friction.law=elastic-plastic", "friction.bond_length=1 um"])
+    assert plastic.friction.kinetic is None
+
+
+@pytest.mark.parametrize("text, kind", [(RIG, "rig"), (BENCH, "bench"), (LINEAR, "linear"), (PATCH, "patch")])
+def test_exact_kinds(text, kind):
+    assert loads(text).kind == kind
+    assert loads(text + '[measured]\nfile = "table1.csv"\n').kind == kind
+
+
+def test_exact_named_effects():
+    extra = '[contact.shear]\n[accuracy]\nmethod = "march"\n[measured]\nfile = "t.csv"\n'
+    assert loads(RIG + extra).named() == [
+        "contact", "contact.coating", "contact.tilt", "contact.shear", "friction.law=nonlocal",
+        "friction.reading=stretch", "structure", "drive.kind=base", "drive.waveform=sine", "accuracy.method=march",
+        "measured",
+    ]  # fmt: skip
+    assert loads(BENCH).named() == ["normal", "friction.law=coulomb", "slide.kind=triangle"]
+
+
+@pytest.mark.parametrize("text, sets", [(RIG, []), (RIG, FULL), (BENCH, []), (LINEAR, []), (PATCH, [])])
+def test_exact_resolved_text_is_the_same_scene(text, sets):
+    scene = loads(text, sets=sets)
+    again = loads(scene.resolved())
+    assert again.tables() == scene.tables()
+    assert again.resolved() == scene.resolved()
+    assert (again.kind, again.named(), again.remarks) == (scene.kind, scene.named(), [])
+
+
+def test_exact_resolved_text_has_no_unused_keys():
+    scene = loads(BENCH + "[accuracy]\ntolerance = 1e-2\n", sets=["friction.bond_length=1 um"])
+    assert "bond_length" not in scene.resolved() and scene.friction.bond_length is None
+    assert scene.remarks == ["friction.bond_length has no meaning for law 'coulomb' and is not used"]
+
+
+def test_exact_scene_survives_pickling():
+    scene = loads(RIG, sets=FULL)
+    assert pickle.loads(pickle.dumps(scene)) == scene
+
+
+def test_exact_tables_are_frozen():
+    with pytest.raises(ValidationError):
+        loads(RIG).contact.load = 1.0
+
+
+def test_exact_load_reads_a_file_with_byte_order_mark(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + RIG.replace("\n", "\r\n").encode())
+    assert load(path).tables() == loads(RIG).tables()
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_exact_materials_by_name(name):
+    found = loads(PATCH, sets=[f"contact.substrate={name}"]).contact.substrate
+    assert (found.young, found.poisson, found.density) == MATERIALS[name][:3]
+
+
+def test_exact_sets_in_order_and_by_mode_name():
+    scene = loads(RIG, sets=["structure.mode.axial.frequency=150 Hz", "contact.load=1 N", "contact.load=2 N",
+                             "title=2024", "contact.crown.radius=1 m", "structure.mode.1.damping=0.02"])  # fmt: skip
+    assert scene.structure.mode[0].frequency == 150.0 and scene.structure.mode[1].damping == 0.02
+    assert (scene.contact.load, scene.title, scene.contact.crown.radius) == (2.0, "2024", 1.0)
+
+
+def test_exact_lines_of_a_hard_text():
+    text = '''a = """
+[no]
+x = 1"""
+[t]  # [no]
+'q.u' = 'x # y'
+list = [ 1, # ] no
+  [2, "]"],
+]
+in.line = {k = 1, m = {n = "}"}}
+[[s.m]]
+x = 1
+[[s.m]]
+y = [{z = 1},
+     {z = 2}]
+[s.m.sub]
+w = \'\'\'it''s\'\'\'
+v = 1979-05-27 07:32:00
+'''
+    lines = key_lines(text)
+    expected = {"a": 1, "t": 4, "t.q.u": 5, "t.list": 6, "t.list.1": 7, "t.in": 9, "t.in.line.m.n": 9, "s": 10,
+                "s.m": 10, "s.m.0": 10, "s.m.0.x": 11, "s.m.1": 12, "s.m.1.y.1.z": 14, "s.m.1.sub": 15,
+                "s.m.1.sub.w": 16, "s.m.1.sub.v": 17}  # fmt: skip
+    assert {key: lines.get(key) for key in expected} == expected
+    assert "no" not in lines and not any("x = 1" in key for key in lines)
+
+
+PIECES = [
+    "contact", "friction", "structure", "mode", "drive", "slide", "normal", "law", "load", "=", "[", "]", "[[", "]]",
+    "{", "}", '"', "'", '"""', "\n", ",", ".", "#", "1", "-1", "1e999", "nan", "true", '"5 mm"', '"26 lbf"', '"x"',
+    "[]", "{}", "1979-05-27", "\\", "\x7f", "é",
+]  # fmt: skip
+
+
+ODD_SETS = [*FULL, "contact=5", "structure.mode=1", "a.b.c=[", "drive={}", "=", "friction.order=1e200"]
+
+
+@st.composite
+def mutated(draw):
+    text = draw(st.sampled_from([RIG, BENCH, PATCH, LINEAR]))
+    for _ in range(draw(st.integers(1, 4))):
+        lines = text.splitlines(keepends=True) or ["\n"]
+        at = draw(st.integers(0, len(lines) - 1))
+        how = draw(st.sampled_from(["drop", "double", "value", "key", "splice"]))
+        key, _, _ = lines[at].partition("=")
+        piece = draw(st.sampled_from(PIECES))
+        if how == "splice":
+            place = draw(st.integers(0, len(text)))
+            text = text[:place] + piece + text[place + draw(st.integers(0, 3)) :]
+            continue
+        lines[at] = {"drop": "", "double": lines[at] * 2, "value": f"{key.strip()} = {piece}\n",
+                     "key": f"{piece} = 1\n"}[how]  # fmt: skip
+        text = "".join(lines)
+    return text
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(mutated(), st.lists(st.sampled_from(ODD_SETS), max_size=2))
+def test_always_a_scene_or_a_scene_error(text, sets):
+    try:
+        scene = loads(text, "a.toml", sets)
+    except SceneError as error:
+        assert error.mistakes
+        assert all("\n" not in m and m.startswith(("a.toml:", "--set: ")) for m in error.mistakes)
+    else:
+        assert isinstance(scene, Scene)
+        assert loads(scene.resolved()).tables() == scene.tables()
+
+
+def test_always_loading_imports_neither_numpy_nor_scipy(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(RIG)
+    code = f"import sys; from patchfem.scene import load; load({str(path)!r})\n"
+    code += "print(sorted({'numpy', 'scipy', 'numba', 'pyvista', 'skfem', 'meshio'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,355 @@
+"""Every mistake of a scene, by line and key, with what was wanted; all of them at once."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
+
+from patchfem.scene import SceneError, load, loads
+from patchfem.scene_rules import NOT_YET_BUILT, _find
+from patchfem.scene_tables import Tables
+from patchfem.scene_types import keys, model_of
+
+# (text, sets, key whose line is named, what the message says)
+BAD_VALUES = [
+    ('load = "26 lb"', "contact.load", "did you mean 'lbf'"),
+    ("load = 26", "contact.load", "a bare number without a unit; a force with its unit is wanted, such as '26 lbf'"),
+    ('load = "26#"', "contact.load", "'#' is ambiguous"),
+    ('load = "6 mil"', "contact.load", "'mil' is a unit of length, but this is a force; use one of N, kN, lbf, kgf"),
+    ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'; a force"),
+    ('load = "nan N"', "contact.load", "not a finite number"),
+    ('load = "1e999 N"', "contact.load", "too large"),
+    ("load = true", "contact.load", "true is not a quantity"),
+    ('length = "0,5 mm"', "contact.length", "comma"),
+    ('length = "12 mm ± 0.1"', "contact.length", "tolerance"),
+    ('length = "-12.7 mm"', "contact.length", "must be > 0, not '-12.7 mm'; a length with its unit is wanted"),
+    ('length = "0 mm"', "contact.length", "must be > 0"),
+    ('width = "3 Ra"', "contact.width", "unknown unit 'Ra'"),
+    ('height = "1 volt/0.001 in"', "contact.height", "use one of m, km"),
+    ('substrate = "Ti-8Al"', "contact.substrate", "did you mean 'Ti-8Al-1Mo-1V'? one of Ti-8Al-1Mo-1V, WC-Co"),
+    ("substrate = 3", "contact.substrate", "a material name or {young ="),
+    ('material = "xyz"', "contact.coating.material", "unknown material 'xyz'; one of Ti-8Al-1Mo-1V"),
+    ('thickness = "6.35 mm"', "contact.coating.thickness", "must be thinner than the height"),
+    ('law = "nonlocl"', "friction.law", "did you mean 'nonlocal'? one of coulomb, tanh"),
+    ("law = 3", "friction.law", "one of coulomb, tanh, elastic-plastic, nonlocal, convolution is wanted, not 3"),
+    ('static = "0.3"', "friction.static", "a plain number is wanted, not '0.3'"),
+    ("static = true", "friction.static", "a plain number is wanted, not true"),
+    ("static = -0.1", "friction.static", "must be >= 0, not -0.1"),
+    ("static = nan", "friction.static", "a plain number is wanted, not nan"),
+    ("static = inf", "friction.static", "a plain number is wanted, not inf"),
+    ("static = 1979-05-27", "friction.static", "a plain number is wanted"),
+    ('moving_mass = "-1 kg"', "structure.moving_mass", "must be > 0"),
+    ('moving_mass = "1 N"', "structure.moving_mass", "'N' is a unit of force, but this is a mass"),
+    ("damping = -0.003", "structure.mode.axial.damping", "must be >= 0"),
+    ('frequency = "-1 Hz"', "structure.mode.axial.frequency", "must be >= 0"),
+    ('kind = "bass"', "drive.kind", "did you mean 'base'? one of base, force, free"),
+    ("cycles = 0", "drive.cycles", "must be > 0"),
+    ("title = 5", "title", "a text in quotes is wanted, not 5"),
+]
+
+
+@pytest.mark.parametrize("line, key, says", BAD_VALUES)
+def test_refuses_a_wrong_value_with_its_line_and_key(line, key, says):
+    start = line.split("=")[0]
+    old = next(row for row in RIG.splitlines() if row.split("=")[0].strip() == start.strip())
+    message = only(RIG.replace(old, line, 1))
+    assert message.startswith(f"a.toml:{line_of(RIG, start.strip())}: {key}: ")
+    assert says in message
+
+
+BAD_SETS = [
+    ("friction.kinetic=0.4", "friction.kinetic", "larger than static"),
+    ("friction.order=-0.5", "friction.order", "must be >= 0"),
+    ("friction.order=-1", "friction.order", "must be >= 0"),
+    ("friction.initial_bonds=1.1", "friction.initial_bonds", "must be <= 1"),
+    ("friction.initial_bonds=-0.1", "friction.initial_bonds", "must be >= 0"),
+    ("friction.breakaway=1", "friction.breakaway", "must be < 1"),
+    ("friction.breakaway=-0.1", "friction.breakaway", "must be >= 0"),
+    ("friction.reading=reprot", "friction.reading", "did you mean 'report'? one of stretch, report"),
+    ("friction.temperature=5", "friction.temperature", "a table [friction.temperature] is wanted, not 5"),
+    ("contact.pairs=0", "contact.pairs", "must be >= 1, not 0; a whole number"),
+    ("contact.pairs=1.5", "contact.pairs", "a whole number is wanted, not 1.5"),
+    ("contact.pairs=true", "contact.pairs", "a whole number is wanted, not true"),
+    ("contact.plane=strane", "contact.plane", "did you mean 'strain'?"),
+    ("contact.element_size=13 mm", "contact.element_size", "longer than contact.length"),
+    ("contact.load_line.offset=1 mm", "contact.load_line", "without [contact.holder]"),
+    ("contact.crown.radius=-1 m", "contact.crown.radius", "must be > 0"),
+    ("contact.tilt.on=both", "contact.tilt.on", "one of upper, lower"),
+    ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
+    ("structure.mode.second.base=0.7", "structure.mode.axial.slide", "sum of base^2"),
+    ("structure.mode.second.name=axial", "structure.mode.1.name", "names two modes"),
+    ("structure.travel=-1 mm", "structure.travel", "must be > 0"),
+    ("drive.displacement=1 mm", "drive.displacement", "acceleration and displacement exclude each other"),
+    ("drive.duration=1 s", "drive.duration", "cycles and duration exclude each other"),
+    ("drive.wavform=sine", "drive.wavform", "unknown key; did you mean 'waveform'?"),
+    ("drive.zzz=1", "drive.zzz", "unknown key; known here: kind, waveform, frequency, from, to"),
+    ("contact.shear.k=1", "contact.shear.k", "unknown key; this table has no keys"),
+    ("contact.tlt={}", "contact.tlt", "unknown table; did you mean 'tilt'?"),
+    ("strucure.moving_mass=1 kg", "strucure", "unknown table; did you mean 'structure'?"),
+    ("accuracy.tolerance=0", "accuracy.tolerance", "must be > 0"),
+    ("accuracy.tolerance=-1e-3", "accuracy.tolerance", "must be > 0"),
+    ("accuracy.method=exakt", "accuracy.method", "did you mean 'exact'? one of auto, exact"),
+    ("accuracy.steps_per_cycle=3", "accuracy.steps_per_cycle", "must be >= 4"),
+    ("accuracy.steps_per_cycle=400.5", "accuracy.steps_per_cycle", "a whole number is wanted, not 400.5"),
+    ("contact.load.x=1", "contact.load.x", "contact.load is a value, not a table"),
+    ("contact.load", "contact.load", "table.key=value is wanted"),
+    ("=5", "=5", "table.key=value is wanted"),
+    ('contact.substrate={young = "1 GPa", poisson = 0.5, density = "1 kg/m^3"}', "contact.substrate.poisson",
+     "must be < 0.5"),
+    ('contact.substrate={young = "1 GPa", poisson = -1, density = "1 kg/m^3"}', "contact.substrate.poisson",
+     "must be > -1"),
+    ('contact.substrate={young = "1 GPa", poisson = 0.3}', "contact.substrate.density", "missing; a density"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("one, key, says", BAD_SETS)
+def test_refuses_a_wrong_set(one, key, says):
+    message = only(RIG, one)
+    where = f"a.toml:{line_of(RIG, 'slide')}" if key == "structure.mode.axial.slide" else "--set"
+    assert message.startswith(f"{where}: {key}: ")
+    assert says in message
+
+
+MISSING = [
+    (RIG, r"^length.*\n", "[contact]", "contact.length", "missing; a length with its unit is wanted, such as"),
+    (RIG, r"^load.*\n", "[contact]", "contact.load", "missing; a force"),
+    (RIG, r"^substrate.*\n", "[contact]", "contact.substrate", "missing; a material name"),
+    (RIG, r"^thickness.*\n", "[contact.coating]", "contact.coating.thickness", "missing; a length"),
+    (RIG, r"^angle.*\n", "[contact.tilt]", "contact.tilt.angle", "missing; an angle"),
+    (RIG, r"^law.*\n", "[friction]", "friction.law", "missing; one of coulomb, tanh"),
+    (RIG, r"^static.*\n", "[friction]", "friction.static", "missing; a plain number is wanted"),
+    (RIG, r"^bond_length.*\n", "[friction]", "friction.bond_length", "law 'nonlocal' needs it"),
+    (RIG, r"^moving_mass.*\n", "[structure]", "structure.moving_mass", "missing; a mass"),
+    (RIG, r"^slide = 0.1\n", "[[structure.mode]]", "structure.mode.second.slide", "missing; a plain number"),
+    (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "missing; a plain number is wanted; or drive.duration instead"),
+    (RIG, r"^acceleration.*\n", "[drive]", "drive.acceleration", "or drive.displacement instead"),
+    (LINEAR, r"^\[\[(.|\n)*(?=\[drive)", "[structure]", "structure.mode", "at least one [[structure.mode]] is wanted"),
+    (BENCH, r"^kind.*\n", "[slide]", "slide.kind", "missing; one of constant, sine, triangle, dwell, file"),
+    (BENCH, r"^amplitude.*\n", "[slide]", "slide.amplitude", "kind 'triangle' needs it"),
+    (BENCH, r"^speed.*\n", "[slide]", "slide.speed", "missing; a velocity with its unit is wanted, such as '5 mm/s'"),
+    (BENCH, r'^load.*\n', "[normal]", "normal.load", "missing; a force"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text, pattern, header, key, says", MISSING)
+def test_refuses_a_missing_key_at_its_table(text, pattern, header, key, says):
+    cut, count = re.subn(pattern, "", text, count=1, flags=re.MULTILINE)
+    assert count == 1
+    message = only(cut)
+    lines = [n for n, line in enumerate(cut.splitlines(), 1) if line == header]
+    assert message.startswith(f"a.toml:{lines[-1]}: {key}: missing")
+    assert says in message
+
+
+@pytest.mark.parametrize(
+    "sets, key, says",
+    [
+        (["friction.law=tanh"], "friction.reference_speed", "law 'tanh' needs it"),
+        (["friction.law=elastic-plastic"], "friction.bond_length", "needs it"),
+        (["friction.law=convolution"], "friction.bond_length", "needs it"),
+        (["slide.kind=sine"], "slide.frequency", "kind 'sine' needs it"),
+        (["slide.kind=constant"], "slide.distance", "kind 'constant' needs it"),
+        (["slide.kind=file"], "slide.file", "kind 'file' needs it"),
+        (["friction.rest_growth=1 g"], "friction.slip_growth", "rest_growth needs it"),
+        (["friction.slip_growth=1 um"], "friction.rest_growth", "slip_growth needs it"),
+        (["normal.amplitude=1 N"], "normal.frequency", "an amplitude needs it"),
+    ],
+)
+def test_refuses_a_key_missing_for_the_selector(sets, key, says):
+    message = only(BENCH, *sets)
+    assert f": {key}: missing" in message and says in message
+
+
+@pytest.mark.parametrize("law", ["tanh", "elastic-plastic", "convolution"])
+def test_refuses_kinetic_for_laws_with_one_coefficient(law):
+    found = mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
+                     "friction.reference_speed=1 mm/s")  # fmt: skip
+    assert found == [f"--set: friction.kinetic: law '{law}' has one coefficient only; "
+                     "kinetic belongs to coulomb and nonlocal"]  # fmt: skip
+
+
+def test_refuses_report_reading_beside_shear():
+    assert "refused beside [contact.shear]" in only(RIG, "contact.shear={}", "friction.reading=report")
+    assert loads(RIG, sets=["friction.reading=report", "friction.order=-0.5"]).friction.order == -0.5
+    assert "must be > -1" in only(RIG, "friction.reading=report", "friction.order=-1")
+
+
+def test_refuses_load_lines_outside_the_patch():
+    text = PATCH.replace('[contact.tilt]\nangle = "0.1 mrad"\n', "[contact.load_line]\n")
+    assert "contact.load_line.offset: missing; a length" in only(text)
+    assert "exclude each other" in only(text, "contact.load_line.offset=1 mm", "contact.load_line.moment=0.05 N m")
+    assert "|offset| < length/2 = 0.00635 m" in only(text, "contact.load_line.offset=-6.35 mm")
+    assert "|moment|/load < length/2" in only(text, "contact.load_line.moment=1 N m")
+    assert "|moment|/load < length/2" in only(text, "contact.load_line.moment=-1e-3 N m", "contact.load=0 N")
+    assert loads(text, sets=["contact.load_line.offset=6.34 mm"]).contact.load_line.offset == 0.00634
+    assert loads(text, sets=["contact.load_line.offset=1 mm", "contact.load=0 N"]).contact.load == 0.0
+
+
+def test_refuses_approach_together_with_load():
+    message = only(PATCH + '[contact.approach]\ndistance = "0.2 um"\n')
+    assert message.startswith("a.toml:12: contact.approach: ") and "exclude each other" in message
+
+
+COMBINATIONS = [
+    ("", "a.toml: missing [contact]: "),
+    ('[measured]\nfile = "x"\n', "a.toml: missing [contact]: "),
+    (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs it"),
+    (LINEAR[LINEAR.index("[drive]") :], "a.toml: missing [structure]: [drive] needs it"),
+    (PATCH + LINEAR, "a.toml: missing [friction]: "),
+    (BENCH[: BENCH.index("[slide]")], "a.toml: missing [slide]: friction needs a motion"),
+    (BENCH[BENCH.index("[friction]") :], "a.toml: missing [contact]: friction needs a normal load"),
+    (BENCH[: BENCH.index("[friction]")] + BENCH[BENCH.index("[slide]") :], "a.toml: missing [friction]: "),
+    (RIG + BENCH[BENCH.index("[slide]") :], "a.toml:34: slide: "),
+    (RIG + '[normal]\nload = "1 N"\n', "a.toml:34: normal: [contact] and [normal] exclude each other"),
+    (LINEAR + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 5\n', "a.toml: missing [friction]: "),
+]
+
+
+@pytest.mark.parametrize("text, start", COMBINATIONS)
+def test_refuses_tables_that_do_not_stand_together(text, start):
+    assert mistakes(text)[0].startswith(start)
+
+
+def test_refuses_all_mistakes_at_once_in_the_order_of_the_file():
+    text = (
+        RIG.replace('load   = "26 lbf"', 'load = "26 lb"')
+        .replace("static = 0.30", "static = 0.3\nkinetic = 0.4\norder = -3")
+        .replace('bond_length = "1 um"\n', "")
+        .replace("damping = 0.003", "dampin = 0.003")
+        .replace("[drive]", "[drve]")
+    )
+    found = mistakes(text, "accuracy.tolerance=0")
+    keys = [message.split(": ")[1] for message in found]
+    assert keys == [
+        "missing [drive]", "contact.load", "friction.bond_length", "friction.kinetic", "friction.order",
+        "structure.mode.axial.damping", "structure.mode.axial.dampin", "drve", "accuracy.tolerance",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text, start",
+    [
+        ("a = 1\nb = = 2\n", "a.toml:2: not valid TOML: "),
+        ("a = 1\na = 2\n", "a.toml:2: not valid TOML: "),
+        ("[contact\n", "a.toml:1: not valid TOML: "),
+        ('a = 1\nb = """x\n', "a.toml:2: not valid TOML: "),
+        ("a = " + "[" * 5000, "a.toml:1: not valid TOML: nested too deeply"),
+        ("a = " + "1" * 5000, "a.toml:1: not valid TOML: "),
+    ],
+)
+def test_refuses_a_text_that_is_not_toml(text, start):
+    assert only(text).startswith(start)
+
+
+def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
+    assert "sum of base^2" in only(RIG, "structure.mode.axial.base=1e200")
+    assert "unknown key" in only(RIG.replace("[structure]\n", '[structure]\n"mode.².x" = 1\n'))
+    assert "unknown key" in only(RIG.replace("[structure]\n", '[structure]\n"a\\n\\u001bb" = 1\n'))
+    assert "unknown key" in only("deep = " + "[" * 250 + "]" * 250 + "\n" + RIG)
+    assert "a plain number is wanted" in only(RIG, "friction.static=" + "9" * 400)
+
+
+def test_refuses_what_cannot_be_read(tmp_path):
+    for path, says in [(tmp_path, "cannot be read: Is a directory"), (tmp_path / "no.toml", "cannot be read: No such"),
+                       ("a\0b", "cannot be read")]:  # fmt: skip
+        with pytest.raises(SceneError) as caught:
+            load(path)
+        assert caught.value.mistakes[0].startswith(f"{path}: {says}")
+    path = tmp_path / "latin.toml"
+    path.write_bytes(b'title = "x"\n# 5 \xb5m\n')
+    with pytest.raises(SceneError, match=r"latin\.toml:2: not UTF-8: byte 0xb5"):
+        load(path)
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        ("contact = 5\n", "contact: a table [contact] is wanted, not 5"),
+        ("[[contact]]\n", "contact: a table [contact] is wanted, not an array"),
+        ("[structure]\nmode = 5\n", "structure.mode: an array of tables [[structure.mode]] is wanted, not 5"),
+        ("[structure]\nmode = []\n", "not an empty array"),
+        ("[structure.mode]\n", "structure.mode: an array of tables [[structure.mode]] is wanted, not a table"),
+    ],
+)
+def test_refuses_another_shape_of_table(text, says):
+    assert any(says in message for message in mistakes(text))
+
+
+UNBUILT = [
+    (PATCH, ['contact.upper.height="5 mm"'], "contact.upper"),
+    (PATCH, ['contact.lower.coating="none"'], "contact.lower"),
+    (PATCH.replace('load   = "26 lbf"\n', ""), ["contact.approach.distance=0.2 um"], "contact.approach"),
+    (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder"),
+    (PATCH, ["contact.step.height=1 um", "contact.step.at=2 mm"], "contact.step"),
+    (PATCH, ["contact.profile.file=before.csv"], "contact.profile"),
+    (PATCH, ["contact.asperities.law=exponential", "contact.asperities.decay_length=1 um"], "contact.asperities"),
+    (PATCH, ["contact.strips.count=8"], "contact.strips"),
+    (BENCH, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "friction.law"),
+    (BENCH, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
+    (RIG, ["friction.spread=5 um"], "friction.spread"),
+    (RIG, ["friction.breakaway=0.1"], "friction.breakaway"),
+    (RIG, ["friction.temperature.surface=393 K", "friction.temperature.reference=293 K"], "friction.temperature"),
+    (BENCH, ["slide.kind=dwell", "slide.distance=1 um", "slide.hold=1 s"], "slide.kind"),
+    (BENCH, ["slide.kind=file", "slide.file=a.csv"], "slide.kind"),
+    (RIG, ["structure.mode.second.pitch=2 rad/m"], "structure.mode.second.pitch"),
+    (RIG, ["structure.stiffening.cubic=1e12 N/m^3"], "structure.stiffening"),
+    (RIG, ["structure.bonded.stiffness=1e6 N/m"], "structure.bonded"),
+    (RIG, ["structure.output_mass=1", 'structure={masses = ["1 kg"], output_mass = 1}'], "structure.masses"),
+    (RIG, ["structure={file = 'rig.uff'}"], "structure.file"),
+    (RIG, ["drive.waveform=levels", "drive.levels=['3 g', '4 g']"], "drive.waveform"),
+    (RIG, ["drive.waveform=sweep", "drive.from=1 Hz", "drive.to=9 Hz", "drive.rate=1 Hz/s"], "drive.waveform"),
+    (RIG, ["drive={kind = 'free', displacement = '1 mm', cycles = 3}"], "drive.kind"),
+    (RIG, ["drive={kind = 'force', force = '1 N', cycles = 3, frequency = '1 Hz'}"], "drive.kind"),
+    (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10"], "wear"),
+    (RIG, ["accuracy.method=newmark"], "accuracy.method"),
+    (RIG, ["accuracy.harmonics=5"], "accuracy.harmonics"),
+]
+
+
+@pytest.mark.parametrize("text, sets, key", UNBUILT)
+def test_refuses_what_is_not_yet_built_by_name(text, sets, key):
+    found = mistakes(text, *sets)
+    assert all(message.endswith("not yet built") for message in found), found
+    assert any(f"{key}: " in message for message in found), found
+
+
+def test_refuses_nothing_unbuilt_before_the_scene_is_otherwise_valid():
+    assert "not yet built" not in only(BENCH, "slide.kind=dwell", "slide.distance=1 um")
+
+
+def test_always_the_unbuilt_list_names_keys_of_the_tables():
+    for entry in NOT_YET_BUILT:
+        path, _, value = entry.partition("=")
+        model = Tables
+        *outer, last = path.split(".")
+        for name in outer:
+            model = model_of(model, keys(model)[name])
+        field = model.model_fields[keys(model)[last]]
+        assert not value or f"'{value}'" in str(field.annotation)
+    assert list(_find(loads(RIG).tables(), "structure.mode.name"))[1] == ("structure.mode.1.name", "second")
+
+
+def test_always_masses_and_interfaces_are_read():
+    text = """
+[structure]
+masses = ["1 kg", "2 kg"]
+[[structure.spring]]
+between = [1, 2]
+stiffness = "1e6 N/m"
+[[structure.interface]]
+between = [2, 0]
+law = "coulomb"
+static = 0.3
+kinetic = 0.4
+load = "1 N"
+[drive]
+kind = "base"
+frequency = "1 Hz"
+acceleration = "1 g"
+cycles = 2
+"""
+    assert "structure.interface.0.kinetic: 0.4 is larger" in only(text)
+    found = mistakes(text.replace("0.4", "0.2"))
+    assert {m.split(": ")[1] for m in found} == {"structure.masses", "structure.spring", "structure.interface"}
