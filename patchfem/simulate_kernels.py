@@ -30,8 +30,8 @@ class Contact(NamedTuple):
 
     force: (static or scale, kinetic, bound) [N]. Jenkins: stretch, stiffness, limit (t,). Points: weight (m,) =
     mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, source (m,), shear modes psi (m, r), kappa (r,), b (r,).
-    List: bondlist (7, capacity), now (5,), tally = (bonds, cut-off, merge width), law. growth of eq. 2.10. Pressure that
-    stays on the lower piece: place (m,), x, sigma.
+    List: bondlist (7, capacity), now (5,), tally = (bonds, cut-off, merge width), law. growth of eq. 2.10.
+    Pressure that stays on the lower piece: place (m,), x, sigma.
     """
 
     force: np.ndarray
@@ -367,8 +367,9 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
     """March `steps` steps from step number `first` of the drive; 0.1-0.3 us per step and a few ns per point.
 
     modes: (omega, 2 zeta omega, slide, base, output); prop: (step, gauss, sine, sine_gauss, weights, dt, beta);
-    held: (1,) last friction force (kind 0); ledger (8,): work in, viscous loss, |power in|, friction loss, peak stored,
-    iterations, worst iterations, steps without convergence; rows (steps + 1, 2 n + 4): z, z', q, q', F, slip.
+    held: (1,) last friction force (kind 0); ledger (9,): work in, viscous loss, |power in|, friction loss, peak stored,
+    iterations, worst iterations, steps without convergence, friction work;
+    rows (steps + 1, 2 n + 4): z, z', q, q', F, slip.
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 bond list full, 3 not finite.
     """
     omega, damp, slide, base, output = modes
@@ -416,6 +417,7 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
         for k in range(n):
             v1 += slide[k] * state[k, 1]
         held[0] = used
+        ledger[8] += used * dq
         if kind == COULOMB and dq == 0.0:
             accelerations(state, omega, damp, slide, base, mass, drive, 0.0, sine[at + 1, 0], accel)
             need, gain = 0.0, 0.0

@@ -110,26 +110,23 @@ class MarchResult:
     ledger: dict
     outcome: Outcome | None
     snapshots: list
+    window_work: float
     cycles_done: float
 
 
-def _response(rows, first, dt, modes, drive) -> Response:
+HISTORIES = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
+             "base_acceleration", "force", "slip")
+
+
+def _response(rows, number, dt, modes, drive) -> Response:
+    """Histories of the samples with step numbers `number` (k,)."""
     n = modes.omega.size
-    z, rate = rows[:, :n], rows[:, n:2 * n]
-    time = (first + np.arange(len(rows))) * dt
+    z, rate, time = rows[:, :n], rows[:, n:2 * n], number * dt
     base = drive.acceleration * np.sin(drive.omega * time)
-    damp = 2 * modes.zeta * modes.omega
-    accel = -np.outer(base, modes.base) - rate * damp - z * modes.omega**2 \
+    accel = -np.outer(base, modes.base) - rate * (2 * modes.zeta * modes.omega) - z * modes.omega**2 \
         - np.outer(rows[:, 2 * n + 2], modes.slide) / modes.mass
     return Response(time, z, rate, rows[:, 2 * n], rows[:, 2 * n + 1], z @ modes.output, rate @ modes.output,
                     accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3])
-
-
-def _thinned(rows, n) -> np.ndarray:
-    """Numbers of the samples of a cycle worth keeping: every reversal of the slide and its extremes."""
-    v = rows[:, 2 * n + 1]
-    turn = np.flatnonzero(v[:-1] * v[1:] <= 0)
-    return np.unique(np.concatenate([[0], turn]))
 
 
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
@@ -139,54 +136,104 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle. NotConverged when
     a step misses its residual, Missing when a bond list overflows; outcome is set for travel and blow-up only.
     """
-    from .dynamics.propagator import GAUSS_W, propagator
 
-    hub = load_kernels(say)
-    prop = propagator(modes, drive, steps_per_cycle)
-    c, work = model.build(hub)
-    state = np.zeros((modes.omega.size, 2))
-    held, ledger = np.zeros(1), np.zeros(8)
-    arrays = hub.Modes(*(np.array(v) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base,
-                                               modes.output)))
-    steps = hub.Steps(prop.step, prop.gauss, prop.sine, prop.sine_gauss, GAUSS_W.copy(), prop.dt, prop.beta)
-    n, total = modes.omega.size, round(cycles * steps_per_cycle)
-    last, kept, kept_at, extremes, snapshots = deque(maxlen=window + 1), [], [], [], []
-    done, outcome, samples = 0, None, 0
-    while done < total and outcome is None:
-        size = min(steps_per_cycle, total - done)
-        final = frames and total - done <= steps_per_cycle
-        size = min(size, max(1, steps_per_cycle // frames)) if final else size
-        rows = np.empty((size + 1, 2 * n + 4))
-        did, status = hub.march(done, size, state, held, arrays, steps, drive.acceleration, modes.mass, model.kind,
-                                model.follow, c, work, GOAL * model.limit, travel, ledger, rows)
-        rows = rows[:did + 1]
+    run = _Run(modes, drive, model, steps_per_cycle, travel, load_kernels(say))
+    total, n = round(cycles * steps_per_cycle), modes.omega.size
+    last, kept, kept_at, extremes, snapshots, samples = deque(maxlen=window), [], [], [], [], 0
+    size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
+    while run.done < total and run.outcome is None:
+        final = run.done + size >= total
+        first, rows, work = run.cycle(size, frames if final else 0, snapshots)
+        if len(last) == window and samples < MOST_KEPT:
+            pick = _thinned(last[0][1], n)
+            kept.append(last[0][1][pick])
+            kept_at.append(last[0][0] + pick)
+            samples += len(pick)
+        last.append((first, rows, work))
+        extremes.append(_extremes(rows, modes, run.prop.dt))
+        size = steps_per_cycle
+        if progress is not None:
+            progress(run.done / total)
+    run.check()
+    rows = np.concatenate([part[:-1] for _, part, _ in last] + [last[-1][1][-1:]])
+    window_rows = _response(rows, last[0][0] + np.arange(len(rows)), run.prop.dt, modes, drive)
+    full = window_rows
+    if kept:
+        head = _response(np.concatenate(kept), np.concatenate(kept_at), run.prop.dt, modes, drive)
+        full = Response(*(np.concatenate([getattr(head, k), getattr(window_rows, k)]) for k in HISTORIES))
+    return MarchResult(full, window_rows, np.array(extremes), run.book(), run.outcome, snapshots,
+                       sum(work for _, _, work in last), run.done / steps_per_cycle)
+
+
+class _Run:
+    """The arrays of one march and its clock."""
+
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub):
+        from .dynamics.propagator import GAUSS_W, propagator
+
+        self.modes, self.drive, self.model, self.travel, self.hub = modes, drive, model, travel, hub
+        self.prop = propagator(modes, drive, steps_per_cycle)
+        self.contact, self.work = model.build(hub)
+        self.state, self.held = np.zeros((modes.omega.size, 2)), np.zeros(1)
+        self.ledger, self.done, self.outcome = np.zeros(9), 0, None
+        self.arrays = hub.Modes(*(np.array(v) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide,
+                                                        modes.base, modes.output)))
+        p = self.prop
+        self.steps = hub.Steps(p.step, p.gauss, p.sine, p.sine_gauss, GAUSS_W.copy(), p.dt, p.beta)
+
+    def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
+        """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
+        first, before, parts = self.done, self.ledger[8], []
+        edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
+        for piece in np.diff(edges):
+            rows = np.empty((piece + 1, 2 * self.modes.omega.size + 4))
+            did, status = self.hub.march(self.done, int(piece), self.state, self.held, self.arrays, self.steps,
+                                         self.drive.acceleration, self.modes.mass, self.model.kind,
+                                         self.model.follow, self.contact, self.work, GOAL * self.model.limit,
+                                         self.travel, self.ledger, rows)
+            self.done += did
+            parts.append(rows[:did + 1])
+            self._judge(status)
+            if frames:
+                snapshots.append(self._snapshot(rows[did]))
+            if self.outcome is not None:
+                break
+        return first, np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]), self.ledger[8] - before
+
+    def _judge(self, status: int) -> None:
+        if status == 1:
+            self.outcome = Outcome.EXCEEDS_TRAVEL
         if status == 2:
-            raise Missing(f"the bond list outgrew {c.bondlist.shape[1]} entries at step {done + did}; loosen "
+            raise Missing(f"the bond list outgrew {self.contact.bondlist.shape[1]} entries at step {self.done}; loosen "
                           "accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1")
         if status == 3:
-            raise NotConverged(f"the motion is not finite at step {done + did}")
-        if status == 1:
-            outcome = Outcome.EXCEEDS_TRAVEL
-        if final:
-            snapshots.append((done * prop.dt, {"bonds": c.bonds.copy(), "stretch": c.stretch.copy(),
-                                               "b": c.b.copy(), "slide": float(modes.slide @ state[:, 0])}))
-        keep = _thinned(rows, n)
-        if len(last) == last.maxlen and samples < MOST_KEPT:
-            old_first, old = last[0]
-            pick = _thinned(old, n)
-            kept.append(old[pick])
-            kept_at.append(old_first + pick)
-            samples += len(keep)
-        last.append((done, rows[:-1] if done + did < total and outcome is None else rows))
-        extremes.append(_extremes(rows, modes, prop.dt))
-        done += did
-        if progress is not None:
-            progress(done / total)
-    if ledger[7]:
-        raise NotConverged(f"{int(ledger[7])} of {done} steps missed the force residual {GOAL:.0e} of the friction "
-                           "limit; raise accuracy.steps_per_cycle")
-    return _collect(modes, drive, prop, last, kept, kept_at, extremes, ledger, state, held, c, hub, model, outcome,
-                    snapshots, done / steps_per_cycle)
+            raise NotConverged(f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle")
+
+    def _snapshot(self, row) -> dict:
+        n, c = self.modes.omega.size, self.contact
+        return {"time": self.done * self.prop.dt, "slide": row[2 * n], "rate": row[2 * n + 1], "force": row[2 * n + 2],
+                "slip": row[2 * n + 3], "bonds": c.bonds.copy(), "stretch": c.stretch.copy(), "b": c.b.copy()}
+
+    def check(self) -> None:
+        """NotConverged when a step missed its residual."""
+        if self.ledger[7]:
+            raise NotConverged(f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of "
+                               "the friction limit; raise accuracy.steps_per_cycle")
+
+    def book(self) -> dict:
+        """The energy ledger [J]."""
+        slide = float(self.modes.slide @ self.state[:, 0])
+        _, energy, _ = self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))
+        motion = 0.5 * self.modes.mass * float(np.sum(self.state[:, 1]**2 + (self.modes.omega * self.state[:, 0])**2))
+        names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
+        return dict(zip(names, map(float, self.ledger))) | {"stored": motion + energy}
+
+
+def _thinned(rows, n) -> np.ndarray:
+    """Numbers of the samples of a cycle worth keeping: its first, and every reversal of the slide."""
+    v = rows[:-1, 2 * n + 1]
+    turn = np.flatnonzero(v[:-1] * v[1:] <= 0)
+    return np.unique(np.concatenate([[0], turn[:20]]))
 
 
 def _extremes(rows, modes, dt) -> tuple:
@@ -213,35 +260,3 @@ def hermite_extremes(y, v, dt) -> tuple:
             if value.size:
                 low, high = min(low, float(value.min())), max(high, float(value.max()))
     return low, high
-
-
-def _collect(modes, drive, prop, last, kept, kept_at, extremes, ledger, state, held, c, hub, model, outcome, snapshots,
-             cycles) -> MarchResult:
-    rows = np.concatenate([part for _, part in last])
-    first = last[0][0]
-    window = _response(rows, first, prop.dt, modes, drive)
-    response = window
-    if kept:
-        early = np.concatenate(kept)
-        number = np.concatenate(kept_at)
-        head = _response(early, 0, prop.dt, modes, drive)
-        head = _at(head, number, prop.dt, modes, drive, early)
-        response = Response(*(np.concatenate([getattr(head, k), getattr(window, k)]) for k in (
-            "time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
-            "base_acceleration", "force", "slip")))
-    _, energy, _ = hub.contact_state(model.kind, c, float(modes.slide @ state[:, 0]), float(held[0]))
-    motion = 0.5 * modes.mass * float(np.sum(state[:, 1]**2 + (modes.omega * state[:, 0])**2))
-    names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
-    book = dict(zip(names, map(float, ledger))) | {"stored": motion + energy}
-    return MarchResult(response, window, np.array(extremes), book, outcome, snapshots, cycles)
-
-
-def _at(response, number, dt, modes, drive, rows) -> Response:
-    """The same samples with their true step numbers (thinned samples are not equally spaced)."""
-    from dataclasses import replace
-
-    time = number * dt
-    base = drive.acceleration * np.sin(drive.omega * time)
-    change = base - response.base_acceleration
-    return replace(response, time=time, base_acceleration=base,
-                   acceleration=response.acceleration + change * (1 - modes.base @ modes.output))

@@ -20,11 +20,15 @@ from ..core import PatchfemError, frozen_array
 class JenkinsSet:
     """Parallel elements: stiffness (t,) [N/m], yield slide (t,) [m]; sum stiffness*yield_slide = friction limit.
 
-    dropped: nodes left out; dropped_share: their part of the friction limit.
+    points: (a,) nodes of the contact set, limit: (a,) their yield forces [N]; share (a, t) [N/m]: the force of a point
+    is share @ stretch for any history. dropped: nodes left out; dropped_share: their part of the friction limit.
     """
 
     stiffness: np.ndarray
     yield_slide: np.ndarray
+    points: np.ndarray
+    limit: np.ndarray
+    share: np.ndarray
     dropped: int
     dropped_share: float
 
@@ -73,12 +77,12 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     limit = np.asarray(limit, float)
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: no point carries friction")
-    _, c, force, dropped, share = contact_tangential(tangential, limit)
+    points, c, force, dropped, share = contact_tangential(tangential, limit)
     c = c + np.diag(local_length / force)
     inverse = np.linalg.inv(c)
     stick = np.ones(force.size, bool)
     carried = np.zeros(force.size)
-    slide, slopes, at = 0.0, [], []
+    slide, rates, at = 0.0, [], []
     while stick.any():
         rate = inverse.sum(axis=1)
         index = np.flatnonzero(stick)
@@ -87,7 +91,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         slide += max(first, 0.0)
         carried[index] += rate * max(first, 0.0)
         going = wait <= first * (1 + 1e-12)
-        slopes.append(rate.sum())
+        rates.append(np.zeros(force.size))
+        rates[-1][index] = rate
         at.append(slide)
         for local in np.flatnonzero(going)[::-1]:
             column = inverse[:, local]
@@ -95,8 +100,9 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
             inverse = inverse[np.ix_(rest, rest)] - np.outer(column[rest], column[rest]) / column[local]
         carried[index[going]] = force[index[going]]
         stick[index[going]] = False
-    slopes = np.array([*slopes, 0.0])
-    return JenkinsSet(frozen_array(slopes[:-1] - slopes[1:]), frozen_array(at), dropped, share)
+    drop = -np.diff(np.array([*rates, np.zeros(force.size)]), axis=0).T
+    return JenkinsSet(frozen_array(drop.sum(axis=0)), frozen_array(at), frozen_array(points, np.int64),
+                      frozen_array(force), frozen_array(drop), dropped, share)
 
 
 def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int,

@@ -191,7 +191,7 @@ def list_force(dq, bonds, count, now, law, growth, v0, dt):
             continue
         total += bonds[6, k] * norm * _bond(u, path - bonds[1, k], damage - bonds[2, k], age - bonds[3, k],
                                             bonds[4, k], eps, p, report)
-    pieces = max(1, int(ceil(abs(dq) / (PIECE * middle))))
+    pieces = max(1, ceil(abs(dq) / (PIECE * middle)))
     for piece in range(pieces):
         for s in (-1.0, 1.0):
             back = (piece + 0.5 + s * 0.28867513459481287) / pieces
@@ -265,7 +265,7 @@ def list_step(dq, bonds, count, now, law, growth, v0, v1, dt, reach, merge):
             bonds[i, count] = now[i]
         bonds[5, count], bonds[6, count] = dq, 0.0
         return count + 1
-    pieces = max(1, int(ceil(abs(dq) / (PIECE * middle))))
+    pieces = max(1, ceil(abs(dq) / (PIECE * middle)))
     count = _merge(bonds, _cut(bonds, count, now, report, eps0, reach), now, eps0, merge)
     if count + 2 * pieces > bonds.shape[1]:
         return -1

@@ -50,7 +50,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> 
 
 
 def grow(law: Bonds, eps: float, v0: float, v1: float, dq: float, dt: float) -> float:
-    """Bond length after a step (2.10): exact relaxation towards (I_A eps_0 + I_B eps_k)/(I_A + I_B); stays in (0, eps_0].
+    """Bond length after a step (2.10): exact relaxation towards (I_A eps_0 + I_B eps_k)/(I_A + I_B), in (0, eps_0].
 
     A step of zero length and zero time changes nothing; at rest it is pure healing.
     """

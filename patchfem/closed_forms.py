@@ -1,0 +1,267 @@
+"""Exact answers to small problems of contact, bonds and Coulomb vibration: truths for users, studies and tests.
+
+Signs of the project: compression > 0; friction positive against positive slip; slide = upper - lower. Lengths called
+`length` are bond lengths eps_0 [m]; `limit` = mu_s N [N] (or mu_s sigma [Pa], the result then has that unit).
+Vibration is written for one mode under a base acceleration a sin: r = drive over natural frequency, friction force f
+and input a in the same unit (an acceleration, or a force over the same mass), motions as a multiple of a/omega_n^2.
+"""
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import gamma, gammainc, gammaincc, hyp1f1
+
+COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven at its own frequency
+
+
+def _positive(**values):
+    for name, value in values.items():
+        if not np.all(np.asarray(value, float) > 0):
+            raise ValueError(f"{name} must be positive, got {value}")
+
+
+def _reading(reading):
+    if reading not in ("stretch", "report"):
+        raise ValueError(f"reading must be 'stretch' or 'report', got {reading!r}")
+
+
+def combined_modulus(young, poisson, young_lower=None, poisson_lower=None) -> float:
+    """E* [Pa] of two bodies in plane strain, 1/E* = (1 - nu^2)/E of both; alike where the lower is left out."""
+    young_lower = young if young_lower is None else young_lower
+    poisson_lower = poisson if poisson_lower is None else poisson_lower
+    _positive(young=young, young_lower=young_lower)
+    return 1 / ((1 - poisson**2) / young + (1 - poisson_lower**2) / young_lower)
+
+
+def hertz_half_width(line_load, radius, modulus):
+    """Half width [m] of the line contact of a crown, gap x^2/(2 radius): a = sqrt(4 P R/(pi E*)) (Hertz 1882).
+
+    line_load P [N/m], radius R [m], modulus E* [Pa] of `combined_modulus`; bodies thick against a.
+    ValueError unless all are positive.
+    """
+    _positive(line_load=line_load, radius=radius, modulus=modulus)
+    return np.sqrt(4 * line_load * radius / (np.pi * modulus))
+
+
+def hertz_peak(line_load, radius, modulus):
+    """Largest pressure [Pa] of the line contact, 2 P/(pi a); arguments as in `hertz_half_width`."""
+    return 2 * line_load / (np.pi * hertz_half_width(line_load, radius, modulus))
+
+
+def hertz_pressure(x, line_load, radius, modulus):
+    """Pressure [Pa] at x [m] from the middle, p_0 sqrt(1 - x^2/a^2), 0 outside; arguments as in `hertz_half_width`."""
+    half = hertz_half_width(line_load, radius, modulus)
+    return hertz_peak(line_load, radius, modulus) * np.sqrt(np.maximum(1 - (np.asarray(x) / half)**2, 0))
+
+
+def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
+    """Bond length [m] in steady sliding (eq. 2.11): (eps_0 + eps_k w)/(1 + w), w = v^2/(a_s l_k).
+
+    speed [m/s] of either sign, ratio = eps_k/eps_0, rest_growth a_s [m s-2], slip_growth l_k [m]; ValueError unless
+    the last four are positive.
+    """
+    _positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
+    w = np.asarray(speed)**2 / (rest_growth * slip_growth)
+    return length * (1 + ratio * w) / (1 + w)
+
+
+def steady_shear(direction, pressure, static, ratio=1.0):
+    """Shear [Pa] in steady rigid sliding (eq. 2.18), direction * mu_s (eps/eps_0) sigma, stretch reading.
+
+    pressure (m,) [Pa]; static mu_s; ratio = eps/eps_0 with eps of `steady_bond_length`. ValueError unless direction is
+    +1 or -1. In the report reading a bond grows from zero and 2.18 holds only where it ripens within its own length.
+    """
+    if direction not in (1, -1):
+        raise ValueError(f"direction must be +1 or -1, got {direction}")
+    return direction * static * ratio * np.asarray(pressure, float)
+
+
+def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
+    """Friction after a first slide >= 0 [m] of one direction (eq. 2.17 at constant bond length), either reading.
+
+    limit*(P(p + 1, x) + m_0 phi_p(x)), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
+    Stretch p = 1, m_0 = 1 and report p = 0, m_0 = 0 are both 1 - e^-x. ValueError for p <= -1 or a slide < 0.
+    """
+    _positive(length=length)
+    x = np.asarray(slide, float) / length
+    if order <= -1:
+        raise ValueError(f"order must exceed -1, got {order}")
+    if np.any(x < 0):
+        raise ValueError("slide must not be negative; the virgin curve is odd")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
+    return limit * (gammainc(order + 1, x) + first)
+
+
+def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
+    """Friction after a long slide and a way back [m] (constant bond length), positive in the first direction.
+
+    x = back/length; report: limit*(2 Q(p + 1, 2x) - 1), so 2 e^-2x - 1 for p = 0; stretch: 2 e^-x - 1 for p = 1, else
+    e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
+    ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
+    """
+    _positive(length=length)
+    _reading(reading)
+    x = np.asarray(back, float) / length
+    if np.any(x < 0):
+        raise ValueError("back must not be negative")
+    if reading == "report":
+        if order <= -1:
+            raise ValueError(f"order must exceed -1, got {order}")
+        return limit * (2 * gammaincc(order + 1, 2 * x) - 1)
+    if order < 0:
+        raise ValueError(f"order must not be negative in the stretch reading, got {order}")
+    if order == 1:
+        return limit * (2 * np.exp(-x) - 1)
+    old = x**(order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)
+    return limit * (np.exp(-2 * x) - gammainc(order + 1, x) - old)
+
+
+def stretch_loop(amplitude, length, limit=1.0):
+    """(area, force at the end of a stroke) of the steady loop, stretch reading, p = 1, constant bond length.
+
+    4 limit (A - eps tanh(A/eps)) and limit tanh(A/eps); amplitude A [m] half peak-to-peak.
+    ValueError unless amplitude and length are positive.
+    """
+    _positive(amplitude=amplitude, length=length)
+    end = np.tanh(np.asarray(amplitude) / length)
+    return 4 * limit * (amplitude - length * end), limit * end
+
+
+def report_loop(amplitude, length, limit=1.0):
+    """(area, force at the end of a stroke) of the steady loop of the printed law, p = 0, constant bond length.
+
+    4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
+    ValueError unless amplitude and length are positive.
+    """
+    _positive(amplitude=amplitude, length=length)
+    amplitude = np.asarray(amplitude, float)
+    return 4 * limit * (amplitude / np.tanh(2 * amplitude / length) - length / 2), limit * np.ones_like(amplitude)
+
+
+def jenkins_loop(amplitude, length, limit=1.0):
+    """(area, force at the end of a stroke) of the elastic-plastic law 3.12 with its reversal: 4 limit (A - eps), limit.
+
+    Below the yield slide (amplitude <= length) the loop is a line: (0, limit A/eps).
+    ValueError unless amplitude and length are positive.
+    """
+    _positive(amplitude=amplitude, length=length)
+    amplitude = np.asarray(amplitude, float)
+    return 4 * limit * np.maximum(amplitude - length, 0), limit * np.minimum(amplitude / length, 1)
+
+
+def coulomb_loop_area(amplitude, limit=1.0):
+    """Area [J] of the loop of rigid Coulomb friction, 4 limit A."""
+    return 4 * limit * np.asarray(amplitude, float)
+
+
+def decay_half_cycles(start, friction) -> int:
+    """Half cycles N_0 until a released Coulomb oscillator rests: max(0, ceil((|x_0|/friction - 1)/2)).
+
+    start x_0 [m], friction F/k [m]. The report leaves N_0 in 3.11 unrounded, but (-1)^N_0 needs an integer.
+    ValueError unless friction is positive.
+    """
+    _positive(friction=friction)
+    return max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
+
+
+def decay_rest(start, friction, omega) -> tuple:
+    """(time [s], place [m]) at which a Coulomb oscillator released at `start` comes to rest; arguments of `decay`."""
+    _positive(omega=omega)
+    count = decay_half_cycles(start, friction)
+    sign = 1.0 if start >= 0 else -1.0
+    return np.pi * count / omega, sign * (-1.0)**count * (abs(start) - 2 * count * friction)
+
+
+def decay(time, start, friction, omega):
+    """Displacement [m] of an undamped Coulomb oscillator released at rest (eq. 3.11 with N_0 rounded up).
+
+    time (k,) [s] >= 0, start x_0 [m], friction F/k [m], omega [rad/s]. ValueError for a negative time, and unless
+    friction and omega are positive.
+    """
+    time = np.asarray(time, float)
+    if np.any(time < 0):
+        raise ValueError("time must not be negative")
+    stop, place = decay_rest(start, friction, omega)
+    count = np.floor(omega * time / np.pi)
+    turn = np.where(count % 2 == 0, 1.0, -1.0)
+    moving = (abs(start) - (2 * count + 1) * friction) * np.cos(omega * time) + turn * friction
+    return np.where(time < stop, (1.0 if start >= 0 else -1.0) * moving, place)
+
+
+def bounded_input(friction):
+    """Largest base acceleration that friction alone keeps bounded at resonance: a = (4/pi) f (same unit as f)."""
+    return friction / COULOMB_RESONANCE
+
+
+def sliding_amplitude(r, friction, damping=0.0) -> float:
+    """Amplitude over a/omega_n^2 of steady motion that slides without a stop (Den Hartog 1931; damping added).
+
+    r = drive/natural frequency > 0, friction f/a >= 0, damping ratio 0 <= xi < 1. Without damping it is
+    sqrt(V^2 - (U f/a)^2), V = 1/(1 - r^2), U = sin(pi/r)/(r (1 + cos(pi/r))).
+    ValueError where no such motion exists (the block stops on the way: below the knee), and without damping at r = 1.
+
+    Between two turns the motion is f + e^(-xi T)(A cos w T + B sin w T) + particular, T = omega_n t; it is
+    antisymmetric over half a drive period, which gives A and B; the rest follows from the particular
+    amplitude 1/|1 - r^2 + 2 i xi r|.
+    """
+    _positive(r=r)
+    if friction < 0 or not 0 <= damping < 1:
+        raise ValueError(f"friction must be >= 0 and damping in [0, 1), got {friction}, {damping}")
+    if damping == 0 and r == 1:
+        raise ValueError("no steady sliding motion at resonance without damping; see bounded_input")
+    half, w = np.pi / r, np.sqrt(1 - damping**2)
+
+    def basis(t):
+        e, c, s = np.exp(-damping * t), np.cos(w * t), np.sin(w * t)
+        return e * np.array([c, s]), e * np.array([-damping * c - w * s, -damping * s + w * c])
+
+    (x0, v0), (x1, v1) = basis(0.0), basis(half)
+    try:
+        free = np.linalg.solve(np.stack([x0 + x1, v0 + v1]), [-2 * friction, 0.0])
+    except np.linalg.LinAlgError:
+        raise ValueError(f"no isolated sliding motion at r = {r} without damping") from None
+    size2 = 1 / ((1 - r * r)**2 + (2 * damping * r)**2)
+    sine = v0 @ free / r
+    if size2 < sine**2:
+        raise ValueError(f"no motion without stops at r = {r}, f/a = {friction}")
+    cosine = np.sqrt(size2 - sine**2)
+    t = half * (np.arange(2000) + 0.5) / 2000
+    speed = np.array([basis(at)[1] @ free for at in t]) - r * (cosine * np.sin(r * t) + sine * np.cos(r * t))
+    if speed.max() > 0:
+        raise ValueError(f"the block stops on the way at r = {r}, f/a = {friction}")
+    return float(friction + x0 @ free + cosine)
+
+
+def two_stop_relation(slip):
+    """(f/a, amplitude over a/omega_n^2) of the steady motion with two stops per cycle: undamped, at resonance.
+
+    slip in (0, pi): drive phase [rad] during which the block slides in each half cycle; release at the phase t_0,
+    tan t_0 = s sin s/(sin s - s cos s); f/a runs from 1 (s = 0) to pi/4 (s = pi), the amplitude from 0 to pi/4.
+    ValueError for a slip outside (0, pi).
+    """
+    s = np.asarray(slip, float)
+    if np.any(s <= 0) or np.any(s >= np.pi):
+        raise ValueError("slip must lie between 0 and pi")
+    start = np.arctan2(s * np.sin(s), np.sin(s) - s * np.cos(s))
+    ratio = 0.5 * (np.sin(start) * (1 + np.cos(s)) + 0.5 * np.cos(start) * np.sin(s) - s / 2 * np.cos(start + s))
+    return ratio, ratio - np.sin(start)
+
+
+def two_stop_amplitude(friction) -> float:
+    """Amplitude over a/omega_n^2 at resonance, undamped, for f/a: inverse of `two_stop_relation`, to 1e-7.
+
+    0 for f/a >= 1 (the block never slips), inf below pi/4 (friction cannot bound the motion). Within 1e-4 of the onset
+    the two terms of the relation cancel; the series 9/4 d^2 (1 + 2.9 d), d = 1 - f/a, stands in.
+    """
+    if friction >= 1:
+        return 0.0
+    if friction < COULOMB_RESONANCE:
+        return float("inf")
+    miss = 1 - friction
+    if miss < 1e-4:
+        return 2.25 * miss**2 * (1 + 2.9 * miss)
+    low, high = 0.04, np.pi * (1 - 1e-9)
+    if two_stop_relation(high)[0] >= friction:
+        return float(COULOMB_RESONANCE)
+    slip = brentq(lambda s: float(two_stop_relation(s)[0]) - friction, low, high, xtol=1e-15, rtol=1e-14)
+    return float(two_stop_relation(slip)[1])

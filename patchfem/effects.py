@@ -1,0 +1,61 @@
+"""Every effect a scene can name: what computes it, its equations, what it needs and what it gives.
+
+An effect is a table of a scene or the value of its selector key. `plan` imports only the modules of the effects that a
+scene names.
+"""
+
+from typing import NamedTuple
+
+
+class Effect(NamedTuple):
+    """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on."""
+
+    module: str
+    equations: str
+    needs: tuple = ()
+    gives: tuple = ()
+
+
+EFFECTS = {
+    "contact": Effect("patchfem.contact.unilateral", "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
+                      (), ("pressure",)),
+    "contact.coating": Effect("", "Lame pair of the layer in the coating rows"),
+    "contact.tilt": Effect("patchfem.contact.gaps", "g += angle x"),
+    "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
+    "contact.crown": Effect("patchfem.contact.gaps", "g += x^2/(2 radius)"),
+    "contact.shear": Effect("patchfem.contact.slip", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
+    "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
+    "friction.law=coulomb": Effect("patchfem.dynamics.events", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
+                                   ("pressure",), ("traction",)),
+    "friction.law=elastic-plastic": Effect("patchfem.friction.local", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
+                                           "reversal)", ("pressure",), ("traction",)),
+    "friction.law=nonlocal": Effect("patchfem.friction.quadrature", "tau = -mu_s int phi(R/eps) sigma_n "
+                                    "u/|u| dL1/eps_0 (2.17)", ("pressure",), ("traction",)),
+    "friction.reading=stretch": Effect("patchfem.friction.recursion", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
+    "friction.reading=report": Effect("patchfem.friction.quadrature", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"),
+    "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
+    "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
+    "slide.kind=triangle": Effect("", "q between +- amplitude at constant speed", (), ("motion",)),
+    "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
+                        ("modes",)),
+    "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
+    "drive.waveform=sine": Effect("", "a(t) = a sin(2 pi f t)"),
+    "accuracy.method=exact": Effect("patchfem.dynamics.events", "closed form between events"),
+    "accuracy.method=march": Effect("patchfem.simulate_kernels", "exact propagator, path-mean force, Newton on the "
+                                    "force residual"),
+    "measured": Effect("", "overlay of measured rows"),
+}
+
+NOT_YET_BUILT = (
+    "contact.upper", "contact.lower", "contact.approach", "contact.holder", "contact.step", "contact.profile",
+    "contact.asperities.law=linear", "contact.asperities.law=exponential", "contact.asperities.law=hertz",
+    "contact.strips", "friction.law=tanh", "friction.law=convolution", "friction.temperature", "slide.kind=dwell",
+    "slide.kind=file", "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free",
+    "drive.waveform=step", "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear",
+    "accuracy.method=duhamel", "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",
+)
+
+
+def absent(named) -> list:
+    """Every effect that is not among `named`, built or not, in the order of the chain."""
+    return [name for name in (*EFFECTS, *NOT_YET_BUILT) if name not in set(named)]

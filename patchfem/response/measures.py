@@ -1,0 +1,162 @@
+"""Measures of a run from its last window of cycles; names, definitions and units are those of the README.
+
+Everything works on samples: values of an exact run and of a march differ only in how they were made.
+"""
+
+import numpy as np
+
+from ..core import BaseSine, Outcome, Response
+
+UNITS = {
+    "relative_displacement_amplitude": "m", "absolute_acceleration_peak": "m s-2", "slip_amplitude": "m",
+    "stick_fraction": "1", "slip_start_phase": "rad", "friction_force_peak": "N", "loop_area": "J",
+    "equivalent_stiffness": "N m-1", "equivalent_damping": "1", "energy_balance": "1", "drift_per_cycle": "m",
+    "normal_load": "N", "friction_ratio_end": "1", "friction_ratio_peak": "1",
+}
+FLOORS = {
+    "relative_displacement_amplitude": 1e-10, "absolute_acceleration_peak": 1e-4, "slip_amplitude": 1e-10,
+    "stick_fraction": 1e-3, "slip_start_phase": 1e-3, "friction_force_peak": 1e-6, "loop_area": 1e-10,
+    "equivalent_stiffness": 1.0, "equivalent_damping": 1e-8, "energy_balance": 1e-8, "drift_per_cycle": 1e-11,
+    "friction_ratio_end": 1e-9, "friction_ratio_peak": 1e-9,
+}
+STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
+
+
+def energy_balance(book: dict) -> float:
+    """|work in - stored - dissipated| / (integral |power in| + peak stored) [1]; 0 for a run without energy."""
+    scale = book["power"] + book["peak_stored"]
+    miss = book["work_in"] - book["stored"] - book["friction"] - book["viscous"]
+    return abs(miss) / scale if scale > 0 else 0.0
+
+
+def harmonic(time, weight, values, omega) -> complex:
+    """First Fourier coefficient 2/T int values exp(-i omega t) dt of samples with quadrature weights."""
+    return 2 * np.sum(weight * values * np.exp(-1j * omega * time)) / np.sum(weight)
+
+
+def interface_loop(time, weight, slide, force, omega, work: float, stiffness: float) -> dict:
+    """Loop area per cycle [J], equivalent stiffness [N/m] and damping [1] of the interface alone.
+
+    work: friction work over the window per cycle; stiffness K = moving_mass omega_1^2, 0 leaves the damping out.
+    The stiffness is the part of the force in phase with the slide, over the slide amplitude: int F cos/(pi A).
+    """
+    amplitude = (slide.max() - slide.min()) / 2
+    out = {"loop_area": work}
+    q, f = harmonic(time, weight, slide - slide.mean(), omega), harmonic(time, weight, force, omega)
+    if amplitude > 0 and abs(q) > 0:
+        out["equivalent_stiffness"] = float((f * q.conjugate()).real / abs(q) / amplitude)
+        if stiffness > 0:
+            out["equivalent_damping"] = work / (2 * np.pi * stiffness * amplitude**2)
+    return out
+
+
+def slip_measures(window: Response, drive: BaseSine, steps_per_cycle: int) -> dict:
+    """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
+
+    From uniform samples of the irreversible motion; sticking is |slip speed| < 1e-2 of the cycle's peak.
+    """
+    slip = window.slip
+    out = {"slip_amplitude": float(slip.max() - slip.min()) / 2}
+    speed = np.diff(slip)
+    cycles = max(1, len(speed) // steps_per_cycle)
+    rows = speed[len(speed) - cycles * steps_per_cycle:] if len(speed) >= steps_per_cycle else speed
+    times = window.time[len(speed) - len(rows):]
+    table = rows.reshape(cycles, -1)
+    peak = np.abs(table).max(axis=1, keepdims=True)
+    if not peak.any():
+        return out | {"stick_fraction": 1.0}
+    share = np.abs(table) / np.where(peak > 0, peak, np.inf)
+    out["stick_fraction"] = float(np.mean(share < STICK))
+    level = share.ravel()
+    rise = np.flatnonzero((level[:-1] < STICK) & (level[1:] >= STICK))
+    if rise.size:
+        part = (STICK - level[rise]) / (level[rise + 1] - level[rise])
+        step = times[1] - times[0]
+        phases = drive.omega * (times[rise] + step * (0.5 + part))
+        out["slip_start_phase"] = circular_mean(phases)
+    return out
+
+
+def circular_mean(phases) -> float:
+    """Mean of angles [rad] modulo pi, in [0, pi)."""
+    return float(np.angle(np.mean(np.exp(2j * np.asarray(phases)))) / 2 % np.pi)
+
+
+def drift(time, slide, period: float) -> float:
+    """Mean motion per cycle [m] over the window: last cycle's mean minus the first one's, per cycle between them."""
+    end, start = time[-1], time[0]
+    cycles = (end - start) / period
+    if cycles < 1.5:
+        return float(slide[-1] - slide[0]) / max(cycles, 1e-9)
+    first, last = slide[time <= start + period * (1 + 1e-9)], slide[time >= end - period * (1 + 1e-9)]
+    return float(last.mean() - first.mean()) / (cycles - 1)
+
+
+def acceleration_peak(window: Response) -> float:
+    """Largest |absolute acceleration| [m s-2] at the accelerometer over equally spaced samples of the window.
+
+    Between samples the parabola through the largest inner one and its neighbours is used where it is smooth.
+    """
+    size = np.abs(window.acceleration)
+    top = int(np.argmax(size))
+    if not 0 < top < len(size) - 1:
+        return float(size[top])
+    left, mid, right = size[top - 1:top + 2]
+    bend = left - 2 * mid + right
+    gain = -(right - left)**2 / (8 * bend) if bend < 0 else 0.0
+    return float(mid + (gain if gain < 0.01 * mid else 0.0))
+
+
+def window_amplitudes(extremes, window: int) -> np.ndarray:
+    """Half peak-to-peak per window of `window` cycles, oldest first, a partial head left out; extremes (c, 2)."""
+    count = len(extremes) // window
+    if count == 0:
+        return np.array([(extremes[:, 1].max() - extremes[:, 0].min()) / 2])
+    tail = extremes[len(extremes) - count * window:].reshape(count, window, 2)
+    return (tail[:, :, 1].max(axis=1) - tail[:, :, 0].min(axis=1)) / 2
+
+
+def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> tuple:
+    """(outcome, steady estimate or None, its error) from the amplitudes of successive windows.
+
+    steady: the last change stays below the tolerance and so does what a geometric tail would still add. A slow tail is
+    extrapolated (Aitken) and counts as transient; without a shrinking change the motion grows when it still rises.
+    """
+    a = np.asarray(amplitudes, float)
+    if a.size == 1:
+        return Outcome.TRANSIENT, None, None
+    change = a[-1] - a[-2]
+    scale = tolerance * abs(a[-1]) + floor
+    if a.size == 2:
+        return (Outcome.STEADY if abs(change) < scale else Outcome.TRANSIENT), None, None
+    before = a[-2] - a[-3]
+    ratio = change / before if before != 0 else 0.0
+    rest = change * ratio / (1 - ratio) if abs(ratio) < 0.9995 else np.inf
+    rising = a.size > 3 and change > 0 and bool(np.all(np.diff(a[-4:]) > 0))
+    endless = not np.isfinite(rest) and rising and abs(change) > 1e-3 * scale
+    if abs(change) < scale and (abs(rest) < scale or not (np.isfinite(rest) or endless)):
+        return Outcome.STEADY, None, None
+    if np.isfinite(rest):
+        earlier = None
+        if a.size > 3 and a[-3] != a[-4] and abs(before / (a[-3] - a[-4])) < 0.9995:
+            r = before / (a[-3] - a[-4])
+            earlier = abs(a[-1] + rest - (a[-2] + before * r / (1 - r)))
+        if abs(rest) < 20 * abs(a[-1]) + floor:
+            return Outcome.TRANSIENT, a[-1] + rest, earlier if earlier is not None else abs(rest)
+    return (Outcome.GROWS if rising else Outcome.TRANSIENT), None, None
+
+
+def run_measures(window: Response, extremes, book: dict, drive: BaseSine, last: int, peak: float | None = None) -> dict:
+    """Measures that every engine shares: amplitude, acceleration, force, energy balance, drift.
+
+    extremes (c, 2) of the output per cycle, `last` of them in the window; book: the energy ledger; peak: the largest
+    acceleration where the engine knows it better than its samples do.
+    """
+    tail = extremes[-last:]
+    return {
+        "relative_displacement_amplitude": float(tail[:, 1].max() - tail[:, 0].min()) / 2,
+        "absolute_acceleration_peak": acceleration_peak(window) if peak is None else peak,
+        "friction_force_peak": float(np.abs(window.force).max()),
+        "energy_balance": energy_balance(book),
+        "drift_per_cycle": drift(window.time, window.slide, drive.period),
+    }

@@ -1,0 +1,239 @@
+"""The page where the stages meet: plan(scene) says what would run, run(plan) runs it."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from .core import Measure, Outcome
+from .simulate_plan import Plan, plan
+
+__all__ = ["Plan", "Result", "plan", "run"]
+FRAMES = 16
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Result:
+    """Everything a run found. measures: name -> Measure; response: kept histories or None; patch: the solved patch or
+    None; fields: (frame, x) arrays by name with `time`; seconds by part; extra: engine, steps, notes for the report."""
+
+    plan: Plan
+    outcome: Outcome
+    measures: dict
+    response: object
+    window: object
+    patch: object
+    fields: dict
+    seconds: dict
+    warnings: list
+    extra: dict
+
+
+def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: bool = True) -> Result:
+    """Run a plan. say: called with one line when the hub compiles; progress: with the done share of the main pass.
+
+    per_point forces the path of every interface point where one lumped point would do; estimate=False skips the
+    re-runs and leaves errors None. NotConverged and Missing as named by the stages.
+    """
+    begin, scene = perf_counter(), what.scene
+    seconds, warnings = {}, list(scene.remarks)
+    patch = coarse = None
+    if scene.contact is not None:
+        from .simulate_patch import solve_both
+
+        patch, coarse = solve_both(scene, estimate)
+        seconds["contact"] = perf_counter() - begin
+    if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":
+        warnings.append("the pieces do not touch: no friction acts and nothing was run")
+        result = _static(what, patch, coarse, seconds, warnings)
+    else:
+        result = _KINDS[what.kind](what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+    seconds["total"] = perf_counter() - begin
+    return replace(result, warnings=result.warnings + _loose(result))
+
+
+def _loose(result: Result) -> list:
+    """One warning per measure whose error exceeds tolerance * |value| + floor, all in one line."""
+    tolerance = result.plan.scene.accuracy.tolerance
+    wide = [name for name, m in result.measures.items()
+            if m.error is not None and m.error > tolerance * abs(m.value) + m.floor]
+    if not wide:
+        return []
+    return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; lower "
+            "contact.element_size or raise accuracy.steps_per_cycle"]
+
+
+def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
+    from .simulate_patch import measures
+
+    p = patch.pressure
+    if p.outcome is Outcome.NO_CONTACT:
+        warnings = [*warnings, Outcome.NO_CONTACT.sentence]
+    return Result(what, p.outcome, measures(patch, coarse), None, None, patch, _still(patch), seconds, warnings,
+                  {"residuals": dict(p.residuals), "iterations": p.iterations})
+
+
+def _still(patch) -> dict:
+    """Fields of the pressed patch before any motion."""
+    return {"time": np.zeros(1), "normal_stress": patch.pressure.sigma_n[None], "gap": patch.pressure.gap[None],
+            "status": patch.active.astype(np.int8)[None]}
+
+
+def _fields(patch, time, tau, local) -> dict:
+    """Frames of the interface: the pressed state first, then the given ones; status 0 open, 1 stick, 2 slip."""
+    still = _still(patch)
+    count = len(time) + 1
+    tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
+    slip = np.concatenate([np.zeros((1, tau.shape[1])), local])
+    moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
+    moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
+    status = np.where(patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(np.int8)
+    return {"time": np.concatenate([[0.0], time]), "normal_stress": np.repeat(still["normal_stress"], count, axis=0),
+            "gap": np.repeat(still["gap"], count, axis=0), "shear_stress": tau, "slip": slip, "status": status}
+
+
+def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
+    from . import simulate_bench as bench
+    from .simulate_rig import with_errors
+
+    scene = what.scene
+    steps = bench.steps_of(scene)
+    frames = FRAMES if patch is not None else 0
+    fine = bench.run(scene, patch, steps, frames, say)
+    seconds["bench"] = fine.seconds
+    others = []
+    if estimate:
+        half = bench.run(scene, patch, max(4, steps // 8 * 4), 0, say)
+        seconds["error"] = half.seconds
+        others.append((fine.values, half.values))
+        if coarse is not None:
+            rough = bench.run(scene, coarse, max(4, steps // 8 * 4), 0, say)
+            others.append((half.values, rough.values))
+            seconds["error"] += rough.seconds
+    found = with_errors(fine.values, *others, least=1e-10)
+    fields = {}
+    if patch is not None:
+        from .simulate_patch import measures
+
+        found = measures(patch, coarse) | {k: m for k, m in found.items() if k != "normal_load"}
+        fields = _fields(patch, fine.time[fine.frames], fine.tau, fine.local)
+    return Result(what, Outcome.DONE, _without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
+                  {"engine": "bench", "steps": steps})
+
+
+def _without_errors(found: dict, estimate: bool) -> dict:
+    return found if estimate else {k: Measure(m.value, m.unit, None, m.floor) for k, m in found.items()}
+
+
+def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
+    from . import simulate_rig as rig
+
+    scene = what.scene
+    settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
+    extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
+    if patch is not None and scene.contact.shear is None and not settings.per_point:
+        warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, the pressure on the upper piece "
+                    "and constant load the patch moves exactly as one point under the same load; add [contact.shear]"]
+    if settings.engine == "exact":
+        load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
+        raw = rig.run_exact(scene, settings, modes, drive, load, progress)
+        seconds["march"] = raw.seconds
+        found = rig.with_errors(raw.values, least=1e-9)
+    else:
+        rig.refuse_costly(scene, settings, drive)
+        raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
+                                        estimate)
+        extra |= {"steps_per_cycle": settings.steps, "iterations": raw.book["iterations"]}
+    outcome, found = rig.settle(raw, _without_errors(found, estimate), scene.accuracy.tolerance)
+    fields = {}
+    if patch is not None:
+        from .simulate_patch import measures
+
+        found = measures(patch, coarse) | {k: m for k, m in found.items() if k != "normal_load"}
+        fields = _rig_fields(scene, settings, patch, raw, drive)
+    extra["book"] = raw.book
+    return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
+
+
+def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress, estimate) -> tuple:
+    """The march with its error: half the steps, a coarser mesh, fewer shear modes; steps double until it is met."""
+    from . import simulate_rig as rig
+
+    frames = FRAMES if patch is not None else 0
+    raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
+    seconds["march"], seconds["error"] = raw.seconds, 0.0
+    if not estimate:
+        return raw, settings, rig.with_errors(raw.values)
+    half = rig.run_march(scene, replace(settings, steps=max(4, settings.steps // 2)), modes, drive, patch)
+    seconds["error"] += half.seconds
+    rest = _space_errors(scene, settings, modes, drive, patch, coarse, half, seconds)
+    tolerance = scene.accuracy.tolerance
+    while True:
+        found = rig.with_errors(raw.values, (raw.values, half.values), *rest, least=1e-9)
+        main = found["relative_displacement_amplitude"]
+        met = main.error <= tolerance * abs(main.value) + main.floor
+        again = settings.steps * 2
+        if met or "steps_per_cycle" in settings.pinned or again > rig.MOST_STEPS or again * settings.cycles > 1e7 \
+                or raw.outcome is Outcome.EXCEEDS_TRAVEL:
+            return raw, settings, found
+        half, settings = raw, replace(settings, steps=again)
+        seconds["error"] += raw.seconds
+        raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
+        seconds["march"] = raw.seconds
+
+
+def _space_errors(scene, settings, modes, drive, patch, coarse, half, seconds) -> list:
+    """Pairs of values whose difference is the error of the mesh and of the shear modes, at half the steps."""
+    from . import simulate_rig as rig
+
+    out = []
+    few = replace(settings, steps=max(4, settings.steps // 2))
+    if coarse is not None and scene.contact.shear is not None:
+        rough = rig.run_march(scene, few, modes, drive, coarse)
+        out.append((half.values, rough.values))
+        seconds["error"] += rough.seconds
+        if scene.friction.law == "nonlocal":
+            fewer = rig.run_march(scene, replace(few, shear_modes=max(1, settings.shear_modes // 2)), modes, drive,
+                                  patch)
+            out.append((half.values, fewer.values))
+            seconds["error"] += fewer.seconds
+    return out
+
+
+def _rig_fields(scene, settings, patch, raw, drive) -> dict:
+    """Interface frames of the last cycle."""
+    from . import simulate_bench as bench
+    from . import simulate_rig as rig
+
+    sigma, f = patch.pressure.sigma_n, scene.friction
+    if settings.engine == "exact" or not raw.snapshots:
+        at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // settings.window),
+                         len(raw.window.time) - 1, FRAMES).round().astype(int)
+        tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
+        return _fields(patch, raw.window.time[at], tau, np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1))
+    shots = raw.snapshots
+    time = np.array([s["time"] for s in shots])
+    shear = scene.contact.shear is not None
+    if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or settings.per_point):
+        law = rig.law_of(scene, drive.acceleration / drive.omega)
+        modes = None
+        if shear:
+            from .contact.slip import shear_modes
+
+            weight = patch.pieces.interface.weight
+            modes = shear_modes(patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes,
+                                1 / law.ratio if law.ratio > 0 else np.inf)
+        tau, local = bench.point_fields(patch, law, modes, [(s["slide"], s["bonds"]) for s in shots])
+    elif shear:
+        from .contact.slip import jenkins_set
+
+        length = f.bond_length if f.law == "elastic-plastic" else 0.0
+        found = jenkins_set(patch.pieces.tangential, f.static * sigma * patch.pieces.interface.weight, length)
+        tau, local = bench.element_fields(patch, found, [(s["slide"], s["stretch"]) for s in shots], length)
+    else:
+        tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
+        local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
+    return _fields(patch, time, tau, local)
+
+
+_KINDS = {"patch": _static, "bench": _bench, "rig": _rig, "linear": _rig}

@@ -1,0 +1,166 @@
+"""What a scene would run, before anything runs: engine, sizes, cost, stiffness chain and dimensionless groups."""
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+from .effects import EFFECTS, absent
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plan:
+    """A scene and what will be done with it. effects: names in the scene; steps: of the time loop, all passes;
+    seconds, bytes: estimates; chain: link -> stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences."""
+
+    scene: object
+    kind: str
+    effects: tuple
+    not_in_scene: tuple
+    engine: str
+    unknowns: dict
+    steps: int
+    seconds: float
+    bytes: int
+    chain: dict
+    groups: dict
+    verdict: tuple
+
+    def as_json(self) -> dict:
+        """The object `patchfem plan --json` prints."""
+        return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
+                "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
+                "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
+                "groups": self.groups, "verdict": list(self.verdict)}
+
+
+def plan(scene, per_point: bool = False) -> Plan:
+    """Plan of a scene from its numbers alone: no mesh, no solve. PatchfemError where nothing can run it."""
+    named = tuple(scene.named())
+    unknowns, chain = _sizes(scene)
+    engine, steps, seconds = "static", 0, 0.25
+    if scene.contact is not None:
+        cells = unknowns["interface_points"]
+        seconds = 0.6 + 2.5e-6 * cells**2 * 1.25
+    if scene.kind in ("rig", "linear"):
+        engine, steps, more = _rig_cost(scene, per_point, unknowns)
+        seconds += more
+    elif scene.kind == "bench":
+        from .simulate_bench import path_of, steps_of
+
+        engine = "bench"
+        steps = path_of(scene.slide, steps_of(scene))[0].size * 2
+        seconds += 6e-5 * steps
+    seconds += 1.5  # files and report
+    size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
+    groups = _groups(scene, chain)
+    return Plan(scene, scene.kind, named, tuple(absent(named)), engine, unknowns, steps, round(seconds, 2), size, chain,
+                groups, tuple(_verdict(scene, groups)))
+
+
+def _sizes(scene) -> tuple:
+    unknowns, chain = {}, {}
+    contact = scene.contact
+    if contact is not None:
+        from .simulate_patch import AUTOMATIC_CELLS
+
+        size = contact.element_size or contact.length / AUTOMATIC_CELLS
+        points = round(contact.length / size) + 1
+        unknowns |= {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
+    if scene.structure is not None:
+        unknowns["modes"] = len(scene.structure.mode)
+        first = scene.structure.mode[0]
+        chain["mode"] = scene.structure.moving_mass * (2 * pi * first.frequency)**2
+    chain["holder"] = "rigid"
+    if contact is not None and contact.shear is not None:
+        chain["pieces_shear"] = block_shear(contact)
+    else:
+        chain["pieces_shear"] = "rigid"
+    chain["asperities"] = "rigid"
+    f = scene.friction
+    load = contact.load if contact is not None else scene.normal.load if scene.normal is not None else None
+    if f is not None and load is not None:
+        chain["bonds"] = f.static * load / f.bond_length if f.bond_length else "rigid until it slips"
+    return unknowns, chain
+
+
+def block_shear(contact) -> float:
+    """Shear stiffness [N/m] of two blocks in series, layer by layer: an upper estimate of the solved one."""
+    def compliance(material, height):
+        return height * 2 * (1 + material.poisson) / material.young
+
+    coat = contact.coating
+    one = compliance(contact.substrate, contact.height - (coat.thickness if coat else 0.0))
+    one += compliance(coat.material, coat.thickness) if coat else 0.0
+    return contact.pairs * contact.length * contact.width / (2 * one)
+
+
+def _rig_cost(scene, per_point, unknowns) -> tuple:
+    from .simulate_rig import choose, drive_of, list_cost
+
+    settings = choose(scene, per_point)
+    drive = drive_of(scene)
+    if settings.engine == "exact":
+        return "exact", int(4 * settings.cycles), 2e-4 * 4 * settings.cycles * len(scene.structure.mode)
+    steps = int(settings.cycles * settings.steps)
+    f, shear = scene.friction, scene.contact is not None and scene.contact.shear is not None
+    each = 1e-6
+    if f is not None and f.law == "nonlocal":
+        if f.reading == "report" or f.order != 1:
+            each = list_cost(scene, settings, drive)[1] / steps
+            unknowns["bond_list_about"] = int(list_cost(scene, settings, drive)[0])
+        elif shear:
+            unknowns["shear_modes"] = settings.shear_modes
+            each = 4e-8 * unknowns.get("interface_points", 1) * (1 + settings.shear_modes / 4)
+        elif settings.per_point:
+            each = 6e-8 * unknowns.get("interface_points", 1)
+    elif shear:
+        each = 3e-9 * unknowns.get("interface_points", 1) + 5e-7
+    return "march", int(steps * 1.75), steps * 1.75 * each
+
+
+def _groups(scene, chain) -> dict:
+    out = {}
+    f, contact = scene.friction, scene.contact
+    load = contact.load if contact is not None else scene.normal.load if scene.normal is not None else 0.0
+    if scene.kind == "rig":
+        from .simulate_rig import drive_of
+
+        drive = drive_of(scene)
+        push = scene.structure.moving_mass * drive.acceleration
+        out["D"] = f.static * load / push if push > 0 else None
+        ratio = scene.structure.mode[0].frequency / scene.drive.frequency
+        out["knee"] = 4 / pi * f.static * load / scene.structure.moving_mass if abs(ratio - 1) < 0.2 else None
+        if f.bond_length:
+            out["drive_amplitude_over_bond_length"] = drive.acceleration / drive.omega**2 / f.bond_length
+    if scene.kind == "bench" and f.bond_length:
+        reach = scene.slide.amplitude or scene.slide.distance
+        out["amplitude_over_bond_length"] = reach / f.bond_length
+    if contact is not None:
+        stiff = block_shear(contact)
+        if f is not None:
+            out["slip_length"] = f.static * load / stiff
+        if contact.tilt is not None and load > 0:
+            modulus = contact.substrate.young / (1 - contact.substrate.poisson**2)
+            approach = load / contact.pairs * 2 * contact.height / (modulus * contact.length * contact.width)
+            out["tilt_over_first_opening"] = abs(contact.tilt.angle) * contact.length / (2 * approach)
+    return {k: v for k, v in out.items() if v is not None}
+
+
+def _verdict(scene, groups) -> list:
+    out = []
+    d = groups.get("D")
+    if d is not None:
+        if d >= 1:
+            out.append(f"D = {d:.3g} >= 1: the block should stick")
+        elif d > pi / 4:
+            out.append(f"D = {d:.3g} between pi/4 and 1: stick-slip at resonance")
+        else:
+            out.append(f"D = {d:.3g} below pi/4: at resonance friction alone does not bound the motion")
+    tilt = groups.get("tilt_over_first_opening")
+    if tilt is not None:
+        part = min(1.0, 1 / sqrt(tilt)) if tilt > 1 else 1.0
+        out.append(f"tilt is {tilt:.3g} of the first-opening tilt: " +
+                   ("full contact" if tilt <= 1 else f"partial contact, roughly {100 * part:.0f} % or less"))
+    slip = groups.get("slip_length")
+    if slip is not None:
+        out.append(f"the pieces' own shear gives way by about {slip:.2g} m before the patch slips")
+    return out

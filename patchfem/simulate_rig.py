@@ -1,0 +1,280 @@
+"""The coupled run of a scene: patch or point, law and modes, by the exact engine or the march, with its errors."""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from time import perf_counter
+
+import numpy as np
+
+from .core import BaseSine, Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
+from .friction.law import Bonds
+from .response.measures import (
+    FLOORS,
+    UNITS,
+    circular_mean,
+    classify,
+    interface_loop,
+    run_measures,
+    slip_measures,
+    window_amplitudes,
+)
+from .structure.modes import basis
+
+MOST_STEPS = 6400  # finest automatic march, steps per cycle
+LIST_LIMIT = 3e6  # steps times expected list entries beyond which a bond list in the rig is refused ... see list_cost
+SHEAR_MODES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Numerical choices of a run; `pinned` names the ones the scene fixed."""
+
+    engine: str
+    steps: int
+    cycles: float
+    window: int
+    shear_modes: int
+    tail: float
+    merge: float
+    per_point: bool
+    pinned: frozenset
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Raw:
+    """One run before its errors are known: values by measure name, histories, amplitudes per window, snapshots."""
+
+    values: dict
+    response: Response
+    window: Response
+    amplitudes: np.ndarray
+    outcome: Outcome | None
+    snapshots: list
+    book: dict
+    seconds: float
+    model: object = None
+
+
+def drive_of(scene) -> BaseSine:
+    """The base sine of [drive]; a displacement amplitude X gives the acceleration X omega^2."""
+    drive = scene.drive
+    omega = 2 * np.pi * drive.frequency
+    a = drive.acceleration if drive.acceleration is not None else drive.displacement * omega**2
+    return BaseSine(float(a), float(omega))
+
+
+def modes_of(scene) -> ModalBasis:
+    """Modes of [structure]."""
+    return basis(scene.structure.mode, scene.structure.moving_mass)
+
+
+def cycles_of(scene, drive: BaseSine) -> float:
+    """Length of the run in drive cycles."""
+    if scene.drive.cycles is not None:
+        return scene.drive.cycles
+    return scene.drive.duration / drive.period
+
+
+def law_of(scene, speed: float) -> Bonds:
+    """Bond law of [friction]; `speed` [m/s] sets the default floor v_h = 1e-3 of the peak speed."""
+    f = scene.friction
+    ratio = f.kinetic / f.static if f.static > 0 else 1.0
+    return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
+                 f.rest_speed or max(1e-3 * speed, 1e-12), f.initial_bonds)
+
+
+def choose(scene, per_point: bool = False) -> Settings:
+    """Engine and numerical settings from the scene; PatchfemError for a method that cannot do it."""
+    accuracy, f, contact = scene.accuracy, scene.friction, scene.contact
+    shear = contact is not None and contact.shear is not None
+    closed = f is None or (f.law == "coulomb" and not shear)
+    side = "upper"
+    if contact is not None:
+        from .simulate_patch import shape_side
+
+        side = shape_side(contact)
+    if accuracy.method == "exact" and not closed:
+        raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
+                            f"{' with [contact.shear]' if shear else ''}; use method = \"march\"")
+    engine = "exact" if closed and accuracy.method != "march" else "march"
+    if engine == "march" and f is not None:
+        _refuse(scene, shear, side)
+    drive = drive_of(scene)
+    cycles = cycles_of(scene, drive)
+    window = int(max(1, min(10, cycles // 10)))
+    fastest = max((m.frequency for m in scene.structure.mode), default=drive.omega) / scene.drive.frequency
+    # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
+    steps = accuracy.steps_per_cycle or int(np.clip(
+        2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * max(1.0, fastest)), 100, MOST_STEPS))
+    pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
+    tail = accuracy.tail if accuracy.tail is not None else min(1e-3 * accuracy.tolerance, 1e-6)
+    merge = accuracy.merge if accuracy.merge is not None else min(0.02, sqrt(accuracy.tolerance) / 1.6)
+    return Settings(engine, steps, cycles, window, accuracy.shear_modes or SHEAR_MODES, max(tail, 1e-15), merge,
+                    per_point or side == "lower", frozenset(pinned))
+
+
+def _refuse(scene, shear: bool, side: str) -> None:
+    f = scene.friction
+    recursion = f.law == "nonlocal" and f.reading == "stretch" and f.order == 1
+    if side == "lower" and (shear or not recursion):
+        what = "[contact.shear]" if shear else f"law '{f.law}' other than the stretch reading with order = 1"
+        raise PatchfemError(f"{scene.path}: pressure on the lower piece with {what} in the rig: not yet built; "
+                            "put the shapes on the upper piece")
+    if shear and f.law == "nonlocal" and not recursion:
+        raise PatchfemError(f"{scene.path}: [contact.shear] with order = {f.order:g}: not yet built; use order = 1")
+
+
+def contact_model(scene, settings: Settings, patch, drive: BaseSine):
+    """The ContactModel of a marching scene; patch: the solved Patch or None for [normal]."""
+    from . import simulate_march as hub
+
+    f, contact = scene.friction, scene.contact
+    load = patch.pressure.load if patch is not None else scene.normal.load
+    limit = f.static * load
+    shear = contact is not None and contact.shear is not None
+    if f.law in ("coulomb", "elastic-plastic"):
+        length = f.bond_length if f.law == "elastic-plastic" else 0.0
+        if shear:
+            from .contact.slip import jenkins_set
+
+            per_node = patch.pressure.sigma_n * patch.pieces.interface.weight
+            if f.law == "coulomb" and f.kinetic < f.static:
+                raise PatchfemError(f"{scene.path}: friction.kinetic below static with [contact.shear]: not yet "
+                                    "built; the exact set of elements needs static = kinetic")
+            found = jenkins_set(patch.pieces.tangential, f.static * per_node, length)
+            return hub.jenkins_model(found.stiffness, found.yield_slide)
+        if f.law == "coulomb":
+            return hub.coulomb_model(limit, f.kinetic * load)
+        return hub.jenkins_model([limit / length], [length])
+    law = law_of(scene, drive.acceleration / drive.omega)
+    if law.reading == "report" or law.order != 1:
+        from .friction.quadrature import cutoff
+
+        return hub.list_model(law, limit, cutoff(law.order, settings.tail), settings.merge)
+    if shear:
+        from .contact.slip import shear_modes
+
+        weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
+        reduced = shear_modes(patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes,
+                              1 / law.ratio if law.ratio > 0 else np.inf)
+        return hub.points_model(law, weight, sigma, reduced)
+    if settings.per_point:
+        from .simulate_patch import shape_side
+
+        x, weight, sigma = patch.grid.x, patch.pieces.interface.weight, patch.pressure.sigma_n
+        pattern = (x, sigma) if shape_side(contact) == "lower" else None
+        return hub.points_model(law, weight, sigma, None, pattern)
+    return hub.points_model(law, [1.0], [load])
+
+
+def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None) -> Raw:
+    """Closed-form run of a Coulomb scene, or of a structure without friction."""
+    from .dynamics.histories import SAMPLES, simulate
+
+    f = scene.friction
+    static, kinetic = (f.static * load, f.kinetic * load) if f is not None else (0.0, 0.0)
+    travel = scene.structure.travel or np.inf
+    begin = perf_counter()
+    done = simulate(modes, drive, static, kinetic, settings.cycles, settings.window, travel, progress)
+    last = min(settings.window, len(done.amplitudes))
+    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
+    span = done.window.time[-1] - done.window.time[0]
+    if f is not None:
+        slip = done.window.slip
+        values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
+                   "normal_load": load}
+        if done.starts.size:
+            values["slip_start_phase"] = circular_mean(done.starts)
+        time, weight, slide, rate, force = done.loop
+        work = float(weight @ (force * rate)) * drive.period / span
+        values |= interface_loop(time, weight, slide, force, drive.omega, work, modes.mass * modes.omega[0]**2)
+    else:
+        values.pop("friction_force_peak")
+    stuck = f is not None and done.stick >= span * (1 - 1e-12)
+    outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    del SAMPLES
+    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window), outcome, [],
+               done.ledger, perf_counter() - begin)
+
+
+def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
+    """One march at settings.steps per cycle."""
+    from . import simulate_march as hub
+
+    travel = scene.structure.travel or np.inf
+    model = contact_model(scene, settings, patch, drive)
+    begin = perf_counter()
+    done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
+                     progress)
+    seconds = perf_counter() - begin
+    last = min(settings.window, len(done.amplitudes))
+    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
+    values |= slip_measures(done.window, drive, settings.steps)
+    values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
+    w = done.window
+    weight = np.full(w.time.size, 1.0)
+    weight[[0, -1]] = 0.5
+    span = w.time[-1] - w.time[0]
+    work = float(done.window_work) * drive.period / span if span > 0 else 0.0
+    values |= interface_loop(w.time, weight, w.slide, w.force, drive.omega, work, modes.mass * modes.omega[0]**2)
+    length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
+    stuck = values["slip_amplitude"] < (1e-3 * length if model.kind else 1e-300)
+    outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    return Raw(values, done.response, w, window_amplitudes(done.amplitudes, settings.window), outcome, done.snapshots,
+               done.ledger, seconds, model)
+
+
+def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:
+    """(expected list entries, seconds) of a shared bond list; a stroke is taken as the drive's own amplitude."""
+    law = law_of(scene, drive.acceleration / drive.omega)
+    from .friction.quadrature import cutoff
+
+    reach = cutoff(law.order, settings.tail)
+    stroke = max(4 * drive.acceleration / drive.omega**2 / law.length, 1e-9)
+    if law.reading == "report" and not law.grows:
+        entries = 2 + 2 * reach / stroke
+    else:
+        entries = min(3 / max(settings.merge, 1e-9), 8 * reach) * (1 + reach / stroke) + 8 * stroke / settings.steps
+    return entries, settings.cycles * settings.steps * 15 * (2 + entries) * 3e-8
+
+
+def refuse_costly(scene, settings: Settings, drive: BaseSine, limit: float = 600.0) -> None:
+    """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
+    f = scene.friction
+    if f is None or f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
+        return
+    entries, seconds = list_cost(scene, settings, drive)
+    if seconds > limit:
+        raise Missing(f"{scene.path}: the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
+                      f"more than {limit:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, loosen accuracy.tail "
+                      "or accuracy.merge, or use reading = \"stretch\" with order = 1")
+
+
+def with_errors(values: dict, *differences: dict, least: float = 0.0) -> dict:
+    """name -> Measure, the error being the sum of |changes| from coarser runs plus `least` of the value."""
+    out = {}
+    for name, value in values.items():
+        error = abs(value) * least
+        for other in differences:
+            fine, coarse = other
+            if name in fine and name in coarse:
+                change = abs(fine[name] - coarse[name])
+                error += min(change, np.pi - change) if name == "slip_start_phase" else change
+        out[name] = Measure(value, UNITS[name], float(error), FLOORS.get(name, 0.0))
+    return out
+
+
+def settle(raw: Raw, measures: dict, tolerance: float) -> tuple:
+    """(outcome, measures with the steady estimate where there is one)."""
+    if raw.outcome is not None:
+        return raw.outcome, measures
+    outcome, steady, error = classify(raw.amplitudes, tolerance)
+    if outcome is Outcome.GROWS:
+        measures = {k: replace(m, error=None) for k, m in measures.items()}
+    if steady is not None:
+        base = measures["relative_displacement_amplitude"]
+        share = abs(steady) / max(abs(base.value), 1e-300)
+        total = (error or 0.0) + (base.error or 0.0) * share
+        measures = measures | {"relative_displacement_amplitude_steady": Measure(float(steady), "m", float(total),
+                                                                                base.floor)}
+    return outcome, measures

@@ -1,0 +1,60 @@
+"""Shared by the contact tests: a pair of alike pieces condensed to its interface."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from patchfem.contact.elasticity import Layers, assemble, interface_compliance
+from patchfem.core import Compliance, Interface
+from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
+
+TITANIUM = (121e9, 0.32)
+CARBIDE = (250e9, 0.24)  # sprayed WC-Co, the project's assumed default
+LENGTH = WIDTH = 12.7e-3
+HEIGHT = 6.35e-3
+COATING = 152.4e-6
+LOAD = 26 * 4.4482216152605
+COATED = Layers(CARBIDE, TITANIUM, "strain")
+TILTS = (0.0, 1e-5, 1e-4, 1e-3)
+
+
+def bare(material, plane="strain") -> Layers:
+    """One material throughout."""
+    return Layers(material, material, plane)
+
+
+def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
+    """Two mirrored pieces: normal and tangential compliance double, their coupling cancels."""
+    piece = assemble(grid.x, grid.depth, grid.coating_rows, layers)
+    nn, tt, _ = interface_compliance(piece)
+    return Compliance(Interface(grid.x, grid.tributary() * width, width), 2 * nn / width, 2 * tt / width)
+
+
+@cache
+def coated_pair(cells: int) -> Compliance:
+    """The coated pair of the test piece with `cells` columns."""
+    return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING), COATED)
+
+
+@cache
+def bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> Compliance:
+    """Uncoated blocks of the size of the test piece."""
+    return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells), bare((young, TITANIUM[1]), plane))
+
+
+def refined_middle(half: float, fine: float, length: float, height: float, growth: float = 1.05) -> TensorGrid:
+    """Uniform columns of `fine` over |x| <= half, growing outwards to the given length; rows start at `fine`."""
+    count = round(half / fine)
+    outer = half + np.cumsum(graded_rows(fine * growth, length / 2 - half, growth))
+    right = np.concatenate([np.arange(1, count + 1) * fine, outer])
+    x = np.concatenate([-right[::-1], [0.0], right])
+    return TensorGrid(x, np.concatenate([[0.0], np.cumsum(graded_rows(fine, height, growth))]), 0)
+
+
+def rough(rng, x, size: float, terms: int = 12):
+    """A random smooth gap of a few waves [m]."""
+    wave = rng.normal(size=(2, terms)) / np.arange(1, terms + 1)
+    phase = np.outer(np.arange(1, terms + 1), np.pi * x / (x[-1] - x[0]))
+    return size * (wave[0] @ np.cos(phase) + wave[1] @ np.sin(phase))

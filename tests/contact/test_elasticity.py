@@ -1,0 +1,188 @@
+"""One piece: linear fields, reciprocity, stresses in balance with the load, layers against the harmonic formula."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import CARBIDE, COATED, COATING, TITANIUM, bare
+from scipy.sparse.linalg import spsolve
+
+from patchfem.contact.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance, lame
+from patchfem.mesh.tensor import TensorGrid, graded_grid
+
+materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
+planes = st.sampled_from(["strain", "stress"])
+UNEVEN = TensorGrid(np.array([-3e-3, -1e-3, -0.8e-3, 0.5e-3, 2e-3, 3e-3]), np.array([0, 1e-4, 3e-4, 1e-3, 2.5e-3]), 2)
+
+
+def piece_of(grid, layers):
+    return assemble(grid.x, grid.depth, grid.coating_rows, layers)
+
+
+def shares(points):
+    """Length that belongs to each node of a line."""
+    out = np.zeros(points.size)
+    out[1:] += np.diff(points) / 2
+    out[:-1] += np.diff(points) / 2
+    return out
+
+
+@given(material=materials, plane=planes, slopes=st.lists(st.floats(-1, 1), min_size=4, max_size=4))
+def test_exact_patch_a_linear_field_needs_only_its_edge_tractions(material, plane, slopes):
+    piece = piece_of(UNEVEN, bare(material, plane))
+    (ux, uy), (vx, vy) = np.reshape(slopes, (2, 2)) * 1e-3
+    x, y = np.meshgrid(UNEVEN.x, UNEVEN.depth, indexing="ij")
+    field = np.stack([ux * x + uy * y, vx * x + vy * y], axis=-1)
+    lam, mu = lame(*material, plane)
+    sxx, syy, sxy = lam * (ux + vy) + 2 * mu * ux, lam * (ux + vy) + 2 * mu * vy, mu * (uy + vx)
+    found = (piece.matrix @ field[:, :-1].ravel()).reshape(UNEVEN.x.size, -1, 2)
+    wanted = np.zeros_like(found)
+    across, down = shares(UNEVEN.x), shares(UNEVEN.depth)[:-1]
+    wanted[:, 0] -= across[:, None] * [sxy, syy]
+    wanted[0] -= down[:, None] * [sxx, sxy]
+    wanted[-1] += down[:, None] * [sxx, sxy]
+    # the last free row also feels the held far face, where the field is not zero
+    scale = material[0] * UNEVEN.length * (1e-3 * np.abs(slopes).max() + 1e-300)
+    assert np.abs(found - wanted)[:, :-1].max() <= 1e-11 * scale
+
+
+@given(material=materials)
+def test_exact_plane_stress_is_plane_strain_of_the_equivalent_material(material):
+    young, nu = material
+    assert lame(young, nu, "stress") == pytest.approx(
+        lame(young * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu), "strain"), rel=1e-11)
+
+
+@pytest.mark.parametrize("plane, modulus", [("strain", TITANIUM[0] / (1 - TITANIUM[1] ** 2)), ("stress", TITANIUM[0])])
+def test_exact_slim_column_shortens_with_the_modulus_of_its_plane(plane, modulus):
+    grid = TensorGrid(np.linspace(-5e-4, 5e-4, 11), np.linspace(0, 6e-3, 61), 0)
+    piece = piece_of(grid, bare(TITANIUM, plane))
+    pressure = 1e8
+    u = displacement(piece, np.zeros((1, 11)), pressure * grid.tributary()[None])[0].reshape(11, 61, 2)
+    shortening = u[:, 0, 1] - u[:, 20, 1]
+    assert np.abs(shortening / (pressure * grid.depth[20] / modulus) - 1).max() <= 1e-7
+
+
+@settings(max_examples=25, deadline=None)
+@given(coating=materials, substrate=materials, plane=planes)
+def test_always_compliance_is_symmetric_and_positive_definite(coating, substrate, plane):
+    nn, tt, nt = interface_compliance(piece_of(UNEVEN, Layers(coating, substrate, plane)))
+    both = np.block([[nn, nt], [nt.T, tt]])
+    assert np.abs(nn - nn.T).max() <= 1e-12 * nn.max()
+    assert np.abs(tt - tt.T).max() <= 1e-12 * tt.max()
+    assert np.linalg.eigvalsh(both).min() > 0
+    assert not nn.flags.writeable
+
+
+def test_exact_work_of_the_load_is_twice_the_stored_energy():
+    grid = graded_grid(2e-3, 1e-3, 1e-4, COATING)
+    piece = piece_of(grid, COATED)
+    nn, tt, nt = interface_compliance(piece)
+    rng = np.random.default_rng(3)
+    shear, normal = rng.normal(size=(2, grid.x.size))
+    u = displacement(piece, shear[None], normal[None])[0].reshape(grid.x.size, -1, 2)
+    free = u[:, :-1].ravel()
+    energy = free @ (piece.matrix @ free)
+    assert normal @ nn @ normal + shear @ tt @ shear + 2 * normal @ nt @ shear == pytest.approx(energy, rel=1e-9)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_exact_displacement_at_the_interface_is_the_compliance_times_the_load(plane):
+    grid = graded_grid(4e-3, 2e-3, 1e-4, COATING)
+    piece = piece_of(grid, Layers(CARBIDE, TITANIUM, plane))
+    nn, tt, nt = interface_compliance(piece)
+    shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
+    u = displacement(piece, shear, normal).reshape(3, grid.x.size, -1, 2)
+    assert np.abs(u[:, :, 0, 1] - (normal @ nn.T + shear @ nt.T)).max() <= 1e-9 * np.abs(u).max()
+    assert np.abs(u[:, :, 0, 0] - (normal @ nt + shear @ tt.T)).max() <= 1e-9 * np.abs(u).max()
+    assert np.all(u[:, :, -1] == 0)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_exact_every_row_of_cells_carries_the_load(plane):
+    grid = graded_grid(4e-3, 2e-3, 2e-4, COATING)
+    piece = piece_of(grid, Layers(CARBIDE, TITANIUM, plane))
+    shear, normal = np.random.default_rng(2).normal(size=(2, 4, grid.x.size))
+    stress, mises = cell_stress(piece, displacement(piece, shear, normal))
+    corner = piece.cells
+    ny = grid.depth.size
+    wide = grid.x[corner[:, 1] // ny] - grid.x[corner[:, 0] // ny]
+    row = corner[:, 0] % ny
+    for k in range(ny - 1):
+        carried = wide[row == k] @ stress[:, row == k].transpose(1, 0, 2).reshape((row == k).sum(), -1)
+        carried = carried.reshape(4, 4)
+        assert np.abs(carried[:, 1] + normal.sum(axis=1)).max() <= 1e-10 * np.abs(normal).sum()
+        assert np.abs(carried[:, 3] + shear.sum(axis=1)).max() <= 1e-10 * np.abs(shear).sum()
+    full = np.zeros((*mises.shape, 3, 3))
+    for k, (i, j) in enumerate([(0, 0), (1, 1), (2, 2), (0, 1)]):
+        full[..., i, j] = full[..., j, i] = stress[..., k]
+    deviator = full - np.trace(full, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
+    assert mises == pytest.approx(np.sqrt(1.5 * (deviator**2).sum(axis=(-2, -1))), rel=1e-12)
+
+
+@given(coating=materials, substrate=materials, plane=planes, slopes=st.lists(st.floats(-1, 1), min_size=4, max_size=4))
+@settings(max_examples=40, deadline=None)
+def test_exact_stress_of_a_linear_field_obeys_hooke_in_three_dimensions(coating, substrate, plane, slopes):
+    piece = piece_of(UNEVEN, Layers(coating, substrate, plane))
+    (ux, uy), (vx, vy) = np.reshape(slopes, (2, 2)) * 1e-3
+    x, y = np.meshgrid(UNEVEN.x, UNEVEN.depth, indexing="ij")
+    field = np.stack([ux * x + uy * y, vx * x + vy * y], axis=-1).reshape(1, -1, 2)
+    stress, _ = cell_stress(piece, field)
+    for coat, (young, nu) in ((True, coating), (False, substrate)):
+        sxx, syy, szz, sxy = stress[0, piece.is_coating == coat].T
+        scale = 1e-11 * (np.abs(slopes).max() * 1e-3 + 1e-300) / (1 - 2 * nu)
+        assert np.abs((sxx - nu * (syy + szz)) / young - ux).max() <= scale
+        assert np.abs((syy - nu * (sxx + szz)) / young - vy).max() <= scale
+        assert np.abs(2 * (1 + nu) * sxy / young - (uy + vx)).max() <= scale
+        if plane == "strain":
+            assert np.abs((szz - nu * (sxx + syy)) / young).max() <= scale
+        else:
+            assert np.all(szz == 0)
+
+
+def layered_harmonic(k, coat, base, thickness):
+    """Displacement per pressure cos(kx) of a layer bonded to a half space of another material, plane strain [m/Pa]."""
+    (e1, n1), (e2, n2) = coat, base
+    g = e1 / (1 + n1) * (1 + n2) / e2
+    ell = 1 - 4 * (1 - n1) / (1 + g * (3 - 4 * n2))
+    kay = (g - 1) / (g + 3 - 4 * n1)
+    q = k * thickness
+    e = np.exp(-2 * q)
+    return (2 * (1 - n1**2) / (e1 * k) * (1 + 4 * q * kay * e - ell * kay * e**2)
+            / (1 - (ell + kay + 4 * q**2 * kay) * e + ell * kay * e**2))
+
+
+def half_wave_compliance(cells, wave):
+    """One half wave of the coated piece between two lines of symmetry, from the energy of its pressure."""
+    base = graded_grid(wave / 2, 2 * wave, wave / 16, COATING)
+    depth = base.depth
+    rows = base.coating_rows
+    for _ in range(int(np.log2(cells // 8))):
+        depth = np.sort(np.concatenate([depth, (depth[1:] + depth[:-1]) / 2]))
+        rows *= 2
+    x = np.linspace(0, wave / 2, cells + 1)
+    piece = assemble(x, depth, rows, COATED)
+    k = 2 * np.pi / wave
+    # consistent nodal forces of cos(kx) on straight shape functions
+    h = x[1]
+    force = h * np.cos(k * x) * 2 * (1 - np.cos(k * h)) / (k * h) ** 2
+    force[[0, -1]] /= 2
+    load = np.zeros((cells + 1, depth.size - 1, 2))
+    load[:, 0, 1] = force
+    free = np.ones(load.shape, bool)
+    free[[0, -1], :, 0] = False  # no motion along x where the wave is symmetric
+    free = np.flatnonzero(free.ravel())
+    u = spsolve(piece.matrix[free][:, free].tocsc(), load.ravel()[free])
+    return load.ravel()[free] @ u / (wave / 4)
+
+
+@pytest.mark.parametrize("wave", [0.08e-3, 0.5e-3, 2e-3])
+def test_order_layered_harmonic_is_two_and_the_piece_never_too_soft(wave):
+    counts = np.array([8, 16, 32])
+    truth = layered_harmonic(2 * np.pi / wave, CARBIDE, TITANIUM, COATING)
+    errors = np.array([half_wave_compliance(int(n), wave) for n in counts]) / truth - 1
+    assert np.all(errors < 0)
+    assert -np.polyfit(np.log(counts), np.log(-errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    assert abs(errors[-1]) <= 4e-3

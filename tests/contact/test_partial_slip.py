@@ -1,0 +1,312 @@
+"""Partial slip of the patch: the parallel elements and the shear modes against the problem point by point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import LOAD, TILTS, coated_pair, rough
+from scipy.optimize import lsq_linear
+
+from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.slip import (
+    contact_tangential,
+    jenkins_set,
+    normal_stiffness,
+    shear_modes,
+    tangential_stiffness,
+)
+from patchfem.contact.unilateral import press
+from patchfem.core import PatchfemError
+
+MU = 0.3
+
+
+def friction_limit(cells, angle):
+    """(m,) yield force of every node [N]."""
+    pair = coated_pair(cells)
+    return MU * press(pair, tilt(pair.interface.x, angle), LOAD).sigma_n * pair.interface.weight
+
+
+def box_problem(c, limit, pull, force):
+    """argmin f.C f/2 - f.pull with |f| <= limit by a primal-dual active set from `force`; its conditions are checked.
+
+    C f = pull where a point sticks; C f <= pull at +limit, C f >= pull at -limit.
+    """
+    scale = np.abs(pull).max() + np.abs(c @ limit).max()
+    at = np.where(force >= limit, 1, np.where(force <= -limit, -1, 0))
+    for _ in range(60 + 3 * limit.size):
+        free = at == 0
+        force = at * limit
+        if free.any():
+            force[free] = np.linalg.solve(c[np.ix_(free, free)], pull[free] - c[np.ix_(free, ~free)] @ force[~free])
+        slip = pull - c @ force
+        following = np.where(free, np.where(force > limit, 1, np.where(force < -limit, -1, 0)),
+                             np.where(at * slip > -1e-15 * scale, at, 0))
+        if np.array_equal(following, at):
+            break
+        at = following
+    slip = pull - c @ force
+    assert np.all(np.abs(force) <= limit * (1 + 1e-12))
+    assert np.abs(slip[at == 0]).max(initial=0) <= 1e-12 * scale
+    assert (at * slip).min() >= -1e-12 * scale
+    return force, slip
+
+
+def point_by_point(c, limit, path):
+    """Resultant at every reversal [N] of points behind the compliance c, one box problem per stroke."""
+    settled, force, out = np.zeros(limit.size), np.zeros(limit.size), []
+    for q in path:
+        force, moved = box_problem(c, limit, q - settled, force)
+        settled = settled + moved
+        out.append(force.sum())
+    return np.array(out)
+
+
+def elements(group, path):
+    """The same of parallel elements, each a spring in series with a slider."""
+    settled, out = np.zeros(group.stiffness.size), []
+    for q in path:
+        stretch = np.clip(q - settled, -group.yield_slide, group.yield_slide)
+        settled = q - stretch
+        out.append(group.stiffness @ stretch)
+    return np.array(out)
+
+
+def histories(count, reach, seed=7):
+    """Random paths of 40 reversals, from micro-slip to gross sliding."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        size = reach * 10 ** rng.uniform(-1, 0.3)
+        swing = rng.uniform(0.0, 1.0, 40) * (-1.0) ** np.arange(40)
+        yield size * (swing + 0.2 * rng.normal())
+
+
+@pytest.mark.parametrize("cells", [100, 200])
+@pytest.mark.parametrize("angle", TILTS)
+def test_exact_elements_carry_the_friction_limit_and_start_at_the_stick_stiffness(cells, angle):
+    pair, limit = coated_pair(cells), friction_limit(cells, angle)
+    group = jenkins_set(pair.tangential, limit)
+    assert group.stiffness @ group.yield_slide == pytest.approx(limit.sum(), rel=1e-12)
+    assert group.stiffness.sum() == pytest.approx(tangential_stiffness(pair.tangential, limit > 0),
+                                                  rel=1e-12 if group.dropped == 0 else 1e-9)
+    assert group.stiffness.min() > 0
+    assert np.all(np.diff(group.yield_slide) >= 0) and group.yield_slide[0] > 0
+
+
+@pytest.mark.parametrize("cells", [100, 200])
+@pytest.mark.parametrize("angle", TILTS)
+def test_always_the_kept_contact_set_has_an_m_matrix_with_positive_row_sums(cells, angle):
+    pair, limit = coated_pair(cells), friction_limit(cells, angle)
+    index, c, force, dropped, share = contact_tangential(pair.tangential, limit)
+    inverse = np.linalg.inv(c)
+    assert (inverse - np.diag(np.diag(inverse))).max() <= 1e-12 * inverse.max()
+    assert inverse.sum(axis=1).min() > 0
+    assert force.sum() == pytest.approx(limit.sum(), rel=1e-13)
+    assert index.size + dropped == np.count_nonzero(limit)
+    assert share == pytest.approx(1 - limit[index].sum() / limit.sum(), abs=1e-12)
+
+
+@pytest.mark.parametrize("angle", TILTS)
+def test_exact_elements_repeat_the_problem_point_by_point(angle):
+    """20 histories of 40 reversals at 101 nodes; the worst difference seen is 9e-15 of mu N."""
+    pair, limit = coated_pair(100), friction_limit(100, angle)
+    group = jenkins_set(pair.tangential, limit)
+    assert group.dropped == 0
+    touching = limit > 0
+    c = pair.tangential[np.ix_(touching, touching)]
+    for path in histories(20, group.yield_slide[-1]):
+        worst = np.abs(point_by_point(c, limit[touching], path) - elements(group, path)).max()
+        assert worst <= 1e-10 * limit.sum()
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_exact_a_bounded_least_squares_solver_finds_the_same_strokes(angle):
+    pair, limit = coated_pair(40), friction_limit(40, angle)
+    touching = limit > 0
+    c, bound = pair.tangential[np.ix_(touching, touching)], limit[touching]
+    group = jenkins_set(pair.tangential, limit)
+    # unit bounds: f = bound * s, C = R^T R
+    size = np.sqrt(np.abs(c).max()) * bound.max()
+    root = np.linalg.cholesky(c).T * bound / size
+    for path in histories(2, group.yield_slide[-1], seed=3):
+        settled, found = np.zeros(bound.size), []
+        for q in path[:12]:
+            wanted = np.linalg.solve(root.T, (q - settled) * bound) / size**2
+            answer = lsq_linear(root, wanted, (-1, 1), method="bvls", tol=1e-15, max_iter=2000)
+            force = bound * np.clip(answer.x, -1, 1)
+            settled = q - c @ force
+            found.append(force.sum())
+        assert np.abs(np.array(found) - elements(group, path[:12])).max() <= 1e-10 * bound.sum()
+
+
+@pytest.mark.parametrize("length", [1e-8, 3e-7, 1e-5])
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_exact_elements_with_bonds_repeat_the_problem_point_by_point(angle, length):
+    """Elastic-plastic points: a bond of stiffness limit/length in series with the shear of the pieces."""
+    pair, limit = coated_pair(100), friction_limit(100, angle)
+    group = jenkins_set(pair.tangential, limit, length)
+    touching = limit > 0
+    c = pair.tangential[np.ix_(touching, touching)] + np.diag(length / limit[touching])
+    assert group.stiffness @ group.yield_slide == pytest.approx(limit.sum(), rel=1e-12)
+    for path in histories(3, group.yield_slide[-1]):
+        worst = np.abs(point_by_point(c, limit[touching], path) - elements(group, path)).max()
+        assert worst <= 1e-10 * limit.sum()
+
+
+def test_exact_dropped_corner_nodes_are_reported_and_the_rest_repeats_point_by_point():
+    pair, limit = coated_pair(200), friction_limit(200, 0.0)
+    rows = np.linalg.solve(pair.tangential, np.ones(201))
+    assert rows[0] < 0 and rows[-1] < 0
+    group = jenkins_set(pair.tangential, limit)
+    index, c, force, dropped, share = contact_tangential(pair.tangential, limit)
+    assert group.dropped == dropped == 201 - index.size > 0
+    assert dropped % 2 == 0 and index[0] + index[-1] == 200
+    assert 0 < group.dropped_share == share
+    reach = group.yield_slide[-1]
+    for path in histories(3, reach):
+        assert np.abs(point_by_point(c, force, path) - elements(group, path)).max() <= 1e-10 * limit.sum()
+        # against every node kept: 6e-5 of mu N seen, far below the share that was moved
+        whole = np.abs(point_by_point(pair.tangential, limit, path) - elements(group, path)).max()
+        assert whole <= 2e-4 * limit.sum()
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), local=st.sampled_from([0.0, 1e-7, 1e-6]))
+def test_always_rough_gaps_keep_the_exact_reduction(seed, local):
+    rng = np.random.default_rng(seed)
+    pair = coated_pair(40)
+    gap = rough(rng, pair.interface.x, 10 ** rng.uniform(-8, -5))
+    limit = MU * press(pair, gap, LOAD).sigma_n * pair.interface.weight
+    group = jenkins_set(pair.tangential, limit, local)
+    assert group.stiffness @ group.yield_slide == pytest.approx(limit.sum(), rel=1e-11)
+    touching = limit > 0
+    c = pair.tangential[np.ix_(touching, touching)] + np.diag(local / limit[touching])
+    path = next(histories(1, group.yield_slide[-1], seed % 1000))
+    worst = np.abs(point_by_point(c, limit[touching], path) - elements(group, path)).max()
+    assert worst <= 1e-10 * limit.sum()
+
+
+@pytest.mark.parametrize("shape", ["crown", "tilt"])
+def test_exact_identity_of_ciavarella_and_jaeger(shape):
+    """With C_tt = C_nn the virgin stroke is F(q) = mu [N - P(delta - q/mu)], P the normal load at an approach."""
+    pair = coated_pair(100)
+    x = pair.interface.x
+    gap = crown(x, 2.0) if shape == "crown" else tilt(x, 1e-4)
+    full = press(pair, gap, LOAD)
+    group = jenkins_set(pair.normal, MU * full.sigma_n * pair.interface.weight)
+    assert group.dropped == 0
+    for share in (0.999, 0.9, 0.6, 0.3, 0.1, 0.01):
+        part = press(pair, gap, share * LOAD)
+        q = MU * (full.approach - part.approach)
+        found = group.stiffness @ np.minimum(q, group.yield_slide)
+        assert found == pytest.approx(MU * (1 - share) * LOAD, rel=1e-10)
+
+
+def test_exact_stiffness_of_the_contact_set_is_the_slope_of_the_load():
+    pair = coated_pair(100)
+    gap = tilt(pair.interface.x, 1e-4)
+    here, more = press(pair, gap, LOAD), press(pair, gap, LOAD * (1 + 1e-7))
+    slope = LOAD * 1e-7 / (more.approach - here.approach)
+    assert normal_stiffness(pair.normal, here.sigma_n > 0) == pytest.approx(slope, rel=1e-6)
+
+
+# values [N/m]: both whole bodies bonded over the contact set, at 200 cells, no condensation
+@pytest.mark.parametrize("angle, bonded", [*zip(TILTS, (4.04955667e8, 4.04942844e8, 2.30395570e8, 1.22044346e8))])
+def test_exact_stick_stiffness_agrees_with_two_whole_bodies(angle, bonded):
+    pair, limit = coated_pair(200), friction_limit(200, angle)
+    assert tangential_stiffness(pair.tangential, limit > 0) == pytest.approx(bonded, rel=1e-8)
+
+
+def saturating(c, limit, length, slide):
+    """Forces limit (1 - exp(-xi/length)) with xi + C f = slide, Newton in the local slide xi of every point."""
+    inverse, local = np.linalg.inv(c), np.zeros(limit.size)
+    for _ in range(500):
+        missing = inverse @ (slide - local) + limit * np.expm1(-local / length)
+        step = np.linalg.solve(inverse + np.diag(limit * np.exp(-local / length) / length), missing)
+        local = local + np.clip(step, -5 * length, 5 * length)
+        if np.abs(step).max() <= 1e-14 * slide:
+            return -limit * np.expm1(-local / length)
+    raise AssertionError("the reference did not converge")
+
+
+def few_modes(modes, limit, length, slide):
+    """The same resultant with the compliance of `modes` only: unknowns are the mode coordinates."""
+    bound, coordinate = limit[modes.points], np.zeros(modes.stiffness.size)
+    for _ in range(200):
+        local = slide - modes.shape @ coordinate
+        missing = modes.stiffness * coordinate + modes.shape.T @ (bound * np.expm1(-local / length))
+        slope = (bound * np.exp(-local / length) / length)[:, None]
+        step = np.linalg.solve(np.diag(modes.stiffness) + modes.shape.T @ (slope * modes.shape), missing)
+        coordinate = coordinate - step
+        if np.abs(step).max() <= 1e-14 * (np.abs(coordinate).max() + slide):
+            return bound @ -np.expm1(-(slide - modes.shape @ coordinate) / length)
+    raise AssertionError("the mode equations did not converge")
+
+
+@pytest.mark.parametrize("angle", TILTS)
+def test_exact_all_modes_hold_the_whole_compliance(angle):
+    pair, limit = coated_pair(100), friction_limit(100, angle)
+    modes = shear_modes(pair.tangential, limit, 1e-6, 10**6)
+    touching = np.flatnonzero(limit > 0)
+    assert np.array_equal(modes.points, touching)
+    c = pair.tangential[np.ix_(touching, touching)]
+    assert np.abs(modes.shape / modes.stiffness @ modes.shape.T - c).max() <= 1e-12 * c.max()
+    assert modes.backbone_error <= 1e-13
+    assert np.all(np.diff(modes.stiffness) >= 0)
+    slides = np.array([0.1, 1.0, 4.0]) * 1e-6
+    for slide in slides:
+        whole = saturating(c, limit[touching], 1e-6, slide).sum()
+        assert few_modes(modes, limit, 1e-6, slide) == pytest.approx(whole, rel=1e-12)
+
+
+@pytest.mark.parametrize("length", [1e-7, 1e-6])
+@pytest.mark.parametrize("angle", TILTS)
+def test_always_more_modes_never_worsen_the_backbone(angle, length):
+    pair, limit = coated_pair(200), friction_limit(200, angle)
+    errors = np.array([shear_modes(pair.tangential, limit, length, n).backbone_error for n in (1, 2, 4, 8, 16)])
+    assert np.all(np.diff(errors) <= 1e-12)
+    assert errors[3] <= (1e-6 if angle == 0 else 1e-4)
+    assert errors[0] > errors[3]
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
+    """Against the points themselves, on the 24 slides up to 6 bond lengths that the error is taken over."""
+    length = 1e-6
+    pair, limit = coated_pair(100), friction_limit(100, angle)
+    touching = limit > 0
+    c = pair.tangential[np.ix_(touching, touching)]
+    slides = length * np.arange(1, 25) / 4
+    whole = np.array([saturating(c, limit[touching], length, q).sum() for q in slides])
+    for count in (1, 3):
+        modes = shear_modes(pair.tangential, limit, length, count)
+        few = np.array([few_modes(modes, limit, length, q) for q in slides])
+        assert modes.backbone_error == pytest.approx(np.abs(few - whole).max() / limit.sum(), abs=1e-12)
+
+
+def test_refuses_a_patch_that_could_jump_by_itself():
+    pair, limit = coated_pair(100), friction_limit(100, 1e-4)
+    length = 1e-7
+    touching = limit > 0
+    stiffness = limit[touching] / length
+    largest = np.linalg.eigvals(stiffness[:, None] * pair.tangential[np.ix_(touching, touching)]).real.max()
+    edge = 1 + 1 / largest
+    with pytest.raises(PatchfemError, match=r"friction\.kinetic.*jump"):
+        shear_modes(pair.tangential, limit, length, 8, weakening=edge * (1 + 1e-6))
+    assert shear_modes(pair.tangential, limit, length, 8, weakening=edge * (1 - 1e-6)).stiffness.size == 8
+
+
+def test_refuses_a_patch_without_friction():
+    with pytest.raises(PatchfemError, match="no point carries friction"):
+        jenkins_set(coated_pair(40).tangential, np.zeros(41))
+
+
+def test_exact_one_node_is_one_element():
+    pair = coated_pair(40)
+    limit = np.zeros(41)
+    limit[7] = 2.0
+    group = jenkins_set(pair.tangential, limit)
+    assert group.stiffness == pytest.approx([1 / pair.tangential[7, 7]], rel=1e-13)
+    assert group.yield_slide == pytest.approx([2.0 * pair.tangential[7, 7]], rel=1e-13)

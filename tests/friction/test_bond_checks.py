@@ -1,0 +1,225 @@
+"""The printed consequences of 2.8-2.21, each number known from a closed form or a second computation.
+
+Lengths in eps_0, forces in mu_s N. Path steps are exact for these laws, so few and uneven steps must do.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from friction_paths import triangle, upper_pressure, walk
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.closed_forms import report_loop, reversal_force, stretch_loop, virgin_force
+from patchfem.friction.law import Bonds, grow, growth_exponents
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import BondState, Recursion
+
+ONE = upper_pressure([1.0])
+UNEVEN = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])
+
+
+def bonds(order=1.0, reading="stretch", initial=1.0, **more):
+    return Bonds(1.0, 1.0, order, reading, initial=initial, **more)
+
+
+def laws(order, reading, initial):
+    law = bonds(order, reading, initial)
+    both = [Quadrature(law, tail=0.0)]
+    return [*both, Recursion(law)] if reading == "stretch" and order == 1 else both
+
+
+def last_cycle_work(law, path, per_cycle):
+    run = walk(law, path, ONE)
+    return float(run.mean[-per_cycle:, 0] @ np.diff(path)[-per_cycle:]), float(run.traction[-1, 0]), run
+
+
+# ---- from rest
+
+@pytest.mark.parametrize("order, reading, initial, want", [
+    (0, "report", 0, [0.393469, 0.632121, 0.864665, 0.981684]),
+    (1, "report", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
+    (1, "stretch", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
+    (1, "report", 0, [0.090204, 0.264241, 0.593994, 0.908422]),
+    (1, "stretch", 0, [0.090204, 0.264241, 0.593994, 0.908422]),
+    (2, "report", 1, [0.090204, 0.264241, 0.593994, 0.908422]),
+    (2, "stretch", 1, [0.090204, 0.264241, 0.593994, 0.908422]),
+    (-0.5, "report", 0, [0.682689, 0.842701, 0.954500, 0.995322]),
+])
+def test_exact_virgin_force(order, reading, initial, want):
+    for law in laws(order, reading, initial):
+        for sign in (1, -1):
+            run = walk(law, sign * UNEVEN, ONE)
+            force = np.append(0.0, sign * run.traction[:, 0])
+            assert np.interp([0.5, 1, 2, 4], UNEVEN, force) == pytest.approx(want, abs=1e-6)
+            assert force == pytest.approx(virgin_force(UNEVEN, 1.0, order, initial), abs=1e-8)
+
+
+def test_exact_peak_of_a_fast_start_with_weakening():
+    """eps = eps_k + (1 - eps_k) e^-R/l_k, F' = 1 - F/eps: peaks of an integrated equation for eps_k = 0.5."""
+    path = np.arange(0, 8, 0.01)
+    for slip_growth, peak, place in ((1.0, 0.600263, 1.607), (5.0, 0.799602, 2.561), (50.0, 0.955895, 4.617)):
+        law = bonds(ratio=0.5, rest_growth=1e-30, slip_growth=slip_growth, rest_speed=1e-3)
+        force = walk(Recursion(law), path, ONE, dt=0.01).traction[:, 0]
+        assert force.max() == pytest.approx(peak, abs=1e-5)
+        assert path[1 + force.argmax()] == pytest.approx(place, abs=0.02 if slip_growth < 50 else 0.1)
+
+
+def test_order_of_the_fast_start_is_two():
+    law = bonds(ratio=0.5, rest_growth=1e-30, slip_growth=1.0, rest_speed=1e-3)
+
+    def end(step):
+        return walk(Recursion(law), np.linspace(0, 2, round(2 / step) + 1), ONE, dt=step).traction[-1, 0]
+
+    exact = end(1e-3)
+    miss = [abs(end(h) - exact) for h in (0.2, 0.1, 0.05)]
+    assert np.log2(miss[0] / miss[1]) == pytest.approx(2, abs=0.1)
+    assert np.log2(miss[1] / miss[2]) == pytest.approx(2, abs=0.1) and miss[2] < 2e-4
+
+
+# ---- loops
+
+@pytest.mark.parametrize("ratio, area", [(0.1, 1.328022e-3), (1, 0.953623), (5, 16.000363), (10, 36.0)])
+def test_exact_stretch_loop_with_any_number_of_steps(ratio, area):
+    for per_stroke in (2, 14):
+        path = triangle(ratio, int(np.ceil(9 / ratio)) + 1, per_stroke)
+        work, end, _ = last_cycle_work(Recursion(bonds()), path, 2 * per_stroke)
+        want, force = stretch_loop(ratio, 1.0)
+        assert work == pytest.approx(area, rel=4e-7) and work == pytest.approx(want, rel=1e-11)
+        assert -end == pytest.approx(force, rel=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1, 5])
+def test_exact_stretch_loop_by_the_sum_over_bonds(ratio):
+    path = triangle(ratio, 10, 4)
+    work, end, _ = last_cycle_work(Quadrature(bonds(), tail=0.0), path, 8)
+    want, force = stretch_loop(ratio, 1.0)
+    assert work == pytest.approx(want, rel=1e-11) and -end == pytest.approx(force, rel=1e-12)
+
+
+@pytest.mark.parametrize("ratio, area, within", [(0.1, 2.659583e-2, 1e-4), (1, 2.149259, 4e-7), (5, 18.0, 4e-7),
+                                                 (10, 38.0, 4e-7)])
+def test_exact_printed_loop_of_order_zero(ratio, area, within):
+    per_stroke = 4 if ratio < 5 else 20
+    path = triangle(ratio, int(np.ceil(3.5 / ratio)) + 2, per_stroke)
+    work, end, _ = last_cycle_work(Quadrature(bonds(0.0, "report", 0.0)), path, 2 * per_stroke)
+    assert work == pytest.approx(area, rel=within)
+    assert work == pytest.approx(report_loop(ratio, 1.0)[0], rel=within)
+    assert end == pytest.approx(-1.0, abs=1e-6)
+
+
+def test_exact_reading_report_creates_energy():
+    """p = 1 as printed, 20 triangle cycles of A = 0.01 from rest: W/(4 A n) = -3.9761e-4; stretch: +2.1858e-5.
+
+    The cycles start and end in the middle of the stroke, so no energy of the bonds' displacement is left out.
+    """
+    path = triangle(0.01, 20, 4)[:-2]
+    assert path[0] == path[-1] == 0 and path.size == 161
+    for reading, want in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
+        run = walk(Quadrature(bonds(1.0, reading, 0.0), tail=0.0), path, ONE)
+        assert run.mean[:, 0] @ np.diff(path) / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
+
+
+def test_exact_reading_report_creates_energy_in_a_steady_loop_of_order_two():
+    path = triangle(0.1, 75, 2)
+    work, _, _ = last_cycle_work(Quadrature(bonds(2.0, "report", 0.0)), path, 4)
+    assert work / 0.4 == pytest.approx(-1.7375e-4, rel=1e-3)
+
+
+# ---- reversal
+
+@pytest.mark.parametrize("order, reading, want", [
+    (0, "report", [0.637462, 0, -0.5, -0.729329, -0.995042]),
+    (1, "stretch", [0.809675, 0.414214, 0, -0.264241, -0.900426]),
+])
+def test_exact_reversal_after_a_long_slide(order, reading, want):
+    back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
+    path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
+    for law in laws(order, reading, 1.0 if reading == "stretch" else 0.0):
+        force = walk(law, path, ONE).traction[-5:, 0]
+        assert force == pytest.approx(want, abs=1e-6)
+        assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=1e-12)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.5, 2.0])
+@pytest.mark.parametrize("reading", ["stretch", "report"])
+def test_exact_reversal_of_other_orders(order, reading):
+    back = np.array([0.25, 1.0, 2.5])
+    path = np.concatenate([np.linspace(0, 40, 161), 40 - back])
+    force = walk(Quadrature(bonds(order, reading, 0.0)), path, ONE).traction[-3:, 0]
+    within = 1e-9 if reading == "report" or order == 2 else 5e-4  # |u|^p is not smooth where u changes sign
+    assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=within)
+
+
+# ---- growth of the bond length
+
+def test_exact_healing_integrals():
+    """Through a linear reversal with a_s/deceleration = 0.3, v_1/v_h = 100; one step from -0.3 to 0.7."""
+    law = bonds(rest_growth=0.3, slip_growth=1e30, rest_speed=0.01)
+    rest, slide = growth_exponents(law, 1.0, -1.0, 0.0, 2.0)
+    assert slide == 0 and np.exp(-rest) == pytest.approx(0.03462767, abs=1e-8)
+    rest, slide = growth_exponents(law, -0.3, 0.7, 0.2, 1.0)
+    assert rest == pytest.approx(2.89490779, abs=1e-8)
+    times = np.linspace(0, 1, 1_000_001)
+    middle = (times[1:] + times[:-1]) / 2
+    assert rest == pytest.approx(np.mean(0.3 / np.maximum(abs(-0.3 + middle), 0.01)), rel=1e-9)
+
+
+@given(st.floats(0, 3), st.floats(1e-3, 10), st.integers(1, 40), st.floats(0.1, 1.0), st.floats(0.01, 5),
+       st.floats(0.01, 5), st.floats(1e-4, 1), st.floats(0.05, 1))
+def test_always_growth_at_constant_speed_may_be_split(speed, time, parts, ratio, rest, slip, floor, start):
+    law = bonds(ratio=ratio, rest_growth=rest, slip_growth=slip, rest_speed=floor)
+    whole = grow(law, start, speed, speed, speed * time, time)
+    eps = start
+    for _ in range(parts):
+        eps = grow(law, eps, speed, speed, speed * time / parts, time / parts)
+    assert eps == pytest.approx(whole, rel=1e-12)
+    assert min(start, ratio) * (1 - 1e-12) <= whole <= 1 + 1e-12
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2), st.floats(1e-3, 1), st.integers(2, 9))
+def test_always_the_rest_integral_of_a_linear_velocity_may_be_split(v0, v1, time, parts):
+    law = bonds(rest_growth=0.7, slip_growth=1.0, rest_speed=0.01)
+    knots = np.linspace(v0, v1, parts + 1)
+    pieces = sum(growth_exponents(law, a, b, 0.0, time / parts)[0] for a, b in pairwise(knots))
+    assert pieces == pytest.approx(growth_exponents(law, v0, v1, 0.0, time)[0], rel=1e-6)
+
+
+def test_exact_steady_bond_length_is_2_11():
+    law = bonds(ratio=0.7, rest_growth=0.4, slip_growth=0.1, rest_speed=1e-6)
+    for speed in (0.02, 0.2, 2.0):
+        eps = grow(law, 1.0, speed, speed, 1e3, 1e3 / speed)
+        assert eps == pytest.approx((1 + 0.7 * speed**2 / 0.04) / (1 + speed**2 / 0.04), rel=1e-13)
+
+
+@pytest.mark.parametrize("hold, length, want", [
+    (0.05, 0.696735, [0.559315, 0.600747, 0.649902, 0.685586]),
+    (0.2, 0.932332, [0.601686, 0.679455, 0.784421, 0.881728]),
+    (1.0, 0.999977, [0.610597, 0.696729, 0.816050, 0.932316]),
+])
+def test_exact_dwell_heals_the_length_and_leaves_the_force(hold, length, want):
+    """Slid to F = 0.5 with eps = 0.5, healed at 10/s; then restarted with the length held (no time passes)."""
+    law = Recursion(bonds(ratio=0.5, rest_growth=10.0, slip_growth=1e30, rest_speed=1.0))
+    state = BondState(np.array([[1.0], [0.5], [0.5]]), 0.5)
+    step = law.step(state, 0.0, np.ones(1), np.ones(1), hold)
+    assert step.state.eps == pytest.approx(length, abs=1e-6)
+    assert step.mean[0] == 0.5 and law.traction(step.state)[0] == 0.5 and step.dissipated[0] == 0
+    for place, force in zip((0.25, 0.5, 1, 2), want):
+        moved = law.step(step.state, place, np.ones(1), np.ones(1), 0.0)
+        assert law.traction(moved.state)[0] == pytest.approx(force, abs=1e-6)
+
+
+# ---- energy
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(-4, 4), min_size=2, max_size=40), st.floats(0.1, 1), st.floats(0.01, 3), st.floats(0.01, 3))
+def test_always_the_stretch_ledger_closes(steps, ratio, rest, slip):
+    """Work = stored + dissipated to 1e-12, and no step gives energy back."""
+    law = Recursion(bonds(ratio=ratio, rest_growth=rest, slip_growth=slip, rest_speed=1e-3))
+    path = np.concatenate([[0], np.cumsum(steps)])
+    run = walk(law, path, ONE, dt=0.1)
+    work = run.mean[:, 0] * np.diff(path)
+    total = np.abs(work).sum() + 1e-300
+    assert abs(work.sum() - run.dissipated.sum() - run.stored[-1, 0]) <= 1e-12 * max(total, 1e-3)
+    assert run.dissipated.min() >= -1e-12 * max(total, 1e-3)

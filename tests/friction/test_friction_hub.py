@@ -1,0 +1,277 @@
+"""The compiled loop where laws and modes meet: prescribed paths, marches and free decay against other computations."""
+
+import numpy as np
+import pytest
+from friction_paths import random_walk, upper_pressure, walk
+from scipy.integrate import solve_ivp
+
+from patchfem.compiled import load_kernels
+from patchfem.contact.slip import jenkins_set, shear_modes
+from patchfem.core import BaseSine, ModalBasis
+from patchfem.dynamics.propagator import GAUSS_W, propagator
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import Recursion, advance
+from patchfem.simulate_march import GOAL, jenkins_model, list_model, march, points_model
+
+OMEGA = 2 * np.pi * 143
+GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
+
+
+def one_mode(omega, zeta, mass):
+    one = np.ones(1)
+    return ModalBasis(("axial",), omega * one, zeta * one, one, one, one, mass)
+
+
+def follow(model, path, dt=0.3):
+    """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of hub.follow_path."""
+    hub = load_kernels()
+    contact, work = model.build(hub)
+    burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    bad = hub.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, work, GOAL * model.limit, burnt,
+                          forces)
+    return forces, burnt, bad, contact
+
+
+def half_plane(count, scale=1.0):
+    """A symmetric positive definite tangential compliance (m, m) with the logarithm of a half plane, and places."""
+    x = (np.arange(count) + 0.5) / count - 0.5
+    gap = np.abs(x[:, None] - x)
+    return scale * (np.log(2.5 / np.where(gap > 0, gap, 0.3 / count))), x
+
+
+# ---- prescribed paths
+
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+def test_exact_prescribed_path_of_points_is_the_recursion(growth):
+    law = Bonds(0.4, 1.0, initial=0.7, **growth)
+    area, sigma = np.array([0.5, 1.0, 0.25]), np.array([2.0, 1.0, 3.0])
+    path = random_walk(2, 80, 0.6)
+    forces, burnt, bad, _ = follow(points_model(law, area, sigma), path)
+    run = walk(Recursion(law), path, upper_pressure(sigma), 0.3)
+    assert bad == 0
+    assert forces[1:, 0] == pytest.approx(run.traction @ area, abs=1e-12)
+    assert forces[:-1, 1] == pytest.approx(run.mean @ area, abs=1e-12)
+    assert burnt[:-1, 0] == pytest.approx(run.dissipated @ area, abs=1e-12)
+    assert burnt[1:, 1] == pytest.approx(run.stored @ area, abs=1e-12)
+
+
+@pytest.mark.parametrize("order", [0.0, 1.0])
+def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
+    law = Bonds(0.4, 1.0, order, "report", initial=0.0)
+    path = random_walk(2, 60, 0.6)
+    forces, _, _, _ = follow(list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
+    run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
+    assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
+    assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-10)
+
+
+def dense_steps(law, compliance, area, sigma, path):
+    """The same step without modes: nodal deflections d with (d_0 + d_1)/2 = C f, f the step-mean nodal forces."""
+    m = area.size
+    bonds, d = np.stack([law.initial * sigma, np.zeros(m), np.zeros(m)]), np.zeros(m)
+    weight, rows = law.static * area / law.length, []
+    for dq in np.diff(path):
+        new = d.copy()
+        for _ in range(80):
+            _, mean, slope, _ = advance(bonds, dq - (new - d), sigma, law.length)
+            miss = (d + new) / 2 - compliance @ (weight * mean)
+            if np.abs(miss).max() < 1e-15:
+                break
+            change = np.linalg.solve(np.eye(m) / 2 + compliance * (weight * slope), miss)
+            part = 1.0
+            while part > 1e-6:
+                trial = new - part * change
+                other = advance(bonds, dq - (trial - d), sigma, law.length)[1]
+                if np.abs((d + trial) / 2 - compliance @ (weight * other)).max() < np.abs(miss).max():
+                    break
+                part /= 2
+            new = new - part * change
+        bonds, mean, _, burnt = advance(bonds, dq - (new - d), sigma, law.length)
+        d = new
+        rows.append((weight @ mean, weight @ bonds[1], weight @ burnt / 2))
+    return np.array(rows), d
+
+
+@pytest.mark.parametrize("stiffness", [0.05, 1.0])
+def test_exact_shear_modes_are_the_full_tangential_compliance(stiffness):
+    """All modes of D^1/2 C D^1/2 against a dense Newton on nodal deflections; slide steps up to two bond lengths."""
+    law = Bonds(0.4, 1.0)
+    compliance, x = half_plane(24, stiffness)
+    area, sigma = np.full(24, 1 / 24), 1 + 0.8 * x
+    modes = shear_modes(compliance, law.static * area * sigma, law.length, 24)
+    path = random_walk(11, 60, 0.8)
+    forces, burnt, bad, contact = follow(points_model(law, area, sigma, modes), path)
+    want, deflection = dense_steps(law, compliance, area, sigma, path)
+    assert bad == 0
+    assert forces[:-1, 1] == pytest.approx(want[:, 0], abs=1e-10)
+    assert forces[1:, 0] == pytest.approx(want[:, 1], abs=1e-9)
+    assert burnt[:-1, 0] == pytest.approx(want[:, 2], abs=1e-9)
+    assert contact.psi @ contact.b == pytest.approx(deflection, abs=1e-9)
+
+
+def test_exact_ledger_with_shear_modes():
+    """Work at the holder = stored in bonds and pieces + dissipated, step by step."""
+    law = Bonds(0.4, 1.0)
+    compliance, x = half_plane(24)
+    modes = shear_modes(compliance, law.static * np.full(24, 1 / 24) * (1 + x), law.length, 8)
+    path = random_walk(12, 80, 0.7)
+    forces, burnt, bad, _ = follow(points_model(law, np.full(24, 1 / 24), 1 + x, modes), path)
+    work = forces[:-1, 1] * np.diff(path)
+    assert bad == 0
+    assert work == pytest.approx(burnt[:-1, 0] + np.diff(burnt[:, 1]), abs=1e-10)
+    assert burnt[:-1, 0].min() >= -1e-13
+
+
+def test_exact_masing_loop_of_a_jenkins_set():
+    """Back and forth at amplitude A: the loop's end force and 4 sum k s (A - s) over the elements that slip."""
+    elements = jenkins_set(half_plane(16)[0], np.full(16, 0.4 / 16), 0.1)
+    amplitude = 0.6 * elements.yield_slide.max()
+    path = amplitude * np.concatenate([np.linspace(0, 1, 6), np.linspace(1, -1, 8)[1:], np.linspace(-1, 1, 8)[1:]])
+    forces, burnt, _, _ = follow(jenkins_model(elements.stiffness, elements.yield_slide), path)
+    slips = elements.yield_slide < amplitude
+    k, s = elements.stiffness, elements.yield_slide
+    assert 0 < slips.sum() < slips.size
+    assert forces[-1, 0] == pytest.approx(k @ np.minimum(s, amplitude), rel=1e-12)
+    area = 4 * (k[slips] * s[slips]) @ (amplitude - s[slips])
+    assert forces[5:-1, 1] @ np.diff(path[5:]) == pytest.approx(area, rel=1e-12)
+    assert burnt[5:-1, 0].sum() == pytest.approx(area, rel=1e-12)
+
+
+# ---- marches
+
+def test_order_of_the_march_against_an_integrated_dahl_law():
+    """143 Hz, 0.003, 1 kg, 0.4 x 98.0665 N, bond length 1 um, 5 g, 3 cycles against DOP853; order two."""
+    length, limit, drive = 1e-6, 0.4 * 98.0665, 5 * 9.80665
+
+    def rhs(t, y):
+        q, v, z = y
+        return [v, -2 * 0.003 * OMEGA * v - OMEGA**2 * q - drive * np.sin(OMEGA * t) - limit * z,
+                (v - abs(v) * z) / length]
+
+    times = np.arange(3 * 50 + 1) / 50 / 143
+    run = solve_ivp(rhs, (0, times[-1]), [0.0, 0.0, 0.0], method="DOP853", rtol=1e-10, atol=[1e-16, 1e-13, 1e-10],
+                    t_eval=times, max_step=1 / 143 / 400)
+    law = Bonds(0.4, length)
+    errors, forces = [], []
+    for steps in (100, 800, 6400):
+        got = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(drive, OMEGA), points_model(law, [1e-4], [98.0665e4]), 3,
+                    steps, window=3)
+        errors.append(np.abs(got.window.slide[::steps // 50] - run.y[0]).max())
+        forces.append(np.abs(got.window.force[::steps // 50] / limit - run.y[2]).max())
+    assert np.ptp(run.y[0]) > 5e-6  # it slides
+    assert errors[0] > errors[1] > errors[2] and errors[2] < 5e-5 * length and forces[2] < 2e-5
+    assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.1)
+    assert np.log2(forces[0] / forces[2]) / 6 == pytest.approx(2, abs=0.1)
+
+
+@pytest.mark.parametrize("stiffness, want", [(10, 0.249538145), (100, 0.285786312)])
+def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
+    """Unit oscillator, damping 0.003, at resonance, limit 0.8 of the drive: steady peaks known from DOP853.
+
+    The step in which an element yields falls where it likes, so single halvings scatter about order two.
+    """
+    rows = []
+    for steps in (400, 3200, 6400):
+        got = march(one_mode(1.0, 0.003, 1.0), BaseSine(1.0, 1.0), jenkins_model([stiffness], [0.8 / stiffness]), 80,
+                    steps, window=2)
+        low, high = got.amplitudes[-1]
+        rows.append((high - low) / 2)
+    errors = np.abs(np.array(rows) - want)
+    assert np.log2(errors[0] / errors[2]) / 4 == pytest.approx(2, abs=0.2) and errors[2] < 3e-6
+    assert rows[2] + (rows[2] - rows[1]) / 3 == pytest.approx(want, abs=2e-7)
+
+
+def test_exact_march_with_a_pressure_on_the_lower_piece_replayed():
+    """The marched slide, walked again by the NumPy law under the shifted pattern, gives the marched force."""
+    law = Bonds(0.4, 2e-6)
+    x = np.linspace(-30e-6, 30e-6, 61)
+    sigma = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 4e-6))
+    area = np.full(61, 1e-4 / 61)
+    limit = 0.4 * area @ sigma
+    got = march(one_mode(OMEGA, 0.01, 1.0), BaseSine(1.5 * limit, OMEGA),
+                points_model(law, area, sigma, pattern=(x, sigma)), 2, 100, window=2)
+    path = got.window.slide
+    run = walk(Recursion(law), path, lambda q: np.interp(x + q, x, sigma, left=0.0, right=0.0))
+    assert np.ptp(path) > 5e-6 and (run.traction == 0).any()
+    assert got.window.force[1:] == pytest.approx(run.traction @ area, abs=1e-9 * limit)
+
+
+def test_exact_march_of_a_list_is_the_march_of_points():
+    """Stretch p = 1 as a list of bonds (two Gauss points, nothing merged) and as bond states: one motion."""
+    law = Bonds(0.4, 2e-6)
+    limit = 0.4 * 98.0665
+    runs = [march(one_mode(OMEGA, 0.003, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 2, 100, window=2).window
+            for model in (list_model(law, limit, 20.0, 0.0), points_model(law, [1e-4], [98.0665e4]))]
+    assert np.ptp(runs[1].slide) > 5e-6
+    assert runs[0].slide == pytest.approx(runs[1].slide, abs=5e-4 * 2e-6)
+    assert runs[0].force == pytest.approx(runs[1].force, abs=5e-4 * limit)
+
+
+def test_exact_energy_ledger_of_a_driven_march():
+    law = Bonds(0.4, 1e-6)
+    for model in (points_model(law, [1e-4], [98.0665e4]), jenkins_model([2e7, 1e7], [1e-6, 2e-6])):
+        got = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(49.0, OMEGA), model, 5, 40)
+        book = got.ledger
+        miss = book["work_in"] - book["viscous"] - book["friction"] - book["stored"]
+        assert abs(miss) <= 1e-8 * (book["power"] + book["peak_stored"])
+
+
+# ---- free decay
+
+def release(basis, model, start, steps_per_cycle, count):
+    """Modal + stored energy at every step of a free march from the modal displacements `start`, and the last slide."""
+    hub = load_kernels()
+    prop = propagator(basis, BaseSine(0.0, basis.omega[0]), steps_per_cycle)
+    contact, work = model.build(hub)
+    state = np.zeros((basis.omega.size, 2))
+    state[:, 0] = start
+    modes = hub.Modes(basis.omega, 2 * basis.zeta * basis.omega, basis.slide, basis.base, basis.output)
+    steps = hub.Steps(prop.step, prop.gauss, prop.sine, prop.sine_gauss, GAUSS_W.copy(), prop.dt, prop.beta)
+    held, ledger, rows = np.zeros(1), np.zeros(8), np.zeros((2, 2 * basis.omega.size + 4))
+
+    def energy():
+        out = 0.5 * basis.mass * np.sum(state[:, 1]**2 + (basis.omega * state[:, 0])**2)
+        if model.kind == hub.JENKINS:
+            return out + 0.5 * contact.stiffness @ contact.stretch**2
+        return out + 0.5 * contact.weight @ contact.bonds[2] + 0.5 * contact.kappa @ contact.b**2
+
+    history = [energy()]
+    for k in range(count):
+        done, status = hub.march(k, 1, state, held, modes, steps, 0.0, basis.mass, model.kind, False, contact, work,
+                                 GOAL * model.limit, np.inf, ledger, rows)
+        assert (done, status) == (1, 0)
+        history.append(energy())
+    assert ledger[7] == 0
+    return np.array(history), ledger, float(basis.slide @ state[:, 0])
+
+
+@pytest.mark.parametrize("steps_per_cycle", [6, 12, 25])
+@pytest.mark.parametrize("kind", ["points", "jenkins"])
+def test_always_free_decay_never_gains_energy(kind, steps_per_cycle):
+    """Undamped, 39.24 N, bond length 2 um, released at 100 um: with six steps per cycle no step gains 1e-8."""
+    law = Bonds(0.4, 2e-6)
+    model = points_model(law, [1e-4], [98.1e4]) if kind == "points" else jenkins_model([39.24 / 2e-6], [2e-6])
+    history, ledger, _ = release(one_mode(OMEGA, 0.0, 1.0), model, 1e-4, steps_per_cycle, 10 * steps_per_cycle)
+    assert np.diff(history).max() <= 1e-8 * history[0]
+    assert history[0] - history[-1] == pytest.approx(ledger[3], rel=1e-9)
+    assert history[-1] < 0.05 * history[0]
+
+
+@pytest.mark.parametrize("steps_per_cycle", [20, 7])
+@pytest.mark.parametrize("shear", [True, False])
+def test_always_free_decay_of_six_modes_never_gains_energy(shear, steps_per_cycle):
+    """Six modes, forty points, shear modes: released in several modes, whose fastest turns within a step."""
+    law = Bonds(0.4, 2e-6)
+    area, (compliance, x) = np.full(40, 1e-4 / 40), half_plane(40, 1e-8)
+    sigma = 98.1e4 * (1 + 1.6 * x)
+    modes = shear_modes(compliance, law.static * area * sigma, law.length, 10) if shear else None
+    omega = OMEGA * np.array([1.0, 1.7, 3.1, 5.3, 8.9, 14.2])
+    slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
+    basis = ModalBasis(tuple("abcdef"), omega, np.zeros(6), slide, slide, slide, 1.0)
+    start = 1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005])
+    history, ledger, _ = release(basis, points_model(law, area, sigma, modes), start, steps_per_cycle,
+                                 15 * steps_per_cycle)
+    assert np.diff(history).max() <= 1e-8 * history[0]
+    assert history[0] - history[-1] == pytest.approx(ledger[3], rel=1e-8)
+    assert history[-1] < 0.5 * history[0]

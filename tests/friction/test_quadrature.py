@@ -1,0 +1,185 @@
+"""The sum over bonds for every order and both readings: closed forms, a sum by hand, orders and bounds."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from friction_paths import lower_pressure, sum_by_hand, triangle, upper_pressure, walk
+from scipy.special import gammaincc
+
+from patchfem.closed_forms import virgin_force
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import Quadrature, cutoff
+
+ONE = upper_pressure([1.0, 0.25])
+GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
+
+
+def random_path(seed, count, size=0.7):
+    return np.concatenate([[0], np.cumsum(np.random.default_rng(seed).normal(0, size, count))])
+
+
+# ---- closed strips
+
+@pytest.mark.parametrize("order", [-0.5, 0.0, 0.5, 1.0, 2.0, 3.7])
+@pytest.mark.parametrize("initial", [0.0, 1.0])
+def test_exact_printed_law_on_random_paths(order, initial):
+    """Incomplete-gamma strips against 2.17 summed by hand; orders below one keep a kink at R = 0 in the hand sum."""
+    law = Bonds(1.0, 1.0, order, "report", initial=initial)
+    path = random_path(4, 40)
+    run = walk(Quadrature(law, tail=0.0), path, ONE)
+    within = {-0.5: 0.05, 0.5: 1e-4}.get(order, 1e-8 if order == 3.7 else 1e-12)
+    assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, ONE), abs=within)
+
+
+@pytest.mark.parametrize("order", [-0.5, 0.5])
+def test_exact_printed_law_of_fractional_order_where_the_strips_are_old(order):
+    """After a slide far from every turn the kink has died out in the hand sum except in the newest strip, cut fine."""
+    law = Bonds(1.0, 1.0, order, "report", initial=0.0)
+    path = np.concatenate([random_path(4, 20), [1.0 + 1e-9]])
+    run = walk(Quadrature(law, tail=0.0), path, ONE)
+    coarse, fine = (sum_by_hand(law, path, ONE, pieces=n)[0] for n in (400, 1600))
+    rate = 4.0**(order + 1)  # the hand sum's own error falls as h^(p+1)
+    assert run.traction[-1, 0] == pytest.approx((rate * fine - coarse) / (rate - 1), abs=2e-4 if order < 0 else 1e-7)
+
+
+@pytest.mark.parametrize("pressure", [ONE, lower_pressure(np.linspace(-2, 2, 5), 5.0, 1.5)])
+@pytest.mark.parametrize("reading, order", [("report", 0.0), ("report", 2.0), ("stretch", 1.0)])
+def test_exact_pressure_on_either_piece(reading, order, pressure):
+    law = Bonds(1.0, 1.0, order, reading, initial=0.5)
+    path = random_path(5, 40)
+    run = walk(Quadrature(law, tail=0.0), path, pressure)
+    assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, pressure), abs=1e-12)
+
+
+@pytest.mark.parametrize("reading", ["report", "stretch"])
+def test_exact_bare_places_hold_only_the_bonds_formed_since(reading):
+    """Pressure 1, then 0 at two points for one step: there the rest of the path starts anew, without a cohort."""
+    law = Bonds(1.0, 1.0, 1.0, reading)
+    path = np.concatenate([np.linspace(0, 2, 9), np.linspace(2, 1.2, 5)[1:]])
+    table = np.ones((path.size, 3))
+    table[8, 1:] = 0.0
+
+    engine = Quadrature(law, tail=0.0)
+    state = engine.start(table[0])
+    for k, dq in enumerate(np.diff(path)):
+        state = engine.step(state, dq, table[k], table[k + 1], 1.0).state
+    after = sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[9:], upper_pressure([1.0]))[0]
+    first = sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:10], upper_pressure([1.0]))[0]
+    # the strip that starts on the bare place forms at the mean of its ends: half density
+    strip = sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:], upper_pressure([1.0]))[0] - after
+    tau = engine.traction(state)
+    assert tau[0] == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]))[0], abs=1e-13)
+    assert tau[1:] == pytest.approx(np.full(2, after + strip / 2), abs=1e-13) and first < 0
+
+
+# ---- both readings
+
+@pytest.mark.parametrize("order", [0.0, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_exact_readings_agree_without_a_reversal(order, sign):
+    path = sign * np.concatenate([[0], np.cumsum(np.random.default_rng(1).uniform(0.01, 0.6, 40))])
+    runs = [walk(Quadrature(Bonds(1.0, 1.0, order, reading, initial=0.7), tail=0.0), path, ONE)
+            for reading in ("stretch", "report")]
+    within = {0.0: 1e-12, 0.5: 4e-4, 1.0: 1e-13, 2.0: 1e-9}[order]  # p = 0.5: Gauss strips on a root
+    assert runs[0].traction == pytest.approx(runs[1].traction, abs=within)
+    assert runs[0].mean == pytest.approx(runs[1].mean, abs=within)
+    assert runs[1].traction[:, 0] == pytest.approx(sign * virgin_force(abs(path[1:]), 1.0, order, 0.7), abs=1e-12)
+
+
+def test_exact_readings_differ_after_a_reversal():
+    path = np.array([0.0, 2.0, 1.0])
+    stretch, report = (walk(Quadrature(Bonds(1.0, 1.0, 1.0, r)), path, ONE).traction[-1, 0]
+                       for r in ("stretch", "report"))
+    assert report - stretch > 0.05  # u/|u| turns at once, the stretch first has to be undone
+
+
+# ---- Gauss strips
+
+def test_order_of_gauss_strips_on_a_root_is_one_and_a_half():
+    """p = 0.5: the integrand starts as R^0.5, so the newest strip sets the error, h^1.5."""
+    def end(step):
+        law = Bonds(1.0, 1.0, 0.5, "stretch", initial=0.0)
+        path = np.linspace(0, 0.8, round(0.8 / step) + 1)
+        return walk(Quadrature(law, tail=0.0), path, ONE).traction[-1, 0]
+
+    exact = virgin_force(0.8, 1.0, 0.5, 0.0)
+    miss = [abs(end(h) - exact) for h in (0.2, 0.1, 0.05, 0.025)]
+    for a, b in pairwise(miss):
+        assert np.log2(a / b) == pytest.approx(1.5, abs=0.1)
+    assert miss[-1] < 3e-5
+
+
+@pytest.mark.parametrize("order", [2.0, 3.0])
+def test_exact_gauss_strips_of_smooth_orders(order):
+    path = np.concatenate([np.linspace(0, 3, 13), np.linspace(3, 1, 9)[1:]])
+    law = Bonds(1.0, 1.0, order, "stretch", initial=0.3)
+    run = walk(Quadrature(law, tail=0.0), path, ONE)
+    assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, ONE), abs=1e-11)
+
+
+def test_order_of_the_printed_law_with_growing_bonds():
+    """Every bond grows its own length from zero: the linear shares inside a strip leave an error of order two."""
+    law = Bonds(1.0, 1.0, 1.0, "report", initial=0.0, **GROWTH)
+
+    def miss(parts):
+        path = triangle(1.0, 1, 8 * parts)[: 20 * parts + 1]
+        run = walk(Quadrature(law, tail=0.0), path, ONE, dt=0.4 / parts)
+        return abs(run.traction[-1, 0] - sum_by_hand(law, path, ONE, 0.4 / parts)[0])
+
+    errors = [miss(n) for n in (1, 2, 4)]
+    assert errors[0] < 2e-3
+    assert np.log2(errors[0] / errors[1]) > 1.5 and np.log2(errors[1] / errors[2]) > 1.5
+
+
+@pytest.mark.parametrize("order", [0.0, 1.0])
+def test_exact_printed_law_pushes_back_while_it_heals(order):
+    """l_k = 1e-3, eps_k = 0.5: 0.5 while sliding; at rest 0.81606 and 0.93233 after one and two e-folds of healing."""
+    law = Bonds(1.0, 1.0, order, "report", ratio=0.5, rest_growth=10.0, slip_growth=1e-3, rest_speed=1.0)
+    path = np.concatenate([np.linspace(0, 30, 1501), [30, 30]])
+    times = np.append(np.full(1500, 1e-9), [0.1, 0.1])
+    force = walk(Quadrature(law), path, upper_pressure([1.0]), times).traction[-3:, 0]
+    assert force == pytest.approx([0.5, 0.81606, 0.93233], abs=5e-4)
+
+
+# ---- cut-off
+
+@pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 2.0, {}), ("stretch", 1.0, {}),
+                                                    ("stretch", 1.0, GROWTH), ("stretch", 2.0, {}),
+                                                    ("report", 1.0, GROWTH)])
+@pytest.mark.parametrize("tail", [1e-2, 1e-5])
+def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth, tail):
+    law = Bonds(0.4, 1.0, order, reading, **growth)
+    path = np.concatenate([random_path(6, 150, 0.4), random_path(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100)])
+    cut = walk(Quadrature(law, tail), path, ONE, 0.3)
+    whole = walk(Quadrature(law, 0.0), path, ONE, 0.3)
+    assert cut.state.dropped > 0 and len(cut.state.q) < len(whole.state.q)
+    gap = np.abs(cut.traction - whole.traction).max()
+    assert gap <= tail * 0.4 * 1.0
+    if reading == "report" and not growth:
+        assert gap > 0
+
+
+@pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
+def test_exact_cut_off_is_the_tail_of_the_gamma_function(order):
+    for tail in (1e-3, 1e-6, 1e-9):
+        assert gammaincc(order + 1, cutoff(order, tail)) == pytest.approx(tail, rel=1e-9)
+
+
+# ---- far ends
+
+@pytest.mark.parametrize("reading, order", [("report", -0.5), ("report", 0.0), ("report", 2.0), ("stretch", 0.0),
+                                            ("stretch", 2.0)])
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+def test_exact_rest_and_long_steps(reading, order, growth):
+    law = Bonds(1.0, 1.0, order, reading, **growth)
+    path = np.array([0.0, 0.0, 0.3, 0.3, 1e3, 1e3])
+    run = walk(Quadrature(law), path, ONE, 1.0)
+    assert np.isfinite(np.concatenate([run.mean, run.traction])).all()
+    assert not run.traction[0].any()
+    if reading == "stretch" or not growth:  # as printed, loaded bonds heal at rest and the force moves by itself
+        assert run.traction[3] == pytest.approx(run.traction[4], rel=1e-12)
+        assert run.mean[4] == pytest.approx(run.traction[4], rel=1e-12)
+    if not growth:
+        assert run.traction[4] == pytest.approx([1.0, 0.25], rel=1e-3)
+        assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-14)

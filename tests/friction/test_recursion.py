@@ -1,0 +1,188 @@
+"""The bond state against the sum over all bonds: same path, same pressure on either piece, same energies."""
+
+import numpy as np
+import pytest
+from friction_paths import lower_pressure, sum_by_hand, upper_pressure, walk
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import Recursion, advance, shape_functions
+
+GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
+X = np.linspace(-3, 3, 7)
+
+
+def pressures(name):
+    if name == "upper":
+        return upper_pressure(1 + 0.5 * np.cos(X))
+    return lower_pressure(X, 7.0, 1.5 if name == "lower" else 0.2)
+
+
+@st.composite
+def growths(draw):
+    if draw(st.booleans()):
+        return {}
+    return {"ratio": draw(st.floats(0.05, 1)), "rest_growth": draw(st.floats(1e-3, 10)),
+            "slip_growth": draw(st.floats(0.01, 10)), "rest_speed": draw(st.floats(1e-4, 1))}
+
+
+# ---- recursion = sum
+
+@pytest.mark.parametrize("piece", ["upper", "lower", "lower with bare places"])
+@pytest.mark.parametrize("growth", GROWTH)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_exact_recursion_is_the_sum_over_bonds(piece, growth, seed):
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(0, 1, 120) * 10.0**rng.uniform(-3, 0.7, 120)
+    steps[rng.integers(0, 120, 10)] = 0.0
+    path, times = np.concatenate([[0], np.cumsum(steps)]), rng.uniform(0.01, 1, 120)
+    law = Bonds(0.4, 1.0, initial=0.8, **growth)
+    fast = walk(Recursion(law), path, pressures(piece), times)
+    slow = walk(Quadrature(law, tail=0.0), path, pressures(piece), times)
+    if piece == "lower with bare places":
+        lost = np.diff((np.array([pressures(piece)(q) for q in path]) <= 0).astype(int), axis=0)
+        assert (lost > 0).sum() > 20  # the pattern must break bonds for the test to mean anything
+    assert np.abs(fast.traction - slow.traction).max() <= 1e-10
+    assert np.abs(fast.mean - slow.mean).max() <= 1e-10
+    assert np.abs(fast.stored - slow.stored).max() <= 1e-10
+    assert np.abs(fast.dissipated - slow.dissipated).max() <= 1e-10
+
+
+@pytest.mark.parametrize("piece", ["upper", "lower"])
+@pytest.mark.parametrize("growth", GROWTH)
+def test_exact_recursion_is_the_sum_written_out_by_hand(piece, growth):
+    rng = np.random.default_rng(7)
+    path = np.concatenate([[0], np.cumsum(rng.normal(0, 0.7, 50))])
+    law = Bonds(1.0, 1.0, initial=0.8, **growth)
+    run = walk(Recursion(law), path, pressures(piece), 0.5)
+    for k in (1, 9, 27, 50):
+        assert run.traction[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], pressures(piece), 0.5), abs=1e-10)
+
+
+def test_exact_step_mean_is_the_average_along_the_step():
+    """Means of whole steps against Gauss points on partial steps whose bonds are summed by hand."""
+    law = Bonds(1.0, 1.0)
+    path = np.array([0.0, 0.8, -0.5, 0.1, 2.0])
+    run = walk(Recursion(law), path, pressures("upper"), 0.5)
+    y, w = np.polynomial.legendre.leggauss(10)
+    for k in range(1, 5):
+        dq = path[k] - path[k - 1]
+        parts = [sum_by_hand(law, np.append(path[:k], path[k - 1] + dq * (1 + a) / 2), pressures("upper"), 0.5)
+                 for a in y]
+        assert run.mean[k - 1] == pytest.approx(w / 2 @ np.array(parts), abs=1e-10)
+
+
+def test_exact_slope_is_the_derivative_of_the_mean():
+    bonds, sigma = np.array([[0.7, 0.2], [0.4, -0.1], [0.5, 0.3]]), np.array([1.0, 0.6])
+    for dq in (-3.0, -0.4, -0.02, 0.01, 0.2, 1.5):
+        h = 1e-5 * abs(dq)
+        slope = (advance(bonds, dq + h, sigma, 0.8)[1] - advance(bonds, dq - h, sigma, 0.8)[1]) / (2 * h)
+        assert advance(bonds, dq, sigma, 0.8)[2] == pytest.approx(slope, rel=1e-6, abs=1e-8)
+
+
+def test_exact_shape_functions_across_their_switch():
+    x = np.array([0.0, 1e-12, 1e-6, 0.01, 0.029999, 0.030001, 0.5, 30.0])
+    f1, f2, e = shape_functions(x)
+    y, w = np.polynomial.legendre.leggauss(40)
+    part = (1 + y) / 2
+    assert f1 == pytest.approx(np.array([w / 2 @ np.exp(-xi * part) for xi in x]), rel=1e-14)
+    assert f2 == pytest.approx(np.array([w / 2 @ ((1 - part) * np.exp(-xi * part)) for xi in x]), rel=1e-13)
+    assert e == pytest.approx(np.exp(-x))
+
+
+def test_exact_step_may_be_split_at_constant_length():
+    law = Recursion(Bonds(0.3, 1.0, initial=0.5))
+    state = law.start(np.ones(1))
+    state = law.step(state, 0.7, np.ones(1), np.ones(1), 1.0).state
+    whole = law.step(state, -2.3, np.ones(1), np.ones(1), 1.0)
+    mean, spent = 0.0, 0.0
+    for _ in range(23):
+        part = law.step(state, -0.1, np.ones(1), np.ones(1), 1.0)
+        mean, spent, state = mean + part.mean[0] / 23, spent + part.dissipated[0], part.state
+    assert state.bonds == pytest.approx(whole.state.bonds, abs=1e-14)
+    assert (mean, spent) == pytest.approx((whole.mean[0], whole.dissipated[0]), abs=1e-13)
+
+
+# ---- passivity
+
+@settings(max_examples=80, deadline=None)
+@given(st.lists(st.tuples(st.floats(-6, 6), st.floats(0, 3), st.floats(0, 3), st.floats(1e-3, 2)), min_size=1,
+                max_size=40), growths(), st.floats(0, 1), st.floats(0.01, 100))
+def test_always_stretch_gives_no_energy_away(rows, growth, initial, length):
+    """Pressures that jump between and along the steps, bonds lost where they vanish: work = stored + dissipated."""
+    law = Recursion(Bonds(0.3, length, initial=initial, **growth))
+    state = law.start(np.array([rows[0][1]]))
+    work, total, spent = 0.0, 0.0, []
+    for dq, s0, s1, dt in rows:
+        step = law.step(state, dq * length, np.array([s0]), np.array([s1]), dt)
+        state = step.state
+        work += step.mean[0] * dq * length
+        total += abs(step.mean[0] * dq * length)
+        spent.append(step.dissipated[0])
+        assert law.stored(state)[0] >= -1e-12 * total
+    size = max(total, 1e-3 * length)
+    assert min(spent) >= -1e-12 * size
+    assert abs(work - sum(spent) - law.stored(state)[0]) <= 1e-12 * size
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growths())
+def test_always_the_sum_over_bonds_gives_no_energy_away(steps, growth):
+    law = Quadrature(Bonds(1.0, 1.0, **growth), tail=0.0)
+    path = np.concatenate([[0], np.cumsum(steps)])
+    run = walk(law, path, pressures("lower with bare places"), 0.3)
+    total = max(np.abs(run.mean * np.diff(path)[:, None]).sum(), 1e-3)
+    assert run.dissipated.min() >= -1e-12 * total and run.stored.min() >= 0
+
+
+@pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("growth", GROWTH)
+def test_always_other_orders_of_the_stretch_give_no_energy_on_a_closed_path(order, growth):
+    """Work over the whole path from rest is storage + loss >= 0 for every p >= 0 (fine steps, Gauss strips)."""
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        turns = rng.uniform(-1, 1, 8) * 10.0**rng.uniform(-1.5, 0.3)
+        path = np.concatenate([np.linspace(a, b, 8)[:-1] for a, b in zip(np.append(0, turns), np.append(turns, 0))])
+        run = walk(Quadrature(Bonds(1.0, 1.0, order, initial=0.0, **growth), tail=0.0), path, upper_pressure([1.0]),
+                   0.05)
+        work = np.cumsum(run.mean[:, 0] * np.diff(path))
+        assert work.min() >= 0
+
+
+# ---- far ends
+
+@pytest.mark.parametrize("growth", GROWTH)
+def test_exact_huge_steps_end_in_steady_sliding(growth):
+    law = Bonds(0.3, 1.0, **growth)
+    for maker in (Recursion, Quadrature):
+        run = walk(maker(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), pressures("upper"), 1.0)
+        assert np.isfinite(np.concatenate([run.mean, run.traction, run.dissipated, run.stored])).all()
+        sigma = pressures("upper")(0)
+        share = 0.5 if growth else 1.0
+        assert run.traction[0] == pytest.approx(0.3 * share * sigma, rel=1e-4)
+        assert run.traction[1] == pytest.approx(-0.3 * share * sigma, rel=1e-4)
+        assert run.mean[1] == pytest.approx(-0.3 * share * sigma, rel=1e-4)
+        assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-12)  # a step of no length
+
+
+def test_exact_steps_of_no_length_and_no_time_change_nothing():
+    law = Bonds(0.3, 1.0, **GROWTH[1])
+    for maker in (Recursion, Quadrature):
+        path, times = np.array([0, 0.4, 0.4, 0.4, 0.9]), np.array([0.5, 0.0, 0.0, 0.5])
+        run = walk(maker(law), path, pressures("upper"), times)
+        short = walk(maker(law), path[[0, 1, 4]], pressures("upper"), times[[0, 3]])
+        assert run.traction[-1] == pytest.approx(short.traction[-1], abs=1e-14)
+        assert run.mean[1] == pytest.approx(run.traction[0], abs=1e-14) and not run.dissipated[1].any()
+
+
+def test_exact_pressure_changes_leave_old_bonds_as_they_were():
+    """Loading and unloading at rest move no force; only a bare place loses it."""
+    law = Recursion(Bonds(0.3, 1.0))
+    state = law.step(law.start(np.ones(1)), 0.5, np.ones(1), np.ones(1), 1.0).state
+    for s0, s1 in ((1.0, 3.0), (3.0, 0.2)):
+        step = law.step(state, 0.0, np.array([s0]), np.array([s1]), 1.0)
+        assert law.traction(step.state) == pytest.approx(law.traction(state)) and step.dissipated[0] == 0
+    lost = law.step(state, 0.0, np.array([0.2]), np.zeros(1), 1.0)
+    assert law.traction(lost.state)[0] == 0 and lost.dissipated[0] == pytest.approx(law.stored(state)[0])

@@ -1,0 +1,235 @@
+"""The tagged mesh of a pair: geometry, a round trip through a file, and every unusable file refused by name."""
+
+from __future__ import annotations
+
+import time
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from patchfem.core import Missing, PatchfemError
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_grid, write_mesh
+from patchfem.mesh.tensor import TensorGrid, graded_grid
+
+GRIDS = {
+    "coated": graded_grid(12.7e-3, 6.35e-3, 0.4e-3, 152.4e-6),
+    "plain": graded_grid(5e-3, 2e-3, 0.5e-3),
+    "uneven columns": TensorGrid(np.array([-2e-3, -0.5e-3, 0.1e-3, 2e-3]), np.array([0, 1e-4, 3e-4, 1e-3]), 1),
+}
+SMALL = graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
+
+each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
+
+
+def store(path, pair, names=None, extra=()):
+    """Write points, quads and tags as they stand, so that a broken pair can be made."""
+    points = np.column_stack([pair["points"], np.zeros(len(pair["points"]))])
+    blocks = [("quad", pair["quads"]), *extra]
+    mesh = meshio.Mesh(points, blocks)
+    tags = [np.asarray(pair["tags"], np.int32), *(np.ones(len(cells), np.int32) for _, cells in extra)]
+    mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    mesh.field_data = {k: np.array([v, 2]) for k, v in (CELL_TAGS if names is None else names).items()}
+    meshio.write(path, mesh, file_format="gmsh22", binary=True)
+    return path
+
+
+def area(points, cells):
+    """Signed area of every polygon (shoelace)."""
+    x, y = points[cells, 0], points[cells, 1]
+    return ((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)) / 2).sum(axis=1)
+
+
+@each_grid
+def test_exact_pair_mesh_fills_both_pieces_and_their_coatings(grid):
+    pair = pair_mesh(grid)
+    areas = area(pair["points"], pair["quads"])
+    assert areas.min() > 0
+    names = {v: k for k, v in CELL_TAGS.items()}
+    for tag, name in names.items():
+        depth = grid.coating if name.endswith("coating") else grid.height - grid.coating
+        mine = pair["tags"] == tag
+        assert areas[mine].sum() == pytest.approx(grid.length * depth, rel=1e-12)
+        if mine.any():
+            side = pair["points"][pair["quads"][mine], 1] * (1 if name.startswith("upper") else -1)
+            assert side.min() >= 0
+
+
+@each_grid
+def test_exact_interface_nodes_of_the_two_pieces_match_and_are_their_own(grid):
+    pair = pair_mesh(grid)
+    ends = {}
+    for name, tag in EDGE_TAGS.items():
+        edges = pair["edges"][pair["edge_tags"] == tag]
+        points = pair["points"][edges]
+        assert np.abs(points[:, 1, 0] - points[:, 0, 0]).sum() == pytest.approx(grid.length, rel=1e-12)
+        ends[name] = np.unique(edges)
+        level = {"interface": 0.0, "far": grid.height}[name.split("_")[1]] * (1 if "upper" in name else -1)
+        assert np.all(pair["points"][ends[name], 1] == level)
+    lower, upper = ends["lower_interface"], ends["upper_interface"]
+    assert np.intersect1d(lower, upper).size == 0
+    assert np.array_equal(pair["points"][lower], pair["points"][upper])
+    owner = {n: set(np.unique(pair["quads"][np.isin(pair["tags"], [CELL_TAGS[f"{n}_substrate"],
+                                                                   CELL_TAGS[f"{n}_coating"]])]))
+             for n in ("upper", "lower")}
+    assert not owner["upper"] & owner["lower"]
+
+
+@each_grid
+def test_exact_round_trip_through_msh(grid, tmp_path):
+    write_mesh(grid, tmp_path / "pair.msh")
+    back = read_grid(tmp_path / "pair.msh")
+    assert back.coating_rows == grid.coating_rows
+    assert np.abs(back.x - grid.x).max() <= 1e-12 * grid.length
+    assert np.abs(back.depth - grid.depth).max() <= 1e-12 * grid.height
+
+
+@each_grid
+def test_exact_vtu_holds_the_same_cells_and_tags(grid, tmp_path):
+    write_mesh(grid, tmp_path / "pair.vtu")
+    mesh = meshio.read(tmp_path / "pair.vtu")
+    pair = pair_mesh(grid)
+    assert np.abs(mesh.points[:, :2] - pair["points"]).max() <= 1e-15
+    assert np.array_equal(mesh.cells_dict["quad"], pair["quads"])
+    assert np.array_equal(mesh.cell_data_dict["tag"]["quad"], pair["tags"])
+    assert np.array_equal(mesh.cell_data_dict["tag"]["line"], pair["edge_tags"])
+
+
+@settings(max_examples=40)
+@given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0))
+def test_always_numbering_and_place_along_x_do_not_matter(order, shift, tmp_path_factory):
+    pair = pair_mesh(SMALL)
+    nodes, cells = list(range(len(pair["points"]))), list(range(len(pair["quads"])))
+    order.shuffle(nodes)
+    order.shuffle(cells)
+    points = np.empty_like(pair["points"])
+    points[nodes] = pair["points"] + [shift, 0.0]
+    mixed = {"points": points, "quads": np.array(nodes)[pair["quads"]][cells], "tags": pair["tags"][cells]}
+    back = read_grid(store(tmp_path_factory.mktemp("mixed") / "pair.msh", mixed))
+    assert back.coating_rows == SMALL.coating_rows
+    assert np.abs(back.x - SMALL.x).max() <= 1e-15
+    assert np.abs(back.depth - SMALL.depth).max() <= 1e-15
+
+
+def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
+    with pytest.raises(PatchfemError, match="no such mesh file"):
+        read_grid(tmp_path / "nowhere.msh")
+    (tmp_path / "pair.stl").write_text("solid")
+    with pytest.raises(PatchfemError, match=r"only \.msh"):
+        read_grid(tmp_path / "pair.stl")
+    with pytest.raises(PatchfemError, match=r"\.msh or \.vtu"):
+        write_mesh(SMALL, tmp_path / "pair.stl")
+    with pytest.raises(Missing, match="cannot be written"):
+        write_mesh(SMALL, tmp_path / "nowhere" / "pair.msh")
+
+
+@pytest.mark.parametrize("content", [b"", b"hello\nworld\n", b"\x00\xff" * 500, b"$MeshFormat\n2.2 1 8\n",
+                                     b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n"])
+def test_refuses_garbage_in_bounded_time(content, tmp_path):
+    path = tmp_path / "pair.msh"
+    path.write_bytes(content)
+    begin = time.perf_counter()
+    with pytest.raises(PatchfemError, match=r"pair\.msh"):
+        read_grid(path)
+    assert time.perf_counter() - begin < 2
+
+
+def test_refuses_every_truncation_in_bounded_time(tmp_path):
+    path = tmp_path / "pair.msh"
+    write_mesh(SMALL, path)
+    whole = path.read_bytes()
+    cells_end = whole.rindex(b"$EndElements")
+    for cut in range(0, cells_end - 1, 61):
+        path.write_bytes(whole[:cut])
+        begin = time.perf_counter()
+        with pytest.raises(PatchfemError, match=r"pair\.msh"):
+            read_grid(path)
+        assert time.perf_counter() - begin < 2
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=6))
+def test_always_a_spoilt_file_is_read_or_refused(changes, tmp_path):
+    path = tmp_path / "pair.msh"
+    write_mesh(SMALL, path)
+    raw = bytearray(path.read_bytes())
+    nodes = raw.index(b"$Nodes")
+    for place, byte in changes:
+        raw[nodes + int(place * (len(raw) - nodes))] = byte
+    path.write_bytes(raw)
+    try:
+        grid = read_grid(path)
+    except PatchfemError:
+        return
+    assert np.all(np.diff(grid.x) > 0) and np.all(np.diff(grid.depth) > 0)
+    assert grid.x.size == SMALL.x.size and grid.depth.size == SMALL.depth.size
+
+
+def test_refuses_missing_tags(tmp_path):
+    pair = pair_mesh(SMALL)
+    lower = {k: v for k, v in CELL_TAGS.items() if k.startswith("lower")}
+    with pytest.raises(PatchfemError, match="upper_substrate"):
+        read_grid(store(tmp_path / "pair.msh", pair, lower))
+    with pytest.raises(PatchfemError, match="lower_substrate, upper_substrate"):
+        read_grid(store(tmp_path / "pair.msh", pair, {}))
+
+
+def test_refuses_cells_without_a_tag_at_the_interface(tmp_path):
+    pair = pair_mesh(SMALL)
+    tags = np.where(np.isin(pair["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["lower_coating"]]), 99, pair["tags"])
+    with pytest.raises(PatchfemError, match="no tensor grid with its interface at y = 0"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+
+
+def test_refuses_triangles(tmp_path):
+    pair = pair_mesh(SMALL)
+    with pytest.raises(PatchfemError, match="triangle cells"):
+        read_grid(store(tmp_path / "pair.msh", pair, extra=[("triangle", pair["quads"][:, :3])]))
+
+
+@pytest.mark.parametrize("node", [0, 7, 30])
+@pytest.mark.parametrize("shift", [(2e-5, 0.0), (0.0, 2e-6), (np.nan, 0.0), (0.0, np.inf)])
+def test_refuses_a_shifted_node(node, shift, tmp_path):
+    pair = pair_mesh(SMALL)
+    for start, piece in ((0, "lower"), (len(pair["points"]) // 2, "upper")):
+        points = pair["points"].copy()
+        points[start + node] += shift
+        with pytest.raises(PatchfemError, match=f"{piece} piece is no tensor grid"):
+            read_grid(store(tmp_path / "pair.msh", {**pair, "points": points}))
+
+
+def test_refuses_a_doubled_cell_and_a_coating_that_is_no_layer(tmp_path):
+    pair = pair_mesh(SMALL)
+    quads = pair["quads"].copy()
+    quads[3] = quads[4]
+    with pytest.raises(PatchfemError, match="no tensor grid"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "quads": quads}))
+    tags = pair["tags"].copy()
+    tags[np.flatnonzero(tags == CELL_TAGS["upper_coating"])[2]] = CELL_TAGS["upper_substrate"]
+    with pytest.raises(PatchfemError, match="upper_coating does not fill whole rows"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+
+
+@pytest.mark.parametrize("other", [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2.1e-3, 1e-3, 5.25e-4, 1e-4),
+                                   graded_grid(2e-3, 1e-3, 4e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
+                         ids=["taller", "longer", "finer", "uncoated"])
+def test_refuses_unlike_pieces(other, tmp_path):
+    lower, upper = pair_mesh(SMALL), pair_mesh(other)
+    low = np.isin(lower["tags"], [CELL_TAGS["lower_coating"], CELL_TAGS["lower_substrate"]])
+    high = np.isin(upper["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["upper_substrate"]])
+    pair = {"points": np.concatenate([lower["points"], upper["points"]]),
+            "quads": np.concatenate([lower["quads"][low], upper["quads"][high] + len(lower["points"])]),
+            "tags": np.concatenate([lower["tags"][low], upper["tags"][high]])}
+    with pytest.raises(PatchfemError, match="two pieces differ"):
+        read_grid(store(tmp_path / "pair.msh", pair))
+
+
+def test_refuses_coatings_of_unlike_thickness_on_the_same_grid(tmp_path):
+    pair = pair_mesh(SMALL)
+    deepest = np.abs(pair["points"][pair["quads"], 1]).max(axis=1) > SMALL.depth[SMALL.coating_rows - 1] * (1 + 1e-9)
+    tags = pair["tags"].copy()
+    tags[deepest & (tags == CELL_TAGS["upper_coating"])] = CELL_TAGS["upper_substrate"]
+    with pytest.raises(PatchfemError, match="two pieces differ"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))

@@ -1,0 +1,97 @@
+"""The graded grid of one piece: exact sums, bounded growth, rows in the coating."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.core import PatchfemError
+from patchfem.mesh.tensor import COATING_ROWS, GROWTH, coarser, graded_grid, graded_rows
+
+lengths = st.floats(1e-6, 1.0)
+growths = st.floats(1.02, 1.6)
+
+
+@given(start=lengths, total=lengths, growth=growths, least=st.integers(1, 6))
+def test_exact_graded_rows_add_up_to_the_total(start, total, growth, least):
+    rows = graded_rows(start, total, growth, least)
+    assert rows.sum() == pytest.approx(total, rel=1e-13)
+
+
+@given(start=lengths, total=lengths, growth=growths, least=st.integers(1, 6))
+def test_always_rows_grow_downwards_by_no_more_than_asked(start, total, growth, least):
+    rows = graded_rows(start, total, growth, least)
+    ratio = rows[1:] / rows[:-1]
+    assert rows.size >= least
+    assert rows.min() > 0
+    assert rows[0] <= min(start, total / least) * (1 + 1e-5)
+    assert np.all(ratio <= growth * (1 + 1e-5))
+    assert np.all(ratio >= 1 - 1e-12)
+
+
+@st.composite
+def pieces(draw):
+    length = draw(st.floats(1e-3, 5e-2))
+    height = draw(st.floats(1e-3, 2e-2))
+    share = draw(st.one_of(st.just(0.0), st.floats(1e-3, 0.95)))
+    return length, height, length / draw(st.floats(1.0, 150.0)), share * height
+
+
+@given(pieces())
+def test_always_grid_has_the_asked_size_and_four_rows_in_the_coating(piece):
+    length, height, size, coating = piece
+    grid = graded_grid(*piece)
+    assert grid.length == pytest.approx(length, rel=1e-14)
+    assert grid.x[0] == pytest.approx(-grid.x[-1], rel=1e-14)
+    assert grid.height == height and grid.depth[0] == 0
+    assert grid.coating == coating
+    assert np.diff(grid.x).max() <= min(size, length / 2) * (1 + 1e-9)
+    assert np.ptp(np.diff(grid.x)) <= 1e-12 * length
+    assert grid.coating_rows >= COATING_ROWS if coating else grid.coating_rows == 0
+    rows = np.diff(grid.depth)
+    assert rows.min() > 0
+    assert np.all(rows[1:] <= rows[:-1] * GROWTH * (1 + 1e-5))
+    assert grid.cell_is_coating().shape == (grid.x.size - 1, rows.size)
+    assert np.all(grid.cell_is_coating() @ rows == pytest.approx(coating, rel=1e-12))
+
+
+@given(pieces())
+def test_exact_tributary_lengths_add_up_to_the_length(piece):
+    grid = graded_grid(*piece)
+    share = grid.tributary()
+    assert share.sum() == pytest.approx(piece[0], rel=1e-13)
+    assert share.min() > 0
+    # the nodal areas integrate a straight line exactly
+    assert share @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)
+
+
+@given(pieces())
+def test_always_arrays_are_read_only(piece):
+    grid = graded_grid(*piece)
+    assert not grid.x.flags.writeable and not grid.depth.flags.writeable
+
+
+def test_exact_coarser_halves_the_columns_and_keeps_the_piece():
+    grid = graded_grid(12.7e-3, 6.35e-3, 12.7e-3 / 200, 152.4e-6)
+    half = coarser(grid)
+    assert half.x.size == 101
+    assert (half.length, half.height, half.coating) == (grid.length, grid.height, grid.coating)
+    assert np.abs(half.x - grid.x[::2]).max() <= 1e-16
+
+
+@pytest.mark.parametrize("start, total", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, -1.0), (np.nan, 1.0)])
+def test_refuses_rows_without_a_positive_size(start, total):
+    with pytest.raises(ValueError, match="positive"):
+        graded_rows(start, total)
+
+
+@pytest.mark.parametrize(
+    "size, coating, name",
+    [(11e-3, 0.0, "contact.element_size"), (1e-3, 5e-3, "contact.coating.thickness"),
+     (1e-3, 6e-3, "contact.coating.thickness")],
+)
+def test_refuses_a_cell_or_a_coating_larger_than_the_piece(size, coating, name):
+    with pytest.raises(PatchfemError, match=name):
+        graded_grid(10e-3, 5e-3, size, coating)

@@ -1,0 +1,322 @@
+"""The shipped exact answers against quadrature, many-digit arithmetic and integration that know nothing of them."""
+
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from scipy.special import gamma
+
+from patchfem import closed_forms as exact
+
+GAUSS = np.polynomial.legendre.leggauss(20)
+HERTZ = {"line_load": 1e5, "radius": 1.0, "modulus": 6.74e10}
+
+
+# ---- line contact
+
+def test_exact_hertz_pressure_carries_the_load():
+    half = exact.hertz_half_width(**HERTZ)
+    total, _ = quad(lambda t: half * np.cos(t) * exact.hertz_pressure(half * np.sin(t), **HERTZ), -np.pi / 2, np.pi / 2)
+    assert total == pytest.approx(HERTZ["line_load"], rel=1e-12)
+
+
+@pytest.mark.parametrize("share", [-0.7, -0.2, 0.1, 0.5, 0.9])
+def test_exact_hertz_pressure_flattens_the_crown(share):
+    """Slope of two half planes under p: 2/(pi E*) PV int p(s)/(x - s) ds must equal the slope x/R of the gap."""
+    half = exact.hertz_half_width(**HERTZ)
+    x = share * half
+    principal, _ = quad(lambda s: exact.hertz_pressure(s, **HERTZ), -half, half, weight="cauchy", wvar=x)
+    assert -2 / (np.pi * HERTZ["modulus"]) * principal == pytest.approx(x / HERTZ["radius"], rel=1e-6)
+
+
+def test_exact_hertz_peak_and_outside():
+    half = exact.hertz_half_width(**HERTZ)
+    p = exact.hertz_pressure(np.array([0.0, half, 1.01 * half]), **HERTZ)
+    assert p[0] == pytest.approx(exact.hertz_peak(**HERTZ), rel=1e-15) and p[1] < 1e-6 * p[0] and p[2] == 0
+
+
+def test_exact_combined_modulus_is_two_compliances_in_series():
+    e = exact.combined_modulus(121e9, 0.32, 250e9, 0.24)
+    assert 1 / e == pytest.approx((1 - 0.32**2) / 121e9 + (1 - 0.24**2) / 250e9, rel=1e-15)
+    assert exact.combined_modulus(121e9, 0.32) == pytest.approx(121e9 / (2 * (1 - 0.32**2)), rel=1e-15)
+
+
+# ---- bonds
+
+def test_exact_steady_length_is_where_growth_stops():
+    args = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
+    for v in (5e-4, 5e-3, -5e-2):
+        rate = solve_ivp(lambda _, e, v=v: 10.0 / abs(v) * (2e-6 - e) + abs(v) / 0.2e-6 * (1.4e-6 - e),
+                         (0, 300 / (10.0 / abs(v) + abs(v) / 0.2e-6)), [0.0], rtol=1e-12, atol=1e-20, method="Radau")
+        assert exact.steady_bond_length(v, **args) == pytest.approx(rate.y[0, -1], rel=1e-9)
+
+
+def test_exact_steady_friction_of_2_18_and_2_11():
+    """mu = 0.6 (eps/eps_0) at 0.5, 5 and 50 mm/s: 0.58, 0.43333, 0.420144."""
+    args = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
+    for v, mu in ((5e-4, 0.58), (5e-3, 13 / 30), (5e-2, 0.420144)):
+        share = exact.steady_bond_length(v, **args) / 2e-6
+        assert exact.steady_shear(1, 1.0, 0.6, share) == pytest.approx(mu, abs=1e-6)
+        bonds, _ = quad(lambda x, c=share: x / c * np.exp(-x / c), 0, 80 * share)  # int phi_1(R/eps) dR/eps_0
+        assert exact.steady_shear(-1, 2.0, 0.6, share) == pytest.approx(-1.2 * bonds, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [-0.5, 0.0, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("initial", [0.0, 1.0, 0.4])
+def test_exact_virgin_force_is_the_sum_over_its_bonds(order, initial):
+    def phi(x):
+        return mpmath.mpf(x)**order * mpmath.exp(-x) / mpmath.gamma(order + 1)
+
+    for x in (0.5, 1.0, 2.0, 4.0):
+        want = float(mpmath.quad(phi, [0, x / 8, x]) + initial * phi(x))
+        assert exact.virgin_force(3 * x, 3.0, order, initial, 7.0) == pytest.approx(7 * want, rel=1e-9)
+
+
+def _weight(order, stretch, x):
+    return stretch**order * np.exp(-x) / gamma(order + 1)
+
+
+@pytest.mark.parametrize("reading", ["stretch", "report"])
+@pytest.mark.parametrize("order", [0.0, 0.5, 1.0, 2.0, 3.0])
+def test_exact_reversal_is_the_sum_over_its_bonds(reading, order):
+    """A bond formed y before the turn has travelled y + d and is stretched by y - d."""
+    def old(y, d):
+        size = abs(y - d) if reading == "stretch" else y + d
+        return np.sign(y - d) * _weight(order, size, y + d)
+
+    for d in (0.05, np.log(2), 1.0, 3.0):
+        total = quad(old, 0, d, args=(d,), epsabs=1e-12)[0] + quad(old, d, d + 60, args=(d,), epsabs=1e-12)[0]
+        total -= quad(lambda y: _weight(order, y, y), 0, d, epsabs=1e-12)[0]
+        assert exact.reversal_force(2 * d, 2.0, order, reading, 5.0) == pytest.approx(5 * total, abs=1e-8)
+
+
+def test_exact_reversal_far_away_is_full_friction_the_other_way():
+    for reading in ("stretch", "report"):
+        for order in (0.0, 0.5, 1.0, 2.5):
+            assert exact.reversal_force(1e4, 1.0, order, reading) == pytest.approx(-1.0, abs=1e-14)
+            assert exact.reversal_force(0.0, 1.0, order, reading) == pytest.approx(1.0, abs=1e-14)
+
+
+def _triangle_force(slide, amplitude, decay, count):
+    """Steady-cycle force at `slide` on the way up: strips of earlier strokes, newest first, shares 1 - decay."""
+    total, path = 0.0, 0.0
+    ends = [(-amplitude, slide, 1)] + [(-amplitude, amplitude, (-1)**(k + 1)) for k in range(count)]
+    for low, high, way in ends:
+        knots = sorted({low, high, min(max(slide, low), high)})
+        for a, b in pairwise(knots):
+            y, w = GAUSS
+            at = (a + b) / 2 + (b - a) / 2 * y
+            travel = path + (high - at if way > 0 else at - low)
+            total += (b - a) / 2 * w @ decay(slide - at, travel)
+        path += high - low
+    return total
+
+
+@pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0])
+@pytest.mark.parametrize("loop, decay", [
+    (exact.stretch_loop, lambda u, travel: u * np.exp(-travel)),
+    (exact.report_loop, lambda u, travel: np.sign(u) * np.exp(-travel)),
+])
+def test_exact_loops_are_sums_over_every_earlier_stroke(ratio, loop, decay):
+    strokes = int(np.ceil(36 / (2 * ratio)))
+    y, w = np.polynomial.legendre.leggauss(24)
+    up = sum(ratio * wi * _triangle_force(ratio * yi, ratio, decay, strokes) for yi, wi in zip(y, w))
+    area, end = loop(2 * ratio, 2.0, 3.0)
+    assert area == pytest.approx(2 * up * 2.0 * 3.0, rel=1e-7)
+    assert end == pytest.approx(3 * _triangle_force(ratio, ratio, decay, strokes), rel=1e-7)
+
+
+def test_exact_loop_numbers():
+    """Areas over mu N eps for A/eps = 0.1, 1, 5, 10 as computed before this module existed."""
+    ratios = np.array([0.1, 1, 5, 10])
+    assert np.allclose(exact.stretch_loop(ratios, 1.0)[0], [1.328022e-3, 0.953623, 16.000363, 36.0], rtol=4e-7)
+    assert np.allclose(exact.report_loop(ratios, 1.0)[0], [2.659583e-2, 2.149259, 18.0, 38.0], rtol=4e-7)
+
+
+@given(st.floats(0.05, 20))
+def test_always_loops_shrink_from_coulomb_to_report_to_stretch_to_jenkins(ratio):
+    areas = [exact.coulomb_loop_area(ratio), exact.report_loop(ratio, 1.0)[0], exact.stretch_loop(ratio, 1.0)[0],
+             exact.jenkins_loop(ratio, 1.0)[0]]
+    assert all(a >= b - 1e-12 for a, b in pairwise(areas))
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 0.2, 0.5, 1.0])
+def test_exact_jenkins_loop_by_walking_it(amplitude):
+    path = amplitude * np.concatenate([np.linspace(0, 1, 1001), np.linspace(1, -1, 2001)[1:],
+                                       np.linspace(-1, 1, 2001)[1:]])
+    stretch, force = 0.0, [0.0]
+    for dq in np.diff(path):
+        stretch = float(np.clip(stretch + dq, -0.2, 0.2))
+        force.append(stretch / 0.2)
+    last = slice(1000, None)
+    area, end = exact.jenkins_loop(amplitude, 0.2)
+    assert np.trapezoid(force[last], path[last]) == pytest.approx(area, abs=1e-12)
+    assert force[-1] == pytest.approx(end, rel=1e-9)
+
+
+# ---- Coulomb vibration
+
+def _coulomb_ivp(start, friction, omega, times):
+    """Release and decay by half cycles of an integrator with events; stops where |x| <= friction at a turn."""
+    out, t0, x0 = np.full(times.size, np.nan), 0.0, start
+    while abs(x0) > friction:
+        sign = np.sign(x0)
+
+        def rhs(_, y, sign=sign):
+            return [y[1], -omega**2 * (y[0] - sign * friction)]
+
+        def turn(_, y, sign=sign):
+            return y[1] * sign
+        turn.direction, turn.terminal = 1, True
+        run = solve_ivp(rhs, (t0, t0 + 2 * np.pi / omega), [x0, -1e-300 * sign], events=turn, dense_output=True,
+                        method="DOP853", rtol=1e-11, atol=1e-13)
+        here = (times >= t0) & (times <= run.t[-1])
+        out[here] = run.sol(times[here])[0]
+        t0, x0 = run.t[-1], run.y[0, -1]
+    out[times >= t0] = x0
+    return out, t0, x0
+
+
+@pytest.mark.parametrize("start, friction, omega", [(1.0, 0.13, 1.0), (11.5, 1.0, 1.0), (-1.0, 0.07, 2.0),
+                                                    (0.9, 1.0, 3.0)])
+def test_exact_decay_by_an_integrator_with_events(start, friction, omega):
+    times = np.linspace(0, 25 / omega, 400)
+    want, stop, place = _coulomb_ivp(start, friction, omega, times)
+    assert np.abs(exact.decay(times, start, friction, omega) - want).max() <= 1e-8 * abs(start)
+    assert exact.decay_rest(start, friction, omega) == pytest.approx((stop, place), abs=1e-7)
+
+
+@pytest.mark.parametrize("start, friction, omega, time, place", [
+    (11.5, 1, 1, 6 * np.pi, -0.5), (11, 1, 1, 5 * np.pi, -1), (11 + 1e-9, 1, 1, 6 * np.pi, -0.999999999),
+    (1, 0.125, 1, 4 * np.pi, 0), (1, 0.13, 1, 4 * np.pi, -0.04), (1, 1 / 15, 2, 3.5 * np.pi, -1 / 15), (1, 1, 1, 0, 1)])
+def test_exact_rest_of_3_11_with_the_count_rounded_up(start, friction, omega, time, place):
+    assert exact.decay_rest(start, friction, omega) == pytest.approx((time, place), abs=1e-12)
+    assert exact.decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx([place, place], abs=1e-12)
+
+
+def test_exact_decay_as_printed_would_rest_off_the_elastic_line():
+    """With N_0 = 5.25 unrounded, x_0 = 11.5 F/k would rest at 1.0 F/k in size; the oscillator rests at -0.5."""
+    raw = (11.5 - 1) / 2
+    assert abs(11.5 - 2 * raw) == 1.0 and exact.decay_rest(11.5, 1.0, 1.0)[1] == -0.5
+
+
+@given(st.floats(-20, 20), st.floats(0.01, 2), st.floats(0.1, 10))
+def test_always_a_decay_rests_inside_the_friction_band_and_is_continuous(start, friction, omega):
+    stop, place = exact.decay_rest(start, friction, omega)
+    assert abs(place) <= friction * (1 + 1e-9) or (stop == 0 and place == start)
+    near = exact.decay(np.array([max(stop - 1e-7 / omega, 0), stop]), start, friction, omega)
+    assert abs(near[1] - near[0]) <= 1e-9 * (abs(start) + friction)
+
+
+@pytest.mark.parametrize("r, friction, damping, want", [
+    (1, 0.5, 0.003, 60.5632260810004979), (1, 2 / 3, 0.003, 25.1953787788816), (1, 4 / 7, 0.003, 45.4055793050063)])
+def test_exact_sliding_amplitude_at_resonance(r, friction, damping, want):
+    assert exact.sliding_amplitude(r, friction, damping) == pytest.approx(want, rel=1e-11)
+    harmonic = (1 - 4 * friction / np.pi) / (2 * damping)
+    assert exact.sliding_amplitude(r, friction, damping) == pytest.approx(harmonic, rel=1e-4)
+
+
+@pytest.mark.parametrize("hertz, input_g, bare, damped", [
+    (135, 6, 5.22698, 4.83011), (150, 7, 6.66151, 6.21040), (155, 8, 4.29575, 4.15965)])
+def test_exact_sliding_amplitude_is_den_hartog(hertz, input_g, bare, damped):
+    r, friction = hertz / 143, 4 / input_g
+    u = np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
+    got = exact.sliding_amplitude(r, friction)
+    assert got == pytest.approx(np.sqrt(1 / (1 - r * r)**2 - (u * friction)**2), rel=1e-12)
+    assert got == pytest.approx(bare, abs=6e-6)
+    assert exact.sliding_amplitude(r, friction, 0.003) == pytest.approx(damped, abs=6e-6)
+
+
+@pytest.mark.parametrize("r, friction, damping", [(135 / 143, 4 / 6, 0.003), (1.0, 0.5, 0.003), (155 / 143, 0.5, 0.05)])
+def test_exact_sliding_amplitude_by_shooting_half_a_cycle(r, friction, damping):
+    """From the turn at +A some drive phase must bring the block to rest at -A half a drive period later."""
+    top = exact.sliding_amplitude(r, friction, damping)
+
+    def end(phase):
+        run = solve_ivp(lambda t, y: [y[1], np.cos(r * t + phase) + friction - y[0] - 2 * damping * y[1]],
+                        (0, np.pi / r), [top, 0.0], method="DOP853", rtol=1e-11, atol=1e-12)
+        return run.y[:, -1]
+
+    grid = np.linspace(0, 2 * np.pi, 73)
+    speeds = np.array([end(p)[1] for p in grid])
+    found = [brentq(lambda p: end(p)[1], a, b, xtol=1e-13) for a, b, u, v in
+             zip(grid, grid[1:], speeds, speeds[1:]) if u * v <= 0]
+    assert min(abs(end(p)[0] + top) for p in found) <= 1e-8 * top
+
+
+@pytest.mark.parametrize("hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)])
+def test_exact_knee_of_the_sliding_motion(hertz, knee):
+    """The motion without stops begins at a/f = 1.2466 ... 1.3337 (damping 0.003), to 5e-4."""
+    assert exact.sliding_amplitude(hertz / 143, 1 / (knee + 5e-4), 0.003) > 0
+    with pytest.raises(ValueError):
+        exact.sliding_amplitude(hertz / 143, 1 / (knee - 5e-4), 0.003)
+
+
+def test_exact_bounded_input_is_four_over_pi():
+    assert exact.bounded_input(4.0) == pytest.approx(5.09295817894, rel=1e-11)
+
+
+@pytest.mark.parametrize("friction, want, within", [
+    (0.95, 0.006603, 1e-6), (0.9, 0.032368, 1e-6), (0.85, 0.096925, 1e-6), (0.828, 0.152702, 1e-6),
+    (0.8, 0.299431041748427515, 1e-12), (0.79, 0.435537658848, 1e-11), (0.786, 0.599134, 1e-6),
+    (np.pi / 4 + 1e-6, 0.76259, 1e-5)])
+def test_exact_two_stop_amplitude(friction, want, within):
+    assert exact.two_stop_amplitude(friction) == pytest.approx(want, abs=within)
+
+
+def test_exact_two_stop_amplitude_of_015_needs_082884():
+    found = brentq(lambda d: exact.two_stop_amplitude(d) - 0.15, 0.8, 0.9, xtol=1e-12)
+    assert found == pytest.approx(0.828843, abs=1e-6)
+
+
+@pytest.mark.parametrize("miss", [1e-8, 1e-6, 0.99e-4, 1.01e-4, 1e-3])
+def test_exact_two_stop_amplitude_near_onset_in_60_digits(miss):
+    with mpmath.workdps(60):
+        def ends(s):
+            t = mpmath.atan2(s * mpmath.sin(s), mpmath.sin(s) - s * mpmath.cos(s))
+            d = (mpmath.sin(t) * (1 + mpmath.cos(s)) + mpmath.cos(t) * mpmath.sin(s) / 2
+                 - s / 2 * mpmath.cos(t + s)) / 2
+            return d, d - mpmath.sin(t)
+        friction = mpmath.mpf(1 - miss)
+        s = mpmath.findroot(lambda s: ends(s)[0] - friction, mpmath.sqrt(18 * miss))
+        want = float(ends(s)[1])
+    assert exact.two_stop_amplitude(1 - miss) == pytest.approx(want, rel=2e-7)
+
+
+@pytest.mark.parametrize("slip", [0.5, 1.5, 2.4726, 3.0])
+def test_exact_two_stop_relation_by_integrating_the_slip(slip):
+    """u'' + u = sin T + f from the release at -A: after `slip` the block must stand at +A."""
+    friction, top = exact.two_stop_relation(slip)
+    start = np.arcsin(friction - top)
+    run = solve_ivp(lambda t, y: [y[1], np.sin(t) - friction - y[0]], (start, start + slip), [-top, 0.0],
+                    method="DOP853", rtol=1e-12, atol=1e-14)
+    assert run.y[:, -1] == pytest.approx([top, 0.0], abs=1e-10)
+
+
+def test_exact_two_stop_limits():
+    assert exact.two_stop_amplitude(1.0) == 0 and exact.two_stop_amplitude(0.785) == np.inf
+    assert exact.two_stop_amplitude(np.pi / 4) == pytest.approx(np.pi / 4, abs=1e-12)
+    friction, top = exact.two_stop_relation(np.pi - 1e-6)
+    assert friction == pytest.approx(np.pi / 4, abs=1e-9) and top == pytest.approx(np.pi / 4, abs=1e-5)
+
+
+# ---- refusals
+
+@pytest.mark.parametrize("call", [
+    lambda: exact.hertz_half_width(-1.0, 1.0, 1.0), lambda: exact.combined_modulus(0.0, 0.3),
+    lambda: exact.steady_shear(0, 1.0, 0.3), lambda: exact.steady_bond_length(1.0, 1.0, 1.0, -1.0, 1.0),
+    lambda: exact.virgin_force(-1.0, 1.0), lambda: exact.virgin_force(1.0, 1.0, -1.0),
+    lambda: exact.reversal_force(1.0, 1.0, reading="printed"), lambda: exact.reversal_force(-1.0, 1.0),
+    lambda: exact.reversal_force(1.0, 1.0, -0.5), lambda: exact.reversal_force(1.0, 1.0, -1.5, "report"),
+    lambda: exact.stretch_loop(0.0, 1.0), lambda: exact.report_loop(1.0, 0.0), lambda: exact.jenkins_loop(-1.0, 1.0),
+    lambda: exact.decay(1.0, 1.0, 0.0, 1.0), lambda: exact.decay([-1.0], 1.0, 1.0, 1.0),
+    lambda: exact.sliding_amplitude(1.0, 0.5), lambda: exact.sliding_amplitude(1.0, 0.9, 0.003),
+    lambda: exact.sliding_amplitude(0.9, -0.1, 0.003), lambda: exact.two_stop_relation(np.pi)])
+def test_refuses_arguments_without_a_meaning(call):
+    with pytest.raises(ValueError):
+        call()
