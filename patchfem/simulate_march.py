@@ -68,8 +68,10 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     """Bond points (stretch reading, p = 1) on nodal areas (m,) [m2] under sigma (m,) [Pa].
 
     shear: ShearModes of the contact set or None for a rigid slide; pattern: (x, sigma on x) when the pressure stays on
-    the lower piece, `area` and `sigma` then belong to the points of the upper one.
+    the lower piece, `area` and `sigma` then belong to the points of the upper one. ValueError for both together.
     """
+    if shear is not None and pattern is not None:
+        raise ValueError("shear modes and a pressure that stays on the lower piece cannot be combined")
     area, sigma = np.asarray(area, float), np.asarray(sigma, float)
     places = np.zeros(0) if pattern is None else pattern[0]
     if shear is not None:

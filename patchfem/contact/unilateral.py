@@ -130,9 +130,11 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
 
     With `moment` [N m] the upper piece is free to rotate; without it `rotation` [rad] is held (and already in `gap`,
     so it is only reported). Zero load gives the outcome no_contact. PatchfemError for a moment that no pressure can
-    carry, NotConverged when a residual exceeds 1e-9.
+    carry, a load that is negative or a gap that is not finite, NotConverged when a residual exceeds 1e-9.
     """
     x, weight = pieces.interface.x, pieces.interface.weight
+    if not (np.isfinite(load) and load >= 0 and np.isfinite(gap).all()):
+        raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
     if load == 0:
         first = float(gap.min())
         return Pressure(frozen_array(np.zeros(x.size)), frozen_array(gap - first), first, rotation, 0.0, 0.0,
@@ -145,8 +147,8 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
         force, motion, count = solve_forces(pieces.normal, x, gap, target, start)
     theta = 0.0 if moment is None else -float(motion[1])
     checks = residuals(pieces.normal, x, gap, force, float(motion[0]), theta, load, moment)
-    if max(checks.values()) > LIMIT:
-        worst = max(checks, key=checks.get)
+    if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
+        worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
         raise NotConverged(f"contact: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}")
     opening = np.maximum(gap + theta * x - float(motion[0]) + pieces.normal @ force, 0.0)
     opening[force > 0] = 0.0

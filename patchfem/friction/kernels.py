@@ -25,6 +25,22 @@ def shape(x):
 
 
 @njit(error_model="numpy", fastmath=FAST)
+def moments(x, e):
+    """Integrals from 0 to x of y exp(-y), y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x).
+
+    Twin: `recursion.moments`.
+    """
+    if x < 0.5:
+        c = x ** 4 * (1 / 4 - x * (1 / 5 - x * (1 / 12 - x * (1 / 42 - x * (1 / 192 - x * (1 / 1080 - x * (
+            1 / 7200 - x * (1 / 55440 - x * (1 / 483840 - x * (1 / 4717440 - x * (1 / 50803200 - x * (
+                1 / 598752000 - x / 7664025600))))))))))))
+    else:
+        c = 6 - e * (x * x * x + 3 * x * x + 6 * x + 6)
+    third = (c + x * x * x * e) / 3
+    return (third + x * x * e) / 2, third, x * third - c
+
+
+@njit(error_model="numpy", fastmath=FAST)
 def bond_mean(m, z, dq, sigma, eps):
     """Path-mean stretch [Pa m] and its slope [Pa] of one point (twin: `recursion.advance`); 10 ns."""
     path = abs(dq)
@@ -45,10 +61,8 @@ def bond_step(m, z, s2, dq, sigma, eps):
     x = path / eps
     f1, _, e = shape(x)
     a1, young = x * f1, sigma - m
-    a2 = 1 - e * (1 + x)
-    a3 = 2 - e * (x * x + 2 * x + 2)
-    burnt = s2 * a1 + 2 * g * z * eps * a2 + m * eps * eps * a3 \
-        + sigma * eps * eps * (2 * x - 6 + e * (x * x + 4 * x + 6))
+    a2, a3, a4 = moments(x, e)
+    burnt = s2 * a1 + 2 * g * z * eps * a2 + m * eps * eps * a3 + sigma * eps * eps * a4
     m1 = sigma - young * e
     z1 = z * e + g * eps * (sigma * a1 - young * x * e)
     s21 = e * (s2 + 2 * g * z * path + m * path * path) + sigma * eps * eps * a3
@@ -195,7 +209,7 @@ def list_force(dq, bonds, count, now, law, growth, v0, dt):
     for piece in range(pieces):
         for s in (-1.0, 1.0):
             back = (piece + 0.5 + s * 0.28867513459481287) / pieces
-            length = now[4] if report else middle
+            length = now[4] + (1 - back) * (eps - now[4]) if report else middle
             total += abs(dq) / (2 * pieces * eps0) * norm * _bond(back * dq, back * abs(dq), back * abs(dq) / middle,
                                                                   back * more, length, eps, p, report)
     return total

@@ -71,7 +71,9 @@ class ElasticPlastic:
         mean = ramp * (y0 + y1) / 2 + (1 - ramp) * y1
         sliding = self.static * np.abs(y1) * (1 - ramp) * abs(dq)
         mean = np.where(move != 0, mean, y0)
-        return Step(self.static * mean, sliding + np.maximum(lost, 0.0), np.stack([y1, sigma]))
+        bare = s1 <= 0  # bonds are lost where no pressure holds them
+        lost = np.maximum(lost, 0.0) + np.where(bare, self._energy(y1, sigma), 0.0)
+        return Step(self.static * mean, sliding + lost, np.stack([np.where(bare, 0.0, y1), np.where(bare, 0.0, sigma)]))
 
     def _energy(self, y, sigma):
         return self.static * self.length * np.divide(y**2, 2 * sigma, out=np.zeros_like(y), where=sigma > 0)

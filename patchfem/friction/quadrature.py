@@ -36,7 +36,8 @@ def cutoff(order: float, tail: float) -> float:
 @dataclass(frozen=True, eq=False, slots=True)
 class Strips:
     """Bonds of a path. Strip k: q, path, damage, growth (J), mature (eps_p) at its end; span (signed length), length
-    scale eps when it formed; sigma (k, m) [Pa]. The first entry is the initial cohort of weight m_0 eps_0."""
+    scale eps when it formed, gain: growth and mature length won while it formed (2, k); sigma (k, m) [Pa]. The first
+    entry is the initial cohort of weight m_0 eps_0."""
 
     q: np.ndarray
     path: np.ndarray
@@ -45,6 +46,7 @@ class Strips:
     mature: np.ndarray
     span: np.ndarray
     eps: np.ndarray
+    gain: np.ndarray
     sigma: np.ndarray
     now: tuple  # q, path, damage, growth, mature of the present
     alive: np.ndarray  # (m,) first strip that still holds at a point
@@ -62,7 +64,7 @@ class Quadrature:
         """Only the initial cohort: unstressed, full-grown bonds of density m_0."""
         one = np.zeros(1)
         return Strips(one, one, one, one, np.full(1, self.law.length), one, np.full(1, self.law.length),
-                      np.array(sigma, float)[None], (0.0, 0.0, 0.0, 0.0, self.law.length),
+                      np.zeros((2, 1)), np.array(sigma, float)[None], (0.0, 0.0, 0.0, 0.0, self.law.length),
                       np.zeros(len(sigma), np.int64))
 
     def step(self, state: Strips, dq: float, s0, s1, dt: float) -> Step:
@@ -113,7 +115,8 @@ class Quadrature:
         new = (*after, dq, middle)
         names = ("q", "path", "damage", "growth", "mature", "span", "eps")
         columns = {name: np.append(getattr(state, name), value) for name, value in zip(names, new)}
-        return self._cut(Strips(**columns, sigma=np.vstack([state.sigma, sigma]), now=after, alive=alive,
+        gain = np.append(state.gain, [[after[3] - growth], [after[4] - mature]], axis=1)
+        return self._cut(Strips(**columns, gain=gain, sigma=np.vstack([state.sigma, sigma]), now=after, alive=alive,
                                 dropped=state.dropped))
 
     def _cut(self, state: Strips) -> Strips:
@@ -127,7 +130,7 @@ class Quadrature:
             return state
         kept = {name: getattr(state, name)[first:] for name in
                 ("q", "path", "damage", "growth", "mature", "span", "eps", "sigma")}
-        return replace(state, **kept, alive=np.maximum(state.alive - first, 0), dropped=state.dropped + first)
+        return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0), dropped=state.dropped + first)
 
     def weights(self, state: Strips) -> np.ndarray:
         """(k,) signed weight [1] of each strip: tau = mu_s sum_k weight_k sigma_k. The first is the initial cohort."""
@@ -212,7 +215,6 @@ def _gauss_strip(state: Strips, rest, law: Bonds) -> np.ndarray:
     number = np.arange(owner.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
     back = (number[:, None] + (1 - _GAUSS_Y) / 2) / pieces[owner][:, None]  # share of the span behind its end
     weight = np.abs(spans)[owner][:, None] / pieces[owner][:, None] * _GAUSS_W / 2
-    start = slice(rest.start - 1, -1) if rest.start else None
     u = state.now[0] - state.q[rest][owner][:, None] + back * spans[owner][:, None]
     travel = state.now[1] - state.path[rest][owner][:, None] + back * np.abs(spans)[owner][:, None]
     if law.reading == "stretch":
@@ -220,7 +222,7 @@ def _gauss_strip(state: Strips, rest, law: Bonds) -> np.ndarray:
         harm = state.now[2] - state.damage[rest][owner][:, None] + back * np.abs(spans)[owner][:, None] / eps
         size = np.abs(u) / eps
     else:
-        before = _interval(state, rest, start)
+        before = state.gain[:, rest]
         age = state.now[3] - state.growth[rest][owner][:, None] + back * before[0][owner][:, None]
         born = state.mature[rest][owner][:, None] - back * before[1][owner][:, None]
         eps = np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
@@ -228,12 +230,3 @@ def _gauss_strip(state: Strips, rest, law: Bonds) -> np.ndarray:
     with np.errstate(divide="ignore"):
         f = np.sign(u) * np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm - gammaln(law.order + 1))
     return np.bincount(owner, ((f * weight).sum(axis=1)), spans.size) / law.length
-
-
-def _interval(state: Strips, rest, start) -> tuple:
-    """Change of the growth exponent and of the mature length over each strip."""
-    if start is None:
-        growth = np.diff(state.growth[rest], prepend=state.growth[rest][:1])
-        mature = np.diff(state.mature[rest], prepend=state.mature[rest][:1])
-        return growth, mature
-    return state.growth[rest] - state.growth[start], state.mature[rest] - state.mature[start]

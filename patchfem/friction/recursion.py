@@ -10,6 +10,7 @@ negative: passive for every path, pressure and bond length.
 """
 
 from dataclasses import dataclass
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,14 @@ def shape_functions(x):
     return f1, f2, np.exp(-x)
 
 
+def moments(x, e):
+    """Integrals from 0 to x of y exp(-y), y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x)."""
+    series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
+    c = np.where(x < 0.5, x**4 * series, 6 - e * (x**3 + 3 * x * x + 6 * x + 6))
+    third = (c + x**3 * e) / 3
+    return (third + x * x * e) / 2, third, x * third - c
+
+
 def advance(bonds, dq, sigma, eps):
     """New bonds (3, m), path-mean stretch zbar (m,) [Pa m], its slope (m,) [Pa], integral of s2 dR/eps (m,) [Pa m2].
 
@@ -49,14 +58,15 @@ def advance(bonds, dq, sigma, eps):
     x = path / eps
     f1, f2, e = shape_functions(x)
     a1, young = x * f1, sigma - m
+    with np.errstate(over="ignore", invalid="ignore"):
+        a2, a3, a4 = moments(x, e)
     mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))
     slope = g * z * (f2 - f1) / eps + sigma * (f1 - f2) - young * (f2 - x * (f1 - f2))
-    slope = np.where(path > 0, slope, m / 2)
+    slope = np.where(path > 0, slope, m / 2)  # the mean of the two sides
     out = np.stack([sigma - young * e,
                     z * e + g * eps * (sigma * a1 - young * x * e),
-                    e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * (2 - e * (x * x + 2 * x + 2))])
-    burnt = s2 * a1 + 2 * g * z * eps * (1 - e * (1 + x)) + m * eps**2 * (2 - e * (x * x + 2 * x + 2)) \
-        + sigma * eps**2 * (2 * x - 6 + e * (x * x + 4 * x + 6))
+                    e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * a3])
+    burnt = s2 * a1 + 2 * g * z * eps * a2 + m * eps**2 * a3 + sigma * eps**2 * a4
     return out, mean, slope, burnt
 
 

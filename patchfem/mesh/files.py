@@ -5,6 +5,8 @@ lower_interface, upper_far, lower_far. The lower piece lies at y <= 0, the upper
 interface nodes of its own.
 """
 
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -69,50 +71,86 @@ def write_mesh(grid: TensorGrid, path: Path) -> None:
 
 
 def _load(path: Path):
+    """meshio's mesh of a .msh; what meshio prints is kept from stdout, and it may call sys.exit."""
     import meshio
 
     if not path.is_file():
         raise PatchfemError(f"{path}: no such mesh file")
     if path.suffix != ".msh":
         raise PatchfemError(f"{path}: only .msh meshes are read; other formats are not yet built")
+    _plausible(path)
     try:
-        return meshio.read(path)
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            return meshio.read(path)
     except (Exception, SystemExit) as error:
         raise PatchfemError(f"{path}: not a readable .msh file ({type(error).__name__}: {error})") from None
+
+
+def _plausible(path: Path) -> None:
+    """PatchfemError when a section announces more entries than the file has bytes for."""
+    content = path.read_bytes()
+    for section, least in ((b"$Nodes", 6), (b"$Elements", 4)):
+        at = content.find(section)
+        line = content[at + len(section):at + len(section) + 80].split(b"\n")
+        numbers = [int(word) for word in line[1].split() if word.isdigit()] if at >= 0 and len(line) > 1 else []
+        if numbers and max(numbers[:4]) * least > len(content):
+            raise PatchfemError(f"{path}: {section.decode()[1:]} announces {max(numbers[:4])} entries, more than a "
+                                f"file of {len(content)} bytes can hold")
+
+
+def _quads(path: Path, mesh) -> tuple:
+    """(cells (t, 4), name of the tag of each cell (t,)); PatchfemError for other cells, bad ids and missing tags."""
+    names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
+    cells, labels, edges = [], [], set()
+    for block, physical in zip(mesh.cells, mesh.cell_data.get("gmsh:physical", [])):
+        if block.type == "line":
+            edges |= {names.get((1, int(t)), "") for t in np.unique(physical)}
+        elif block.type == "quad":
+            cells.append(block.data)
+            labels += [names.get((2, int(t)), f"tag {int(t)}") for t in physical]
+        elif block.type != "vertex":
+            raise PatchfemError(f"{path}: {block.type} cells; only the quads of `patchfem mesh` can be used, "
+                                "other meshes are not yet built")
+    missing = {"upper_substrate", "lower_substrate"} - set(labels) | set(EDGE_TAGS) - edges
+    if missing:
+        raise PatchfemError(f"{path}: nothing is tagged {', '.join(sorted(missing))}")
+    unknown = set(labels) - set(CELL_TAGS)
+    if unknown:
+        raise PatchfemError(f"{path}: cells with the unknown {', '.join(sorted(unknown))}; known are "
+                            f"{', '.join(CELL_TAGS)}")
+    quads = np.concatenate(cells)
+    if quads.min() < 0 or quads.max() >= len(mesh.points):
+        raise PatchfemError(f"{path}: a cell names node {int(quads.max())}, the file has {len(mesh.points)}")
+    if not np.isfinite(mesh.points).all():
+        raise PatchfemError(f"{path}: a node has a coordinate that is not finite")
+    return quads, np.array(labels)
 
 
 def read_grid(path: Path) -> TensorGrid:
     """The tensor grid behind a tagged .msh of two alike pieces, as `patchfem mesh` writes them.
 
-    PatchfemError names what is missing or wrong: tags, node ids, a mesh that is no tensor grid (not yet built).
+    PatchfemError names what is missing or wrong: tags, node ids, twisted cells, pieces that are unlike or shifted, a
+    mesh that is no tensor grid (not yet built).
     """
     path = Path(path)
     mesh = _load(path)
-    names = {int(value[0]): name for name, value in mesh.field_data.items() if int(value[1]) == 2}
-    quads, tags = [], []
-    for block, physical in zip(mesh.cells, mesh.cell_data.get("gmsh:physical", [])):
-        if block.type == "quad":
-            quads.append(block.data)
-            tags.append(physical)
-        elif block.type not in ("line", "vertex"):
-            raise PatchfemError(f"{path}: {block.type} cells; only the quads of `patchfem mesh` can be used, "
-                                "other meshes are not yet built")
-    wanted = {"upper_substrate", "lower_substrate"}
-    if not quads or not wanted <= set(names.values()):
-        missing = sorted(wanted - set(names.values())) or ["quads"]
-        raise PatchfemError(f"{path}: no cells tagged {', '.join(missing)}")
-    quads, tags = np.concatenate(quads), np.concatenate(tags)
-    if quads.min() < 0 or quads.max() >= len(mesh.points):
-        raise PatchfemError(f"{path}: a cell names node {int(quads.max())}, the file has {len(mesh.points)}")
-    label = np.array([names.get(int(t), "") for t in tags])
+    quads, label = _quads(path, mesh)
+    corner = mesh.points[quads][:, :, :2]
+    first, second = corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    side = corner[:, (1, 2, 3, 0)] - corner
+    turns = side[:, :, 0] * side[:, (1, 2, 3, 0), 1] - side[:, :, 1] * side[:, (1, 2, 3, 0), 0]
+    if not (np.all(turns * np.sign(area)[:, None] > 0)):
+        raise PatchfemError(f"{path}: a cell is twisted or has no area")
     lower = _piece(mesh.points, quads, label, "lower", -1.0, path)
     upper = _piece(mesh.points, quads, label, "upper", 1.0, path)
     same = lower.x.size == upper.x.size and lower.depth.size == upper.depth.size
-    size = lower.length
+    size = np.ptp(lower.x)
     if not same or np.abs(lower.x - upper.x).max() > 1e-9 * size or \
             np.abs(lower.depth - upper.depth).max() > 1e-9 * size or lower.coating_rows != upper.coating_rows:
-        raise PatchfemError(f"{path}: the two pieces differ; unlike pieces are not yet built")
-    return lower
+        raise PatchfemError(f"{path}: the two pieces differ or are shifted; unlike pieces are not yet built")
+    middle = (lower.x[0] + lower.x[-1]) / 2
+    return TensorGrid(frozen_array(lower.x - middle), lower.depth, lower.coating_rows)
 
 
 def _piece(points, quads, label, piece: str, side: float, path: Path) -> TensorGrid:
@@ -138,9 +176,8 @@ def _piece(points, quads, label, piece: str, side: float, path: Path) -> TensorG
     rows = int(row[coat].max() + 1) if coat.any() else 0
     if not np.array_equal(coat, row < rows):
         raise PatchfemError(f"{path}: {piece}_coating does not fill whole rows from the interface")
-    middle = (x[0] + x[-1]) / 2
     depth[0] = 0.0
-    return TensorGrid(frozen_array(x - middle), frozen_array(depth), rows)
+    return TensorGrid(frozen_array(x), frozen_array(depth), rows)
 
 
 def _levels(values, span: float) -> np.ndarray:

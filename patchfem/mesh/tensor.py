@@ -56,10 +56,10 @@ class TensorGrid:
 def graded_rows(start: float, total: float, growth: float = GROWTH, least: int = 1) -> np.ndarray:
     """Row heights (ny,) that begin near `start`, grow by at most `growth` and add up to `total` [m].
 
-    ValueError unless start and total are positive.
+    ValueError unless start and total are positive and growth > 1.
     """
-    if not (start > 0 and total > 0):
-        raise ValueError("start and total must be positive")
+    if not (start > 0 and total > 0 and growth > 1):
+        raise ValueError("start and total must be positive and growth above 1")
     start = min(start, total / least)
     count = max(least, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
     if count * start >= total * (1 - 1e-12):

@@ -11,7 +11,6 @@ from scipy.optimize import lsq_linear
 
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.slip import (
-    contact_tangential,
     jenkins_set,
     normal_stiffness,
     shear_modes,
@@ -90,22 +89,20 @@ def test_exact_elements_carry_the_friction_limit_and_start_at_the_stick_stiffnes
     group = jenkins_set(pair.tangential, limit)
     assert group.stiffness @ group.yield_slide == pytest.approx(limit.sum(), rel=1e-12)
     assert group.stiffness.sum() == pytest.approx(tangential_stiffness(pair.tangential, limit > 0),
-                                                  rel=1e-12 if group.dropped == 0 else 1e-9)
+                                                  rel=1e-11)
     assert group.stiffness.min() > 0
     assert np.all(np.diff(group.yield_slide) >= 0) and group.yield_slide[0] > 0
 
 
-@pytest.mark.parametrize("cells", [100, 200])
 @pytest.mark.parametrize("angle", TILTS)
-def test_always_the_kept_contact_set_has_an_m_matrix_with_positive_row_sums(cells, angle):
-    pair, limit = coated_pair(cells), friction_limit(cells, angle)
-    index, c, force, dropped, share = contact_tangential(pair.tangential, limit)
-    inverse = np.linalg.inv(c)
-    assert (inverse - np.diag(np.diag(inverse))).max() <= 1e-12 * inverse.max()
-    assert inverse.sum(axis=1).min() > 0
-    assert force.sum() == pytest.approx(limit.sum(), rel=1e-13)
-    assert index.size + dropped == np.count_nonzero(limit)
-    assert share == pytest.approx(1 - limit[index].sum() / limit.sum(), abs=1e-12)
+def test_always_the_contact_set_has_an_m_matrix_and_only_corner_nodes_a_negative_row_sum(angle):
+    pair, limit = coated_pair(200), friction_limit(200, angle)
+    index = np.flatnonzero(limit > 0)
+    inverse = np.linalg.inv(pair.tangential[np.ix_(index, index)])
+    assert (inverse - np.diag(np.diag(inverse))).max() <= 1e-9 * inverse.max()
+    rows = inverse.sum(axis=1)
+    assert set(index[rows <= 0]) <= {0, 200}
+    assert jenkins_set(pair.tangential, limit).reluctant <= 2
 
 
 @pytest.mark.parametrize("angle", TILTS)
@@ -113,7 +110,7 @@ def test_exact_elements_repeat_the_problem_point_by_point(angle):
     """20 histories of 40 reversals at 101 nodes; the worst difference seen is 9e-15 of mu N."""
     pair, limit = coated_pair(100), friction_limit(100, angle)
     group = jenkins_set(pair.tangential, limit)
-    assert group.dropped == 0
+    assert group.reluctant == 0
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)]
     for path in histories(20, group.yield_slide[-1]):
@@ -155,21 +152,30 @@ def test_exact_elements_with_bonds_repeat_the_problem_point_by_point(angle, leng
         assert worst <= 1e-10 * limit.sum()
 
 
-def test_exact_dropped_corner_nodes_are_reported_and_the_rest_repeats_point_by_point():
-    pair, limit = coated_pair(200), friction_limit(200, 0.0)
-    rows = np.linalg.solve(pair.tangential, np.ones(201))
-    assert rows[0] < 0 and rows[-1] < 0
+@pytest.mark.parametrize("angle", [0.0, 1e-5])
+def test_exact_corner_nodes_with_a_negative_row_sum_wait_for_their_neighbours(angle):
+    """At 201 nodes the free corners carry the wrong sign at first; 6e-10 of mu N seen against every node kept."""
+    pair, limit = coated_pair(200), friction_limit(200, angle)
     group = jenkins_set(pair.tangential, limit)
-    index, c, force, dropped, share = contact_tangential(pair.tangential, limit)
-    assert group.dropped == dropped == 201 - index.size > 0
-    assert dropped % 2 == 0 and index[0] + index[-1] == 200
-    assert 0 < group.dropped_share == share
-    reach = group.yield_slide[-1]
-    for path in histories(3, reach):
-        assert np.abs(point_by_point(c, force, path) - elements(group, path)).max() <= 1e-10 * limit.sum()
-        # against every node kept: 6e-5 of mu N seen, far below the share that was moved
-        whole = np.abs(point_by_point(pair.tangential, limit, path) - elements(group, path)).max()
-        assert whole <= 2e-4 * limit.sum()
+    assert group.reluctant > 0 and group.stiffness.min() > 0
+    touching = limit > 0
+    c = pair.tangential[np.ix_(touching, touching)]
+    for path in histories(3, group.yield_slide[-1]):
+        whole = np.abs(point_by_point(c, limit[touching], path) - elements(group, path)).max()
+        assert whole <= 5e-9 * limit.sum()
+
+
+def test_exact_the_force_of_every_point_is_its_share_of_the_elements():
+    pair, limit = coated_pair(100), friction_limit(100, 1e-4)
+    group = jenkins_set(pair.tangential, limit)
+    c = pair.tangential[np.ix_(group.points, group.points)]
+    settled, force, own = np.zeros(group.points.size), np.zeros(group.points.size), np.zeros(group.stiffness.size)
+    for q in np.array([0.3, 0.9, -0.4, 0.1, -2.0]) * group.yield_slide[-1]:
+        force, moved = box_problem(c, group.limit, q - settled, force)
+        settled = settled + moved
+        stretch = np.clip(q - own, -group.yield_slide, group.yield_slide)
+        own = q - stretch
+        assert np.abs(group.share @ stretch - force).max() <= 1e-10 * limit.sum()
 
 
 @settings(max_examples=25, deadline=None)
@@ -196,7 +202,7 @@ def test_exact_identity_of_ciavarella_and_jaeger(shape):
     gap = crown(x, 2.0) if shape == "crown" else tilt(x, 1e-4)
     full = press(pair, gap, LOAD)
     group = jenkins_set(pair.normal, MU * full.sigma_n * pair.interface.weight)
-    assert group.dropped == 0
+    assert group.reluctant == 0
     for share in (0.999, 0.9, 0.6, 0.3, 0.1, 0.01):
         part = press(pair, gap, share * LOAD)
         q = MU * (full.approach - part.approach)
@@ -267,18 +273,18 @@ def test_always_more_modes_never_worsen_the_backbone(angle, length):
     pair, limit = coated_pair(200), friction_limit(200, angle)
     errors = np.array([shear_modes(pair.tangential, limit, length, n).backbone_error for n in (1, 2, 4, 8, 16)])
     assert np.all(np.diff(errors) <= 1e-12)
-    assert errors[3] <= (1e-6 if angle == 0 else 1e-4)
+    assert errors[3] <= (1e-6 if length == 1e-6 else 3e-5)
     assert errors[0] > errors[3]
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
-    """Against the points themselves, on the 24 slides up to 6 bond lengths that the error is taken over."""
+    """Against the points themselves, on the 24 slides that the error is taken over."""
     length = 1e-6
     pair, limit = coated_pair(100), friction_limit(100, angle)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)]
-    slides = length * np.arange(1, 25) / 4
+    slides = (6 * length + 2 * np.abs(c @ limit[touching]).max()) * (np.arange(1, 25) / 24) ** 2
     whole = np.array([saturating(c, limit[touching], length, q).sum() for q in slides])
     for count in (1, 3):
         modes = shear_modes(pair.tangential, limit, length, count)

@@ -165,6 +165,30 @@ def test_order_of_the_march_against_an_integrated_dahl_law():
     assert np.log2(forces[0] / forces[2]) / 6 == pytest.approx(2, abs=0.1)
 
 
+def test_order_of_the_march_with_a_growing_bond_length():
+    """The same rig with 2.10 (eps_k = 0.7 eps_0) as a fourth state of an integrated system; order two."""
+    length, limit, drive = 1e-6, 0.4 * 98.0665, 5 * 9.80665
+    law = Bonds(0.4, length, ratio=0.7, rest_growth=10.0, slip_growth=0.2e-6, rest_speed=1e-3)
+
+    def rhs(t, y):
+        q, v, z, eps = y
+        return [v, -2 * 0.003 * OMEGA * v - OMEGA**2 * q - drive * np.sin(OMEGA * t) - limit * z,
+                v / length - abs(v) * z / eps,
+                10.0 / max(abs(v), 1e-3) * (length - eps) + abs(v) / 0.2e-6 * (0.7 * length - eps)]
+
+    times = np.arange(2 * 50 + 1) / 50 / 143
+    run = solve_ivp(rhs, (0, times[-1]), [0.0, 0.0, 0.0, length], method="LSODA", rtol=1e-10,
+                    atol=[1e-16, 1e-13, 1e-11, 1e-17], t_eval=times, max_step=1 / 143 / 800)
+    errors = []
+    for steps in (100, 800, 6400):
+        got = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(drive, OMEGA), points_model(law, [1e-4], [98.0665e4]), 2,
+                    steps, window=2)
+        errors.append(np.abs(got.window.slide[::steps // 50] - run.y[0]).max())
+    assert run.y[3].min() < 0.701 * length and np.ptp(run.y[0]) > 1e-4
+    assert errors[0] > errors[1] > errors[2] and errors[2] < 1e-4 * length
+    assert np.log2(errors[0] / errors[2]) / 6 == pytest.approx(2, abs=0.15)
+
+
 @pytest.mark.parametrize("stiffness, want", [(10, 0.249538145), (100, 0.285786312)])
 def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
     """Unit oscillator, damping 0.003, at resonance, limit 0.8 of the drive: steady peaks known from DOP853.

@@ -5,9 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from friction_paths import GAUSS, random_walk, sum_by_hand, triangle, upper_pressure, walk
+from mpmath import mp
 from scipy.special import gammainc
 
-from patchfem.friction import kernels
+from patchfem.friction import kernels, recursion
 from patchfem.friction.law import Bonds, grow, growth_exponents
 from patchfem.friction.quadrature import Quadrature, cutoff
 from patchfem.friction.recursion import advance, shape_functions
@@ -227,3 +228,19 @@ def test_exact_gauss_nodes_of_the_kernels():
     assert y[-1] == pytest.approx(0.906179845938664, abs=1e-15) and w[2] == pytest.approx(0.5688888888888889)
     assert np.polynomial.legendre.leggauss(2)[0][1] / 2 == pytest.approx(0.28867513459481287, abs=1e-16)
     assert GAUSS[0].size == 12
+
+
+def test_exact_a_bond_list_foresees_the_force_it_commits():
+    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=0.1, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    _, after, ahead, _ = follow_list(law, np.linspace(0, 0.4, 9), 0.5)
+    assert ahead == pytest.approx(after, abs=1e-10)
+
+
+@pytest.mark.parametrize("x", [1e-9, 1e-5, 1e-2, 0.3, 0.499999, 0.5, 0.7, 3.0, 40.0])
+def test_exact_moments_have_no_cancellation(x):
+    with mp.workdps(40):
+        e = mp.exp(-mp.mpf(x))
+        truth = [1 - e * (1 + mp.mpf(x)), 2 - e * (mp.mpf(x)**2 + 2 * mp.mpf(x) + 2),
+                 2 * mp.mpf(x) - 6 + e * (mp.mpf(x)**2 + 4 * mp.mpf(x) + 6)]
+    for mine in (kernels.moments(x, np.exp(-x)), recursion.moments(np.array(x), np.exp(-x))):
+        assert [float(v) for v in mine] == pytest.approx([float(t) for t in truth], rel=2e-12)

@@ -109,3 +109,10 @@ def test_exact_steps_leave_the_state_they_start_from(law):
     run = walk(law, np.array([0.0, 1e6, 0.0, 0.0]), upper_pressure([1.0, 0.0]))
     assert np.isfinite(np.concatenate([run.mean, run.traction, run.dissipated])).all()
     assert run.traction[1] == pytest.approx([-0.3, 0.0]) and run.mean[1] == pytest.approx([-0.3, 0.0], rel=1e-5)
+
+
+def test_exact_elastic_plastic_loses_its_bonds_on_a_bare_place():
+    law, one, bare = ElasticPlastic(0.4, 1.0), np.ones(1), np.zeros(1)
+    step = law.step(law.start(one), 1.0, one, bare, 1.0)
+    assert law.traction(step.state)[0] == 0 and law.stored(step.state)[0] == 0
+    assert step.dissipated[0] == pytest.approx(step.mean[0] * 1.0, rel=1e-12)

@@ -183,3 +183,11 @@ def test_exact_rest_and_long_steps(reading, order, growth):
     if not growth:
         assert run.traction[4] == pytest.approx([1.0, 0.25], rel=1e-3)
         assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-14)
+
+
+def test_exact_a_dwell_does_not_count_as_growth_of_the_next_strip():
+    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=0.1, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    path = np.concatenate([np.linspace(0, 2, 41), [2.0, 2.05]])
+    times = np.append(np.full(40, 0.5), [1.0, 0.5])
+    got = walk(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[-1, 0]
+    assert got == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]), times)[0], abs=2e-4)

@@ -24,14 +24,17 @@ SMALL = graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
 each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
 
 
-def store(path, pair, names=None, extra=()):
+def store(path, pair, names=None, extra=(), edges=None):
     """Write points, quads and tags as they stand, so that a broken pair can be made."""
     points = np.column_stack([pair["points"], np.zeros(len(pair["points"]))])
-    blocks = [("quad", pair["quads"]), *extra]
+    pair = pair_mesh(SMALL) | pair if "edges" not in pair else pair
+    blocks = [("quad", pair["quads"]), ("line", pair["edges"]), *extra]
     mesh = meshio.Mesh(points, blocks)
-    tags = [np.asarray(pair["tags"], np.int32), *(np.ones(len(cells), np.int32) for _, cells in extra)]
+    tags = [np.asarray(pair["tags"], np.int32), np.asarray(pair["edge_tags"], np.int32),
+            *(np.ones(len(cells), np.int32) for _, cells in extra)]
     mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     mesh.field_data = {k: np.array([v, 2]) for k, v in (CELL_TAGS if names is None else names).items()}
+    mesh.field_data |= {k: np.array([v, 1]) for k, v in (EDGE_TAGS if edges is None else edges).items()}
     meshio.write(path, mesh, file_format="gmsh22", binary=True)
     return path
 
@@ -174,12 +177,43 @@ def test_refuses_missing_tags(tmp_path):
         read_grid(store(tmp_path / "pair.msh", pair, lower))
     with pytest.raises(PatchfemError, match="lower_substrate, upper_substrate"):
         read_grid(store(tmp_path / "pair.msh", pair, {}))
+    with pytest.raises(PatchfemError, match="lower_far, upper_far"):
+        near = {k: v for k, v in EDGE_TAGS.items() if k.endswith("interface")}
+        read_grid(store(tmp_path / "pair.msh", pair, edges=near))
+    with pytest.raises(PatchfemError, match="lower_substrate, upper_substrate"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": pair["tags"] + 100}))
+
+
+def test_refuses_a_twisted_cell_and_a_piece_shifted_along_x(tmp_path):
+    pair = pair_mesh(SMALL)
+    quads = pair["quads"].copy()
+    quads[5, [1, 2]] = quads[5, [2, 1]]
+    with pytest.raises(PatchfemError, match="twisted"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "quads": quads}))
+    points = pair["points"].copy()
+    points[len(points) // 2:, 0] += 1e-4
+    with pytest.raises(PatchfemError, match="shifted"):
+        read_grid(store(tmp_path / "pair.msh", {**pair, "points": points}))
+
+
+def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, capsys):
+    path = tmp_path / "pair.msh"
+    write_mesh(SMALL, path)
+    read_grid(path)
+    assert capsys.readouterr().out == ""
+    content = path.read_bytes()
+    at = content.index(b"$Nodes") + 7
+    path.write_bytes(content[:at] + b"100000000" + content[content.index(b"\n", at):])
+    start = time.perf_counter()
+    with pytest.raises(PatchfemError, match="announces 100000000"):
+        read_grid(path)
+    assert time.perf_counter() - start < 1.0
 
 
 def test_refuses_cells_without_a_tag_at_the_interface(tmp_path):
     pair = pair_mesh(SMALL)
     tags = np.where(np.isin(pair["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["lower_coating"]]), 99, pair["tags"])
-    with pytest.raises(PatchfemError, match="no tensor grid with its interface at y = 0"):
+    with pytest.raises(PatchfemError, match="unknown tag 99"):
         read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
 
 
@@ -196,7 +230,7 @@ def test_refuses_a_shifted_node(node, shift, tmp_path):
     for start, piece in ((0, "lower"), (len(pair["points"]) // 2, "upper")):
         points = pair["points"].copy()
         points[start + node] += shift
-        with pytest.raises(PatchfemError, match=f"{piece} piece is no tensor grid"):
+        with pytest.raises(PatchfemError, match=f"{piece} piece is no tensor grid|not finite|twisted"):
             read_grid(store(tmp_path / "pair.msh", {**pair, "points": points}))
 
 

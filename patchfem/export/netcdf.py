@@ -1,0 +1,70 @@
+"""result.nc: histories and interface frames as one netCDF4 file with CF attributes and provenance."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+LONG = {
+    "relative_displacement": ("m", "displacement of the block relative to the base at its output"),
+    "relative_velocity": ("m s-1", "velocity of the block relative to the base at its output"),
+    "absolute_acceleration": ("m s-2", "acceleration at the output, base motion included"),
+    "base_acceleration": ("m s-2", "acceleration of the base"),
+    "friction_force": ("N", "resultant friction force, positive against positive slip"),
+    "normal_load": ("N", "normal load on the interface"),
+    "modal_coordinate": ("m", "modal coordinate"),
+    "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
+    "gap": ("m", "remaining gap"),
+    "shear_stress": ("Pa", "frictional shear stress, positive against positive slip"),
+    "slip": ("m", "irreversible local slip"),
+    "weight": ("m2", "nodal area of all pairs"),
+}
+
+
+def dataset(histories: dict, modal, fields: dict, x, weight) -> xr.Dataset:
+    """Dataset of a run.
+
+    histories: name -> (k,) with "time"; modal: (names, (k, n)) or None; fields: name -> (f, m) with "time", or {};
+    x, weight: (m,) or None.
+    """
+    data, coords = {}, {}
+    if histories:
+        coords["time"] = ("time", histories["time"], {"units": "s", "standard_name": "time"})
+        for name, values in histories.items():
+            if name != "time":
+                data[name] = ("time", values, _attributes(name))
+    if modal is not None:
+        coords["mode"] = ("mode", list(modal[0]), {"long_name": "mode"})
+        data["modal_coordinate"] = (("time", "mode"), modal[1], _attributes("modal_coordinate"))
+    if x is not None:
+        coords["x"] = ("x", np.asarray(x), {"units": "m", "long_name": "place along the sliding direction"})
+        data["weight"] = ("x", np.asarray(weight), _attributes("weight"))
+        coords["frame_time"] = ("frame", fields["time"], {"units": "s", "long_name": "time of the frame"})
+        for name, values in fields.items():
+            if name == "status":
+                data[name] = (("frame", "x"), values, {"long_name": "contact status", "flag_meanings": "open stick slip",
+                                                       "flag_values": np.array([0, 1, 2], np.int8)})
+            elif np.ndim(values) == 2:
+                data[name] = (("frame", "x"), values, _attributes(name))
+    return xr.Dataset(data, coords)
+
+
+def _attributes(name: str) -> dict:
+    unit, text = LONG[name]
+    return {"units": unit, "long_name": text}
+
+
+def write(data: xr.Dataset, path: Path, summary: dict, scene_text: str, versions: dict) -> None:
+    """Write through a temporary file beside `path`; provenance holds no host name and no path."""
+    data = data.assign_attrs({
+        "Conventions": "CF-1.11", "title": summary["title"], "source": f"patchfem {summary['patchfem']}",
+        "outcome": summary["outcome"], "scene": scene_text,
+        "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
+        "summary": json.dumps({k: summary[k] for k in ("kind", "measures", "warnings")}, ensure_ascii=False),
+        "versions": json.dumps(versions)})
+    encoding = {name: {"zlib": True, "complevel": 1} for name in data.data_vars if data[name].ndim}
+    partial = Path(path).with_name(Path(path).name + ".partial")
+    data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+    partial.replace(path)

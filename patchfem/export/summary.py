@@ -1,0 +1,28 @@
+"""summary.json: the answer of a run as one small object."""
+
+import json
+import math
+from pathlib import Path
+
+
+def measure_object(measure) -> dict:
+    """{"value", "unit", "error", "floor"} of a Measure; a value that is not finite becomes null."""
+    def clean(number):
+        return None if number is None or not math.isfinite(number) else float(number)
+
+    return {"value": clean(measure.value), "unit": measure.unit, "error": clean(measure.error),
+            "floor": float(measure.floor)}
+
+
+def summary(version: str, title: str, kind: str, outcome: str, measures: dict, effects: list, absent: list,
+            warnings: list, seconds: dict) -> dict:
+    """The object of summary.json; effects: dicts with effect, equations and seconds."""
+    return {"patchfem": version, "title": title, "kind": kind, "outcome": outcome,
+            "measures": {name: measure_object(m) for name, m in measures.items()}, "effects": effects,
+            "not_in_scene": absent, "warnings": warnings,
+            "seconds": {name: round(float(value), 6) for name, value in seconds.items()}}
+
+
+def write_json(value: dict, path: Path) -> None:
+    """Write `value` as strict JSON (no NaN) with a final newline."""
+    Path(path).write_text(json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
