@@ -79,8 +79,11 @@ def _still(patch) -> dict:
             "status": patch.active.astype(np.int8)[None]}
 
 
-def _fields(patch, time, tau, local) -> dict:
-    """Frames of the interface: the pressed state first, then the given ones; status 0 open, 1 stick, 2 slip."""
+def _fields(patch, time, tau, local, slide) -> dict:
+    """Frames of the interface: the pressed state first, then the given ones; status 0 open, 1 stick, 2 slip.
+
+    slide (f,): motion of the upper holder [m] in the given frames.
+    """
     still = _still(patch)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
@@ -89,7 +92,8 @@ def _fields(patch, time, tau, local) -> dict:
     moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
     status = np.where(patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(np.int8)
     return {"time": np.concatenate([[0.0], time]), "normal_stress": np.repeat(still["normal_stress"], count, axis=0),
-            "gap": np.repeat(still["gap"], count, axis=0), "shear_stress": tau, "slip": slip, "status": status}
+            "gap": np.repeat(still["gap"], count, axis=0), "shear_stress": tau, "slip": slip, "status": status,
+            "holder_slide": np.concatenate([[0.0], slide])}
 
 
 def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
@@ -116,7 +120,7 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
         from .simulate_patch import measures
 
         found = measures(patch, coarse) | {k: m for k, m in found.items() if k != "normal_load"}
-        fields = _fields(patch, fine.time[fine.frames], fine.tau, fine.local)
+        fields = _fields(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
     return Result(what, Outcome.DONE, _without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
                   {"engine": "bench", "steps": steps})
 
@@ -132,8 +136,8 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
     if patch is not None and scene.contact.shear is None and not settings.per_point:
-        warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, the pressure on the upper piece "
-                    "and constant load the patch moves exactly as one point under the same load; add [contact.shear]"]
+        warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
+                    "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
         raw = rig.run_exact(scene, settings, modes, drive, load, progress)
@@ -161,7 +165,7 @@ def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, sa
 
     frames = FRAMES if patch is not None else 0
     raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
-    seconds["march"], seconds["error"] = raw.seconds, 0.0
+    seconds |= {"march": raw.seconds, "reduce": raw.prepare["reduce"], "load": raw.prepare["load"], "error": 0.0}
     if not estimate:
         return raw, settings, rig.with_errors(raw.values)
     half = rig.run_march(scene, replace(settings, steps=max(4, settings.steps // 2)), modes, drive, patch)
@@ -210,7 +214,8 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // settings.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
-        return _fields(patch, raw.window.time[at], tau, np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1))
+        slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
+        return _fields(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
     shear = scene.contact.shear is not None
@@ -233,7 +238,7 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
-    return _fields(patch, time, tau, local)
+    return _fields(patch, time, tau, local, np.array([s["slide"] for s in shots]))
 
 
 _KINDS = {"patch": _static, "bench": _bench, "rig": _rig, "linear": _rig}

@@ -323,7 +323,7 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     return burnt, True
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", cache=True)
 def contact_state(kind, c, q, held):
     """(friction force [N], stored energy [J], irreversible slip [m]) of the contact as it stands."""
     if kind == COULOMB:

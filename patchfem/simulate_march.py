@@ -131,6 +131,12 @@ def _response(rows, number, dt, modes, drive) -> Response:
                     accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3])
 
 
+def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
+    """Load the compiled loop, or compile it, by a march of no steps."""
+    run = _Run(modes, drive, model, 4, np.inf, load_kernels(say))
+    run.cycle(0, 0, [])
+
+
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None) -> MarchResult:
     """March from rest for `cycles` drive cycles at `steps_per_cycle` steps.
@@ -187,7 +193,7 @@ class _Run:
         """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
         first, before, parts = self.done, self.ledger[8], []
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
-        for piece in np.diff(edges):
+        for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, 2 * self.modes.omega.size + 4))
             did, status = self.hub.march(self.done, int(piece), self.state, self.held, self.arrays, self.steps,
                                          self.drive.acceleration, self.modes.mass, self.model.kind,

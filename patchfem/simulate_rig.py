@@ -53,6 +53,7 @@ class Raw:
     book: dict
     seconds: float
     model: object = None
+    prepare: dict | None = None
 
 
 def drive_of(scene) -> BaseSine:
@@ -202,7 +203,11 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     from . import simulate_march as hub
 
     travel = scene.structure.travel or np.inf
+    begin = perf_counter()
     model = contact_model(scene, settings, patch, drive)
+    reduced = perf_counter() - begin
+    hub.warm_up(modes, drive, model, say)
+    loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
                      progress)
@@ -221,7 +226,7 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     stuck = values["slip_amplitude"] < (1e-3 * length if model.kind else 1e-300)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, w, window_amplitudes(done.amplitudes, settings.window), outcome, done.snapshots,
-               done.ledger, seconds, model)
+               done.ledger, seconds, model, {"reduce": reduced, "load": loaded})
 
 
 def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:

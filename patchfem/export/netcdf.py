@@ -44,8 +44,9 @@ def dataset(histories: dict, modal, fields: dict, x, weight) -> xr.Dataset:
         coords["frame_time"] = ("frame", fields["time"], {"units": "s", "long_name": "time of the frame"})
         for name, values in fields.items():
             if name == "status":
-                data[name] = (("frame", "x"), values, {"long_name": "contact status", "flag_meanings": "open stick slip",
-                                                       "flag_values": np.array([0, 1, 2], np.int8)})
+                flags = {"long_name": "contact status", "flag_meanings": "open stick slip",
+                         "flag_values": np.array([0, 1, 2], np.int8)}
+                data[name] = (("frame", "x"), values, flags)
             elif np.ndim(values) == 2:
                 data[name] = (("frame", "x"), values, _attributes(name))
     return xr.Dataset(data, coords)

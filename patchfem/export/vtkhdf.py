@@ -14,7 +14,7 @@ LINE, QUAD = 3, 9
 
 
 def write_series(path: Path, points, quads, lines, times, point_data: dict, cell_data: dict, units: dict) -> None:
-    """points (N, 3), quads (t, 4), lines (l, 2); times (f,); data: name -> (f, N or cells, ...) or (1, ...) if constant.
+    """points (N, 3), quads (t, 4), lines (l, 2); times (f,); data: name -> (f or 1, N or cells, ...), 1 if constant.
 
     The file is written whole beside `path` and then renamed; written with an HDF5 version that VTK's reader knows.
     """

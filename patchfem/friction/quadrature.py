@@ -130,7 +130,8 @@ class Quadrature:
             return state
         kept = {name: getattr(state, name)[first:] for name in
                 ("q", "path", "damage", "growth", "mature", "span", "eps", "sigma")}
-        return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0), dropped=state.dropped + first)
+        return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0),
+                       dropped=state.dropped + first)
 
     def weights(self, state: Strips) -> np.ndarray:
         """(k,) signed weight [1] of each strip: tau = mu_s sum_k weight_k sigma_k. The first is the initial cohort."""

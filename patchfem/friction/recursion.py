@@ -40,7 +40,7 @@ def shape_functions(x):
 
 
 def moments(x, e):
-    """Integrals from 0 to x of y exp(-y), y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x)."""
+    """Integrals 0..x of y exp(-y), of y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x)."""
     series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
     c = np.where(x < 0.5, x**4 * series, 6 - e * (x**3 + 3 * x * x + 6 * x + 6))
     third = (c + x**3 * e) / 3

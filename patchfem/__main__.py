@@ -1,0 +1,210 @@
+"""The command line. Nothing scientific is imported until a verb needs it."""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import App, CycloptsError, Parameter
+
+from . import __version__
+
+app = App(name="patchfem", version=__version__, help_format="plaintext",
+          help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
+Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
+NOT_BUILT = ("sweep", "cost", "fit", "profile", "compare", "report", "view", "import", "export", "demo", "new",
+             "schema", "doctor", "cite")
+
+
+def say(text: str) -> None:
+    """One line on stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def _scene(path: Path, sets):
+    from .scene import load
+
+    return load(path, sets)
+
+
+@app.command
+def check(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False):
+    """Name every mistake in SCENE; compute nothing."""
+    found = _scene(scene, set_)
+    for remark in found.remarks:
+        say(f"{scene}: {remark}")
+    if json_:
+        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks}))
+    else:
+        print(f"{scene}: a {found.kind} scene without mistakes")
+
+
+@app.command
+def plan(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
+         probe: Annotated[bool, Parameter(negative=())] = False):
+    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; --probe solves the static patch."""
+    from .simulate_plan import plan as make
+
+    found = make(_scene(scene, set_))
+    answer = found.as_json()
+    if probe and found.scene.contact is not None:
+        from .simulate_patch import solve_both, values
+
+        solved = values(solve_both(found.scene, False)[0])
+        answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] \
+            if found.scene.contact.shear is not None else "rigid"
+        answer["probe"] = solved
+    if json_:
+        print(json.dumps(answer))
+        return
+    _print_plan(answer, probe)
+
+
+def _print_plan(answer: dict, probe: bool) -> None:
+    print(f"kind     {answer['kind']}, engine {answer['engine']}")
+    for effect in answer["effects"]:
+        print(f"  runs   {effect['effect']:<28} {effect['equations']}")
+    print(f"  not    {', '.join(answer['not_in_scene'])}")
+    print("sizes    " + ", ".join(f"{k} {v}" for k, v in answer["unknowns"].items()) + f", steps {answer['steps']}")
+    print(f"cost     about {answer['seconds']:.1f} s and {answer['bytes'] / 1e6:.0f} MB")
+    print("chain    " + " -> ".join(f"{k} {v:.4g} N/m" if not isinstance(v, str) else f"{k} {v}"
+                                   for k, v in answer["stiffness_chain"].items()))
+    if not probe and not isinstance(answer["stiffness_chain"].get("pieces_shear", "rigid"), str):
+        print("         pieces_shear is an upper estimate from the layers; --probe solves it")
+    print("groups   " + ", ".join(f"{k} {v:.4g}" for k, v in answer["groups"].items()))
+    for sentence in answer["verdict"]:
+        print(f"verdict  {sentence}")
+
+
+@app.command
+def run(scene: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None, set_: Sets = (),
+        json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
+        resume: Annotated[bool, Parameter(negative=())] = False,
+        quiet: Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())] = False,
+        verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
+    """Run SCENE and write its results folder, by default out/<scene name>."""
+    if resume:
+        raise Refused("run: --resume is not yet built; run the scene again")
+    found = _scene(scene, set_)
+    from .simulate import plan as make
+    from .simulate import run as simulate
+    from .simulate_files import write
+
+    talk = (lambda text: None) if quiet else say
+    what = make(found)
+    if verbose:
+        talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
+    target = out or Path("out") / found.path.stem
+    with _progress(quiet or json_) as progress:
+        result = simulate(what, talk, progress)
+    answer = write(result, target)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        _print_answer(answer, target, verbose)
+
+
+class _progress:
+    """A bar on a terminal, nothing elsewhere; the call takes the done share."""
+
+    def __init__(self, silent: bool):
+        self.bar = None
+        if not silent and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self.bar = Progress(console=Console(stderr=True), transient=True)
+            self.task = self.bar.add_task("running", total=1.0)
+
+    def __enter__(self):
+        if self.bar is None:
+            return None
+        self.bar.start()
+        return lambda share: self.bar.update(self.task, completed=share)
+
+    def __exit__(self, *_):
+        if self.bar is not None:
+            self.bar.stop()
+
+
+def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
+    from .core import Outcome
+
+    print(f"{answer['outcome']}: {Outcome(answer['outcome']).sentence}")
+    for name, m in answer["measures"].items():
+        error = "" if m["error"] is None else f" ± {m['error']:.2g}"
+        value = "-" if m["value"] is None else f"{m['value']:.6g}"
+        print(f"  {name:<42} {value}{error} {m['unit']}")
+    for text in answer["warnings"]:
+        say(f"warning: {text}")
+    if verbose:
+        say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
+    print(f"results: {target}")
+
+
+@app.command
+def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], set_: Sets = ()):
+    """Write the tagged mesh of SCENE as .msh or .vtu."""
+    found = _scene(scene, set_)
+    if found.contact is None:
+        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
+    from .mesh.files import write_mesh
+    from .simulate_patch import grid_of
+
+    grid = grid_of(found)
+    write_mesh(grid, out)
+    print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")
+
+
+class Refused(Exception):
+    """A request that the command line itself turns down, exit code 2."""
+
+
+def main(argv: list | None = None) -> None:
+    """Entry point: exit codes 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, 130 interrupted."""
+    words = sys.argv[1:] if argv is None else argv
+    sys.exit(_guarded(words))
+
+
+def _guarded(words: list) -> int:
+    from .scene import SceneError
+
+    try:
+        if words and words[0] in NOT_BUILT:
+            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, mesh")
+        app(words, exit_on_error=False, print_error=False)
+        sys.stdout.flush()
+        return 0
+    except SceneError as error:
+        for line in error.mistakes:
+            say(line)
+        return 2
+    except (Refused, CycloptsError) as error:
+        say(f"patchfem: {' '.join(str(error).split())}")
+        return 2
+    except KeyboardInterrupt:
+        say("interrupted; nothing was replaced")
+        return 130
+    except MemoryError:
+        say("out of memory; make contact.element_size larger or the run shorter")
+        return 4
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        say(f"{error.filename or 'patchfem'}: {error.strerror or error}")
+        return 4
+    except Exception as error:
+        code = getattr(error, "code", None)
+        if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
+            say(str(error))
+            return code
+        say(f"patchfem: internal fault, please report it: {type(error).__name__}: {error}")
+        if os.environ.get("PATCHFEM_DEBUG"):
+            raise
+        return 1
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,170 @@
+"""A finished run on disk: summary, netCDF, fields, resolved scene and report in one results folder."""
+
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from . import __version__
+from .effects import EFFECTS
+from .export.results import Folder
+from .export.summary import summary, write_json
+from .simulate import Result
+
+PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
+
+
+def versions() -> dict:
+    """Versions of the interpreter and of the packages that compute."""
+    out = {"python": ".".join(map(str, sys.version_info[:3]))}
+    for name in PACKAGES:
+        try:
+            out[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return out
+
+
+def summary_of(result: Result) -> dict:
+    """The object of summary.json."""
+    what = result.plan
+    return summary(__version__, what.scene.title, what.kind, str(result.outcome), result.measures, effects_of(result),
+                   list(what.not_in_scene), result.warnings, result.seconds)
+
+
+def effects_of(result: Result) -> list:
+    """[{"effect", "equations", "seconds"}]: the law and the modes share one loop, whose time stands with the law."""
+    patch, out = result.patch, []
+    loop = result.seconds.get("march", result.seconds.get("bench", 0.0))
+    for name in result.plan.effects:
+        seconds = 0.0
+        if patch is not None and name == "contact":
+            seconds = sum(patch.seconds.get(k, 0.0) for k in ("assemble", "condense", "press"))
+        elif patch is not None and name in ("contact.tilt", "contact.crown"):
+            seconds = patch.seconds.get(name.removeprefix("contact."), 0.0)
+        elif name == "contact.shear":
+            seconds = result.seconds.get("reduce", 0.0)
+        elif name.startswith("friction.law=") or (name == "structure" and result.plan.kind == "linear"):
+            seconds = loop
+        out.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": round(float(seconds), 6)})
+    return out
+
+
+def write(result: Result, target: Path, say=None) -> dict:
+    """Write the results folder `target` (an older one is replaced only when the new one is whole); the summary."""
+    say = say or (lambda text: None)
+    with Folder(target) as folder:
+        begin = perf_counter()
+        scene = result.plan.scene
+        text = scene.resolved()
+        (folder.path / "scene.resolved.toml").write_text(text, encoding="utf-8")
+        _write_netcdf(result, folder.path / "result.nc", text)
+        data = report_data(result)
+        if result.patch is not None:
+            data["bodies"] = _write_fields(result, folder.path / "fields.vtkhdf")
+        from .export.report import write_report
+
+        result.seconds["files"] = perf_counter() - begin
+        write_report(folder.path / "report.html", data)
+        result.seconds["files"] = perf_counter() - begin
+        answer = summary_of(result)
+        write_json(answer, folder.path / "summary.json")
+    say(f"results in {target}")
+    return answer
+
+
+def _histories(result: Result) -> tuple:
+    kind, r = result.plan.kind, result.response
+    if r is None:
+        return {}, None
+    if kind == "bench":
+        return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
+                "friction_force": r.force, "normal_load": r.load}, None
+    out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
+           "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
+    if kind == "rig":
+        out |= {"friction_force": r.force, "normal_load": np.full(r.time.size, result.measures["normal_load"].value)}
+    modes = [mode.name for mode in result.plan.scene.structure.mode]
+    return out, (modes, r.modal)
+
+
+def _write_netcdf(result: Result, path: Path, text: str) -> None:
+    from .export.netcdf import dataset, write
+
+    histories, modal = _histories(result)
+    patch = result.patch
+    x, weight = (patch.grid.x, patch.pieces.interface.weight) if patch is not None else (None, None)
+    fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
+    write(dataset(histories, modal, fields, x, weight), path, summary_of(result), text, versions())
+
+
+def _write_fields(result: Result, path: Path) -> dict:
+    """Both bodies and the interface, frame by frame, of one pair; the pressed state for the report's picture."""
+    from .contact.elasticity import cell_stress, displacement
+    from .export.vtkhdf import bodies, write_series
+    from .mesh.files import pair_mesh
+
+    patch, fields = result.patch, result.fields
+    piece, weight = patch.piece, patch.pieces.interface.weight
+    per = 1 / patch.pieces.interface.width
+    times = fields["time"]
+    tau = fields.get("shear_stress", np.zeros((len(times), patch.grid.x.size)))
+    shear = np.concatenate([np.zeros((1, tau.shape[1])), tau * weight * per])
+    normal = np.zeros_like(shear)
+    normal[0] = patch.pressure.sigma_n * weight * per
+    u = displacement(piece, shear, normal)
+    down, along = u[:1], u[1:]
+    s_down, s_along = cell_stress(piece, down)[0], cell_stress(piece, along)[0]
+    flip = np.array([1, 1, 1, -1.0])  # the inward axis points to -y in the lower piece, to +y in the upper one
+    s_lower, s_upper = (s_down + s_along) * flip, s_down - s_along
+    p, y = patch.pressure, np.tile(patch.grid.depth, patch.grid.x.size)
+    x = np.repeat(patch.grid.x, patch.grid.depth.size)
+    lower = (down + along) * [1, -1]
+    upper = (down - along) * [1, 1]
+    upper[..., 0] += fields.get("holder_slide", np.zeros(len(times)))[:, None] - p.rotation * y
+    upper[..., 1] += p.rotation * x - p.approach
+    interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
+    points, quads, lines, point_data, cell_data = bodies(
+        pair_mesh(patch.grid), len(times), lower, upper, s_lower, s_upper, mises(s_lower), mises(s_upper), interface,
+        patch.grid.depth.size)
+    units = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "part": "1", "material": "1",
+             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1"}
+    used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
+    write_series(path, points, quads, lines, times, point_data, cell_data, used)
+    shape = (2, patch.grid.x.size - 1, patch.grid.depth.size - 1)
+    return {"depth": patch.grid.depth, "mises": np.stack([mises(s_lower)[0], mises(s_upper)[0]]).reshape(shape)}
+
+
+def mises(s: np.ndarray) -> np.ndarray:
+    """Von Mises stress [Pa] of (..., 4) stresses xx, yy, zz, xy."""
+    xx, yy, zz, xy = np.moveaxis(s, -1, 0)
+    return np.sqrt(((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) / 2 + 3 * xy**2)
+
+
+def report_data(result: Result) -> dict:
+    """Plain arrays and texts for the report page."""
+    scene, r, w = result.plan.scene, result.response, result.window
+    data = {"summary": summary_of(result), "scene": scene.text, "resolved": scene.resolved(),
+            "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
+            "x": None if result.patch is None else result.patch.grid.x, "versions": versions()}
+    if r is not None:
+        slow = result.plan.kind == "bench"
+        data["history"] = {"time": r.time, "displacement": r.slide if slow else r.output, "force": r.force}
+        data["loop"] = {"slide": w.slide, "force": w.force, "time": w.time}
+        if not slow:
+            data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
+                              "base": w.base_acceleration, "force": w.force, "slide": w.slide}
+            data["loop"] |= {"period": 1 / scene.drive.frequency}
+    if scene.measured is not None:
+        from .response.measured import read_table
+
+        table = read_table(scene.beside(scene.measured.file))
+        data["measured"] = {"rows": table, "frequency": scene.drive.frequency if scene.drive else None,
+                            "gain": scene.measured.acceleration_gain}
+        if scene.drive is not None:
+            from .simulate_rig import drive_of
+
+            data["measured"]["input"] = drive_of(scene).acceleration
+    return data
