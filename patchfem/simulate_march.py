@@ -39,8 +39,8 @@ class ContactModel:
         if r:
             scale[1:] = self.limit / np.maximum(contact.psi.T @ (contact.weight * contact.source), 1e-300)
             scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((contact.psi**2).mean(axis=0)))
-        work = hub.Work(np.zeros(1 + r), np.zeros(1 + r), np.zeros((1 + r, 1 + r)), np.zeros(1 + r), np.zeros(1 + r),
-                        scale, np.zeros((2, 1 + r)), np.full(1, self.length))
+        work = hub.Work(np.zeros(1 + r), np.zeros(1 + r), np.zeros((1 + r, 1 + r)), np.zeros(contact.weight.size),
+                        np.zeros(1 + r), np.zeros(1 + r), scale, np.zeros((2, 1 + r)), np.full(1, self.length))
         return contact, work
 
 

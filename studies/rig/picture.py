@@ -1,0 +1,49 @@
+"""What does the rig scene look like on one picture? `rig.svg`, the picture of the README, drawn from a run.
+
+Run: python studies/rig/picture.py
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from patchfem import scene, simulate
+from patchfem.core import G_N
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.response.measured import read_table
+
+HERE = Path(__file__).parent
+
+
+def main(path: Path = HERE / "rig.svg") -> Path:
+    """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
+    found = simulate.run(simulate.plan(scene.load(HERE / "rig.toml")), estimate=False)
+    x, fields, window = found.patch.grid.x * 1e3, found.fields, found.window
+    rows = [r for r in read_table(HERE / "table1.csv") if abs(r.frequency - 143) < 0.5 and r.acceleration]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 2.7))
+        FigureCanvasSVG(figure)
+        a, b, c, d = figure.subplots(1, 4)
+        a.fill_between(x, fields["normal_stress"][0] / 1e6, color=BLUE, alpha=0.3, lw=0)
+        a.set(title="σn(x) [MPa]", xlabel="x [mm]", xlim=(-6.4, -3.2))
+        for k in range(1, len(fields["shear_stress"])):
+            b.plot(x, fields["shear_stress"][k] / 1e6, color=ORANGE, lw=0.8, alpha=0.7)
+        b.set(title="τ(x), one cycle [MPa]", xlabel="x [mm]", xlim=(-6.4, -3.2))
+        c.plot(window.slide * 1e6, window.force, color=BLUE, lw=0.8)
+        c.set(title="friction force [N]", xlabel="slide [um]")
+        d.plot([r.input / G_N for r in rows], [r.acceleration / G_N for r in rows], "o", color=GREY, ms=4,
+               label="Table 1")
+        peak = found.measures["absolute_acceleration_peak"].value / G_N
+        d.plot([5], [peak], "D", color=BLUE, ms=5, label="computed")
+        d.set(title="acceleration [g], 143 Hz", xlabel="input [g]", ylim=(0, 14))
+        d.legend(frameon=False, fontsize=7)
+        figure.savefig(path, metadata={"Date": None})
+    assert np.isfinite(peak)
+    return path
+
+
+if __name__ == "__main__":
+    main()

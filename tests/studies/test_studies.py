@@ -1,0 +1,64 @@
+"""The sentences of the studies, checked by running them."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2] / "studies"
+
+
+def study(name):
+    """The module of a study by its path below studies/."""
+    path = ROOT / name
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_table_1_scores_of_the_rigid_coulomb_block(capsys):
+    """An independent event-driven model with an onset of 4.00 g scored 1.62 / 3.68 / 2.26 (200 cycles or more)."""
+    found = study("rig/table_1.py").main(400, models=("coulomb",))
+    assert found["coulomb"]["acceleration"] == pytest.approx(1.62, abs=0.01)
+    assert found["coulomb"]["displacement"] == pytest.approx(3.68, abs=0.01)
+    assert found["coulomb"]["all"] == pytest.approx(2.26, abs=0.01)
+    assert found["null"] == pytest.approx(0.116, abs=0.001)
+    assert capsys.readouterr().out.count(" Hz ") == 28
+    five = found["coulomb"]["cells"][143.0, 5 * 9.80665]
+    assert five.acceleration == pytest.approx(5.42, abs=0.01)
+
+
+def test_table_1_cells_of_the_patch_at_four_g():
+    """The always-on share: 135 and 143 Hz at 4 g, where partial slip and yaw move a block that Coulomb holds still."""
+    table = study("rig/table_1.py")
+    rows = [r for r in table.read_table(ROOT / "rig/table1.csv") if r.displacement and r.input < 40]
+    found = table.compute(rows, table.patch, 800)
+    measured = {135.0: 0.25, 143.0: 0.08}
+    for (frequency, _), cell in found.items():
+        assert cell.displacement == pytest.approx(measured[frequency], rel=0.15)
+        assert cell.displacement_error < 0.05 * cell.displacement
+
+
+@pytest.mark.slow
+def test_table_1_scores_of_the_patch():
+    found = study("rig/table_1.py").main(800, models=("patch",))
+    assert found["patch"]["acceleration"] == pytest.approx(1.625, abs=0.01)
+    assert found["patch"]["displacement"] == pytest.approx(3.37, abs=0.02)
+
+
+def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
+    flat, tilted = study("rig/tilt.py").main((0.0, 1e-3))
+    assert flat["contact_fraction"][0] == 1 and tilted["contact_fraction"][0] < 0.03
+    assert tilted["tangential_stiffness"][0] == pytest.approx(1.22e8, rel=0.02)
+    assert tilted["thresholds"][1] == pytest.approx(301e-9, rel=0.02)
+    for name, low in (("relative_displacement_amplitude", 0.93), ("loop_area", 0.916)):
+        (a, da), (b, db) = flat[name], tilted[name]
+        assert b / a == pytest.approx(low, abs=0.005) and a - b > 5 * (da + db)
+
+
+def test_always_the_printed_law_holds_the_block_tighter():
+    found = study("rig/readings.py").main()
+    name = "relative_displacement_amplitude"
+    assert found["report"][name][0] == pytest.approx(11.69e-6, abs=found["report"][name][1])
+    assert found["stretch"][name][0] == pytest.approx(14.69e-6, abs=found["stretch"][name][1])
