@@ -98,7 +98,7 @@ def _fields(patch, time, tau, local, slide) -> dict:
 
 def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from . import simulate_bench as bench
-    from .simulate_rig import with_errors
+    from .response.errors import change, step_error, with_errors
 
     scene = what.scene
     steps = bench.steps_of(scene)
@@ -107,12 +107,12 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     seconds["bench"] = fine.seconds
     others = []
     if estimate:
-        half = bench.run(scene, patch, max(4, steps // 8 * 4), 0, say)
-        seconds["error"] = half.seconds
-        others.append((fine.values, half.values))
+        half, quarter = (bench.run(scene, patch, max(4, steps // (4 * k) * 4), 0, say) for k in (2, 4))
+        seconds["error"] = half.seconds + quarter.seconds
+        others.append(step_error(fine.values, half.values, quarter.values, steps))
         if coarse is not None:
-            rough = bench.run(scene, coarse, max(4, steps // 8 * 4), 0, say)
-            others.append((half.values, rough.values))
+            rough = bench.run(scene, coarse, max(4, steps // 16 * 4), 0, say)
+            others.append(change(quarter.values, rough.values))
             seconds["error"] += rough.seconds
     found = with_errors(fine.values, *others, least=1e-10)
     fields = {}
@@ -131,6 +131,7 @@ def _without_errors(found: dict, estimate: bool) -> dict:
 
 def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from . import simulate_rig as rig
+    from .response.errors import with_errors
 
     scene = what.scene
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
@@ -142,7 +143,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
         raw = rig.run_exact(scene, settings, modes, drive, load, progress)
         seconds["march"] = raw.seconds
-        found = rig.with_errors(raw.values, least=1e-9)
+        found = with_errors(raw.values, least=1e-9)
     else:
         rig.refuse_costly(scene, settings, drive)
         raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
@@ -160,46 +161,51 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
 
 
 def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress, estimate) -> tuple:
-    """The march with its error: half the steps, a coarser mesh, fewer shear modes; steps double until it is met."""
+    """The march with its error: half and a quarter of the steps, a coarser mesh, fewer shear modes; an automatic step
+    is halved until the error of the displacement is met."""
     from . import simulate_rig as rig
+    from .response.errors import step_error, with_errors
 
     frames = FRAMES if patch is not None else 0
     raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
     seconds |= {"march": raw.seconds, "reduce": raw.prepare["reduce"], "load": raw.prepare["load"], "error": 0.0}
     if not estimate:
-        return raw, settings, rig.with_errors(raw.values)
-    half = rig.run_march(scene, replace(settings, steps=max(4, settings.steps // 2)), modes, drive, patch)
-    seconds["error"] += half.seconds
-    rest = _space_errors(scene, settings, modes, drive, patch, coarse, half, seconds)
+        return raw, settings, with_errors(raw.values)
+    half, quarter = (rig.run_march(scene, replace(settings, steps=max(4, settings.steps // k)), modes, drive, patch)
+                     for k in (2, 4))
+    seconds["error"] += half.seconds + quarter.seconds
+    rest = _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds)
     tolerance = scene.accuracy.tolerance
     while True:
-        found = rig.with_errors(raw.values, (raw.values, half.values), *rest, least=1e-9)
+        step = step_error(raw.values, half.values, quarter.values, settings.steps)
+        found = with_errors(raw.values, step, *rest, least=1e-9)
         main = found["relative_displacement_amplitude"]
         met = main.error <= tolerance * abs(main.value) + main.floor
         again = settings.steps * 2
         if met or "steps_per_cycle" in settings.pinned or again > rig.MOST_STEPS or again * settings.cycles > 1e7 \
                 or raw.outcome is Outcome.EXCEEDS_TRAVEL:
             return raw, settings, found
-        half, settings = raw, replace(settings, steps=again)
+        half, quarter, settings = raw, half, replace(settings, steps=again)
         seconds["error"] += raw.seconds
         raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
         seconds["march"] = raw.seconds
 
 
-def _space_errors(scene, settings, modes, drive, patch, coarse, half, seconds) -> list:
-    """Pairs of values whose difference is the error of the mesh and of the shear modes, at half the steps."""
+def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds) -> list:
+    """Errors of the mesh and of the shear modes, both at a quarter of the steps."""
     from . import simulate_rig as rig
+    from .response.errors import change
 
     out = []
-    few = replace(settings, steps=max(4, settings.steps // 2))
+    few = replace(settings, steps=max(4, settings.steps // 4))
     if coarse is not None and scene.contact.shear is not None:
         rough = rig.run_march(scene, few, modes, drive, coarse)
-        out.append((half.values, rough.values))
+        out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
         if scene.friction.law == "nonlocal":
             fewer = rig.run_march(scene, replace(few, shear_modes=max(1, settings.shear_modes // 2)), modes, drive,
                                   patch)
-            out.append((half.values, fewer.values))
+            out.append(change(quarter.values, fewer.values))
             seconds["error"] += fewer.seconds
     return out
 

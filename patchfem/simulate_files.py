@@ -1,6 +1,7 @@
 """A finished run on disk: summary, netCDF, fields, resolved scene and report in one results folder."""
 
 import sys
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
@@ -57,8 +58,7 @@ def write(result: Result, target: Path, say=None) -> dict:
     say = say or (lambda text: None)
     with Folder(target) as folder:
         begin = perf_counter()
-        scene = result.plan.scene
-        text = scene.resolved()
+        text = resolved(result.plan.scene)
         (folder.path / "scene.resolved.toml").write_text(text, encoding="utf-8")
         _write_netcdf(result, folder.path / "result.nc", text)
         data = report_data(result)
@@ -73,6 +73,27 @@ def write(result: Result, target: Path, say=None) -> dict:
         write_json(answer, folder.path / "summary.json")
     say(f"results in {target}")
     return answer
+
+
+def resolved(scene) -> str:
+    """The scene in SI with every default written out, also those that follow from other keys."""
+    contact, friction = scene.contact, scene.friction
+    if contact is not None and contact.element_size is None and contact.mesh is None:
+        from .simulate_patch import AUTOMATIC_CELLS
+
+        contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})
+    if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
+        if scene.kind == "bench":
+            from .simulate_bench import bonds_of
+
+            law = bonds_of(scene)
+        else:
+            from .simulate_rig import drive_of, law_of
+
+            drive = drive_of(scene)
+            law = law_of(scene, drive.acceleration / drive.omega)
+        friction = friction.model_copy(update={"rest_speed": law.rest_speed})
+    return replace(scene, contact=contact, friction=friction).resolved()
 
 
 def _histories(result: Result) -> tuple:
@@ -146,7 +167,7 @@ def mises(s: np.ndarray) -> np.ndarray:
 def report_data(result: Result) -> dict:
     """Plain arrays and texts for the report page."""
     scene, r, w = result.plan.scene, result.response, result.window
-    data = {"summary": summary_of(result), "scene": scene.text, "resolved": scene.resolved(),
+    data = {"summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
             "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
             "x": None if result.patch is None else result.patch.grid.x, "versions": versions()}
     if r is not None:

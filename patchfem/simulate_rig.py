@@ -9,8 +9,6 @@ import numpy as np
 from .core import BaseSine, Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
-    FLOORS,
-    UNITS,
     circular_mean,
     classify,
     interface_loop,
@@ -21,8 +19,8 @@ from .response.measures import (
 from .structure.modes import basis
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
-LIST_LIMIT = 3e6  # steps times expected list entries beyond which a bond list in the rig is refused ... see list_cost
 SHEAR_MODES = 8
+LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +168,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
 
 def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None) -> Raw:
     """Closed-form run of a Coulomb scene, or of a structure without friction."""
-    from .dynamics.histories import SAMPLES, simulate
+    from .dynamics.histories import simulate
 
     f = scene.friction
     static, kinetic = (f.static * load, f.kinetic * load) if f is not None else (0.0, 0.0)
@@ -193,7 +191,6 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
         values.pop("friction_force_peak")
     stuck = f is not None and done.stick >= span * (1 - 1e-12)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    del SAMPLES
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window), outcome, [],
                done.ledger, perf_counter() - begin)
 
@@ -243,7 +240,7 @@ def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:
     return entries, settings.cycles * settings.steps * 15 * (2 + entries) * 3e-8
 
 
-def refuse_costly(scene, settings: Settings, drive: BaseSine, limit: float = 600.0) -> None:
+def refuse_costly(scene, settings: Settings, drive: BaseSine, limit: float = LONGEST) -> None:
     """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = scene.friction
     if f is None or f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
@@ -253,20 +250,6 @@ def refuse_costly(scene, settings: Settings, drive: BaseSine, limit: float = 600
         raise Missing(f"{scene.path}: the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
                       f"more than {limit:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, loosen accuracy.tail "
                       "or accuracy.merge, or use reading = \"stretch\" with order = 1")
-
-
-def with_errors(values: dict, *differences: dict, least: float = 0.0) -> dict:
-    """name -> Measure, the error being the sum of |changes| from coarser runs plus `least` of the value."""
-    out = {}
-    for name, value in values.items():
-        error = abs(value) * least
-        for other in differences:
-            fine, coarse = other
-            if name in fine and name in coarse:
-                change = abs(fine[name] - coarse[name])
-                error += min(change, np.pi - change) if name == "slip_start_phase" else change
-        out[name] = Measure(value, UNITS[name], float(error), FLOORS.get(name, 0.0))
-    return out
 
 
 def settle(raw: Raw, measures: dict, tolerance: float) -> tuple:

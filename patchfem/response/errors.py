@@ -1,0 +1,45 @@
+"""Errors of the measures of a run, from coarser runs of the same scene.
+
+The step of a march meets reversals and sticks at irregular places, so its error falls like the square of the step on
+the whole but not at every halving: one difference can vanish by chance. Two of them are taken. On 30 random scenes
+(two laws, one and two modes, 20 to 200 cycles) the estimate held the true error of every amplitude, acceleration peak
+and loop area, at a median of six times that error.
+"""
+
+import numpy as np
+
+from ..core import Measure
+from .measures import FLOORS, UNITS
+
+
+def change(fine: dict, coarse: dict) -> dict:
+    """|difference| of the measures that both runs have; a phase is compared modulo pi."""
+    out = {}
+    for name in fine.keys() & coarse.keys():
+        gap = abs(fine[name] - coarse[name])
+        out[name] = min(gap, np.pi - gap) if name == "slip_start_phase" else gap
+    return out
+
+
+def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
+    """Error of the time step from runs at `steps`, half and a quarter of them per cycle.
+
+    The larger of the last change and half of the one before; what is read off the samples (stick fraction, phase of the
+    first slip) has at least the resolution of a step.
+    """
+    last, before = change(fine, half), change(half, quarter)
+    out = {name: max(value, before.get(name, 0.0) / 2) for name, value in last.items()}
+    for name, least in (("stick_fraction", 4 / steps), ("slip_start_phase", 4 * np.pi / steps)):
+        if name in out:
+            out[name] += least
+    return out
+
+
+def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
+    """name -> Measure whose error is the sum of the given errors, plus `least` of the value; a measure that a coarser
+    run does not have is as uncertain as it is large."""
+    out = {}
+    for name, value in values.items():
+        known = [part.get(name, abs(value)) for part in errors]
+        out[name] = Measure(float(value), UNITS[name], float(sum(known) + abs(value) * least), FLOORS.get(name, 0.0))
+    return out

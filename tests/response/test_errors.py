@@ -1,0 +1,82 @@
+"""Do the error bars of a march hold the true error? Random scenes against the same scene at 12800 steps per cycle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patchfem import scene, simulate_rig
+from patchfem.response.errors import change, step_error, with_errors
+
+TEXT = """
+[normal]
+load = "100 N"
+[friction]
+law = "{law}"
+static = {static}
+bond_length = "{length} um"
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = {damping}
+slide = 1.0
+{other}
+[drive]
+kind = "base"
+frequency = "{frequency} Hz"
+acceleration = "5 g"
+cycles = {cycles}
+"""
+OTHER = """[[structure.mode]]
+name = "yaw"
+frequency = "{} Hz"
+damping = 0.01
+slide = {}
+"""
+
+
+def random_scene(rng):
+    other = OTHER.format(rng.uniform(60, 400), rng.uniform(0.05, 0.3)) if rng.random() < 0.5 else ""
+    return scene.loads(TEXT.format(
+        law=rng.choice(["nonlocal", "elastic-plastic"]), static=rng.uniform(0.2, 0.55), length=10 ** rng.uniform(-1, 1),
+        damping=rng.choice([0.003, 0.01, 0.05]), other=other, frequency=rng.uniform(110, 180),
+        cycles=rng.choice([20, 60])))
+
+
+def coverage(count, seed):
+    """Share of (scene, measure) pairs whose error bar holds the true error."""
+    rng, held = np.random.default_rng(seed), []
+    for _ in range(count):
+        found = random_scene(rng)
+        settings, modes = simulate_rig.choose(found), simulate_rig.modes_of(found)
+        drive = simulate_rig.drive_of(found)
+        runs = {n: simulate_rig.run_march(found, replace(settings, steps=n), modes, drive, None).values
+                for n in (400, 200, 100, 12800)}
+        errors = step_error(runs[400], runs[200], runs[100], 400)
+        truth = change(runs[400], runs[12800])
+        for name, measure in with_errors(runs[400], errors).items():
+            if name in truth and name != "energy_balance":
+                held.append(truth[name] <= measure.error + measure.floor)
+    return float(np.mean(held))
+
+
+def test_always_error_bars_hold_the_true_error():
+    assert coverage(6, 5) >= 0.95
+
+
+@pytest.mark.slow
+def test_always_error_bars_hold_the_true_error_of_many_scenes():
+    assert coverage(40, 6) >= 0.95
+
+
+def test_exact_a_phase_is_compared_modulo_pi():
+    assert change({"slip_start_phase": 0.01}, {"slip_start_phase": np.pi - 0.01})["slip_start_phase"] == \
+        pytest.approx(0.02)
+
+
+def test_exact_a_chance_coincidence_does_not_hide_the_error():
+    """Equal values at the last two steps, a change before: half of that change stays as the error."""
+    name = "relative_displacement_amplitude"
+    assert step_error({name: 2.0}, {name: 2.0}, {name: 2.4}, 400)[name] == pytest.approx(0.2)

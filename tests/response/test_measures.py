@@ -1,0 +1,326 @@
+"""Measures on signals whose answers are known by hand, and tables of measurements as typed."""
+
+from math import acos, asin, cos, pi, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem import closed_forms
+from patchfem.core import G_N, BaseSine, Outcome, PatchfemError, Response
+from patchfem.response import measures
+from patchfem.response.measured import FLAGS, read_table
+from patchfem.simulate_march import hermite_extremes
+
+TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
+OMEGA = 2 * pi * 143
+DRIVE = BaseSine(5 * G_N, OMEGA)
+
+
+def cycles_of(count, steps):
+    """(time, drive phase) of `count` whole cycles with both ends."""
+    phase = 2 * pi * np.arange(count * steps + 1) / steps
+    return phase / OMEGA, phase
+
+
+def trapezium(time):
+    weight = np.full(time.size, 1.0)
+    weight[[0, -1]] = 0.5
+    return weight
+
+
+def response(time, slip=None, slide=None, force=None, acceleration=None):
+    zero = np.zeros(time.size)
+    pick = [zero if v is None else v for v in (slip, slide, force, acceleration)]
+    return Response(time, zero[:, None], zero[:, None], pick[1], zero, pick[1], zero, pick[3], zero, pick[2], pick[0])
+
+
+# energy and loop
+
+def test_exact_energy_balance():
+    book = {"work_in": 5.0, "stored": 1.0, "friction": 2.5, "viscous": 1.0, "power": 8.0, "peak_stored": 2.0}
+    assert measures.energy_balance(book) == pytest.approx(0.05, rel=1e-15)
+    assert measures.energy_balance(dict.fromkeys(book, 0.0)) == 0.0
+
+
+def test_exact_harmonic():
+    time, phase = cycles_of(3, 64)
+    values = 0.7 + 2 * np.cos(phase) - 3 * np.sin(phase) + 5 * np.cos(2 * phase) + np.sin(7 * phase)
+    found = measures.harmonic(time, trapezium(time), values, OMEGA)
+    assert found == pytest.approx(2 + 3j, abs=1e-12)
+
+
+@pytest.mark.parametrize("amplitude, length", [(3.0, 1.0), (1.5, 1.0), (1.0, 2.0)])
+def test_exact_loop_of_a_jenkins_element(amplitude, length):
+    """The first harmonic of a bilinear loop (Caughey 1960) and its area."""
+    time, phase = cycles_of(2, 20_000)
+    slide, force, stretch = amplitude * np.sin(phase), np.zeros(phase.size), 0.0
+    for k in range(1, phase.size):
+        stretch = min(max(stretch + slide[k] - slide[k - 1], -length), length)
+        force[k] = stretch / length
+    late = slice(20_000, None)
+    t, q, f = time[late], slide[late], force[late]
+    work = np.sum((f[1:] + f[:-1]) / 2 * np.diff(q))
+    area, _ = closed_forms.jenkins_loop(amplitude, length)
+    assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
+    found = measures.interface_loop(t, trapezium(t), q, f, OMEGA, work, 0.5)
+    turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
+    stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
+    assert found["loop_area"] == work
+    assert found["equivalent_stiffness"] == pytest.approx(stiffness, rel=1e-6)
+    assert found["equivalent_damping"] == pytest.approx(float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6,
+                                                       abs=1e-12)
+
+
+def test_exact_loop_measures_that_do_not_exist():
+    time, phase = cycles_of(1, 64)
+    still = measures.interface_loop(time, trapezium(time), np.ones(phase.size), np.sin(phase), OMEGA, 0.0, 1.0)
+    assert still == {"loop_area": 0.0}
+    free = measures.interface_loop(time, trapezium(time), np.sin(phase), np.cos(phase), OMEGA, 2.0, 0.0)
+    assert set(free) == {"loop_area", "equivalent_stiffness"}
+    assert free["equivalent_stiffness"] == pytest.approx(0.0, abs=1e-12)
+
+
+@given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
+def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope, shift):
+    time, phase = cycles_of(1, 128)
+    slide = offset + amplitude * np.sin(phase + shift)
+    force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
+    found = measures.interface_loop(time, trapezium(time), slide, force, OMEGA, 1.0, 0.0)
+    grid = (slide.max() - slide.min()) / 2 / amplitude  # the samples may miss the top
+    assert found["equivalent_stiffness"] == pytest.approx(slope / grid, abs=1e-10)
+
+
+# slip
+
+@pytest.mark.parametrize("floor", [0.2, 0.5, 0.9])
+def test_exact_slip_with_pauses(floor):
+    """Slip speed sign(sin) max(|sin| - c, 0): stuck share, first slip and stroke by hand."""
+    steps = 8000
+    time, _ = cycles_of(4, steps)
+    start = asin(floor)
+
+    def stroke(phase):
+        turn, part = np.divmod(phase, pi)
+        inside = np.clip(part, start, pi - start)
+        one = cos(start) - np.cos(inside) - floor * (inside - start)
+        full = 2 * cos(start) - floor * (pi - 2 * start)
+        return np.where(turn % 2 == 0, one, full - one)
+
+    found = measures.slip_measures(response(time, slip=stroke(OMEGA * time)), DRIVE, steps)
+    level = asin(floor + 1e-2 * (1 - floor))
+    assert found["slip_amplitude"] == pytest.approx(cos(start) - floor * (pi / 2 - start), rel=1e-6)
+    assert found["stick_fraction"] == pytest.approx(2 * level / pi, abs=3 / steps)
+    assert found["slip_start_phase"] == pytest.approx(level, abs=2 * pi / steps)
+
+
+def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
+    time, _ = cycles_of(2, 100)
+    still = measures.slip_measures(response(time), DRIVE, 100)
+    assert still == {"slip_amplitude": 0.0, "stick_fraction": 1.0}
+    steady = measures.slip_measures(response(time, slip=1e-3 * time), DRIVE, 100)
+    assert steady["stick_fraction"] == 0.0 and "slip_start_phase" not in steady
+
+
+@settings(max_examples=50)
+@given(st.floats(0, pi), st.floats(0, 0.4))
+def test_always_circular_mean(middle, spread):
+    found = measures.circular_mean([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
+    assert 0 <= found <= pi
+    assert min(abs(found - middle % pi), pi - abs(found - middle % pi)) < 1e-9
+
+
+@pytest.mark.parametrize("count", [2, 5, 10])
+def test_exact_drift(count):
+    time, phase = cycles_of(count, 50)
+    slide = 3e-6 * np.sin(phase + 0.3) + 2e-7 * phase / (2 * pi) + 1e-6
+    assert measures.drift(time, slide, DRIVE.period) == pytest.approx(2e-7, rel=1e-9)
+    assert measures.drift(time, np.full(time.size, 0.3), DRIVE.period) == 0.0
+
+
+def test_exact_drift_of_less_than_two_cycles():
+    time, phase = cycles_of(1, 50)
+    assert measures.drift(time, 2e-7 * phase / (2 * pi), DRIVE.period) == pytest.approx(2e-7, rel=1e-12)
+
+
+# peaks
+
+@pytest.mark.parametrize("shift", [0.3, 0.4, 0.5])
+def test_order_acceleration_peak_between_samples(shift):
+    """The top lies `shift` steps beside a sample; the parabola through three samples misses it by O(h^4)."""
+    errors, steps = [], (50, 100, 200)
+    for count in steps:
+        time, phase = cycles_of(2, count)
+        top = (7 + shift) * 2 * pi / count
+        found = measures.acceleration_peak(response(time, acceleration=-7 * np.cos(phase - top)))
+        errors.append(abs(found / 7 - 1))
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
+    assert errors[-1] < (2 * pi / steps[-1])**4 / 30
+
+
+def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
+    time = np.linspace(0, 1, 21)
+    round_top = response(time, acceleration=40 - 3 * (time - 0.513)**2)
+    assert measures.acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
+    jump = response(time, acceleration=np.where(time < 0.5, time, -0.2))
+    assert measures.acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
+    edge = response(time, acceleration=time)
+    assert measures.acceleration_peak(edge) == 1.0
+
+
+def test_exact_window_amplitudes():
+    low, high = -np.arange(1.0, 8.0), 2 * np.arange(1.0, 8.0)
+    extremes = np.column_stack([low, high])
+    # seven cycles in windows of three: the first one is left out; cycles count from 1
+    np.testing.assert_array_equal(measures.window_amplitudes(extremes, 3), [(8 + 4) / 2, (14 + 7) / 2])
+    np.testing.assert_array_equal(measures.window_amplitudes(extremes, 10), [(14 + 7) / 2])
+    np.testing.assert_array_equal(measures.window_amplitudes(extremes, 1), (high - low) / 2)
+
+
+def test_exact_run_measures():
+    time, phase = cycles_of(3, 100)
+    slide = 1e-6 * np.sin(phase)
+    window = response(time, slide=slide, force=3 * np.cos(phase), acceleration=8 * np.sin(phase))
+    book = {"work_in": 1.0, "stored": 0.0, "friction": 1.0, "viscous": 0.0, "power": 1.0, "peak_stored": 0.0}
+    extremes = np.array([[-9.0, 9.0], [-1e-6, 2e-6], [-1e-6, 1e-6], [-3e-6, 1e-6]])
+    found = measures.run_measures(window, extremes, book, DRIVE, 3)
+    assert found["relative_displacement_amplitude"] == pytest.approx(2.5e-6, rel=1e-15)
+    assert found["absolute_acceleration_peak"] == pytest.approx(8.0, rel=1e-6)
+    assert found["friction_force_peak"] == 3.0 and found["energy_balance"] == 0.0
+    assert found["drift_per_cycle"] == pytest.approx(0.0, abs=1e-20)
+    assert measures.run_measures(window, extremes, book, DRIVE, 3, 9.5)["absolute_acceleration_peak"] == 9.5
+    assert set(found) <= set(measures.UNITS) and set(found) <= set(measures.FLOORS)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.123, 0.5, 0.77])
+def test_exact_extremes_of_a_cubic(shift):
+    """A cubic is its own Hermite interpolant: y = 2 t^3 - 3 t^2 has its top 0 at 0 and its bottom -1 at 1."""
+    t = np.arange(-0.4, 1.41, 0.3) + 0.1 * shift
+    y, v = 2 * t**3 - 3 * t**2, 6 * t**2 - 6 * t
+    inner = slice(1, -1) if y[0] < -1 else slice(None)
+    low, high = hermite_extremes(y[inner], v[inner], 0.3)
+    assert low == pytest.approx(min(-1.0, y[inner].min()), abs=1e-14)
+    assert high == pytest.approx(max(0.0, y[inner].max()), abs=1e-14)
+
+
+def test_order_extremes_of_a_sine():
+    errors = []
+    for steps in (20, 40, 80):
+        _, phase = cycles_of(1, steps)
+        at = phase + 0.35 * 2 * pi / steps
+        low, high = hermite_extremes(np.sin(at), np.cos(at), 2 * pi / steps)
+        errors.append(max(abs(high - 1), abs(low + 1)))
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert rates == pytest.approx(4, abs=0.1) and errors[-1] < 1e-7
+
+
+# how a run ended
+
+@pytest.mark.parametrize("ratio", [0.3, 0.8, 0.97, 0.995, -0.6])
+def test_exact_geometric_tail_is_extrapolated(ratio):
+    a = 2.0 - 0.9 * ratio**np.arange(6)
+    outcome, steady, error = measures.classify(a, 1e-6)
+    assert outcome is Outcome.TRANSIENT
+    assert steady == pytest.approx(2.0, rel=1e-9)
+    assert error < 1e-9
+
+
+def test_exact_two_decays_are_bracketed_by_the_error():
+    n = np.arange(8)
+    _, steady, error = measures.classify(1.0 + 0.3 * 0.8**n + 0.1 * 0.4**n, 1e-9)
+    assert 0 < abs(steady - 1.0) < error
+
+
+@pytest.mark.parametrize("growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05**np.arange(6)])
+def test_exact_endless_growth(growth):
+    assert measures.classify(growth, 1e-3) == (Outcome.GROWS, None, None)
+
+
+def test_exact_slow_endless_growth_is_not_steady():
+    """Each window adds a tenth of the tolerance, for ever."""
+    assert measures.classify(1 + 1e-4 * np.arange(6), 1e-3)[0] is Outcome.GROWS
+
+
+@settings(max_examples=200)
+@given(st.lists(st.floats(-1e-8, 1e-8), min_size=2, max_size=8), st.floats(0.1, 10))
+def test_always_noise_is_steady(noise, size):
+    assert measures.classify(size * (1 + np.array(noise)), 1e-3) == (Outcome.STEADY, None, None)
+
+
+def test_exact_short_and_odd_runs():
+    assert measures.classify([1.0], 1e-3)[0] is Outcome.TRANSIENT
+    assert measures.classify([1.0, 1.0001], 1e-3)[0] is Outcome.STEADY
+    assert measures.classify([1.0, 1.1], 1e-3) == (Outcome.TRANSIENT, None, None)
+    assert measures.classify([1.0, 1.0, 1.0], 1e-3)[0] is Outcome.STEADY
+    assert measures.classify([0.0, 0.0, 0.0], 1e-3)[0] is Outcome.STEADY
+    assert measures.classify(5 - 0.5 * np.arange(6), 1e-3)[0] is Outcome.TRANSIENT
+
+
+def test_exact_every_measure_has_a_unit():
+    assert set(measures.FLOORS) <= set(measures.UNITS)
+
+
+# tables of measurements
+
+def test_table_1_as_typed():
+    rows = read_table(TABLE_1)
+    assert len(rows) == 28
+    assert sum(r.acceleration is not None for r in rows) == 27
+    assert sum(r.displacement is not None for r in rows) == 8
+    bare = [r for r in rows if r.acceleration is None]
+    assert [(r.frequency, r.input, r.displacement, r.flag) for r in bare] == [(143.0, 8 * G_N, None, "U")]
+    assert sum("R" in r.flag for r in rows) == 9 and sum("U" in r.flag for r in rows) == 3
+    assert all((r.displacement is None) == ("*" in r.flag or r in bare) for r in rows)
+    mine = next(r for r in rows if r.frequency == 143 and r.input == 5 * G_N and "R" not in r.flag)
+    assert mine.acceleration == pytest.approx(6 * G_N, rel=1e-15)
+    assert mine.displacement == pytest.approx(0.23 * 25.4e-6, rel=1e-15)
+
+
+def test_table_1_interface_force_at_the_onset():
+    """A rigid block of mass M at 143 Hz and 4 g needs the interface force a_abs - x omega_n^2 = 4.8 g times M."""
+    mine = next(r for r in read_table(TABLE_1) if r.frequency == 143 and r.input == 4 * G_N and "R" not in r.flag)
+    assert (mine.acceleration - mine.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
+
+
+def test_exact_units_of_a_table(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("\ufeffinput [m/s^2], displacement [um],frequency [kHz],flag\n2,3,0.1,UR\n\n4,,0.2,\n", "utf-8")
+    first, second = read_table(path)
+    assert (first.input, first.frequency, first.acceleration, first.flag) == (2.0, 100.0, None, "UR")
+    assert first.displacement == pytest.approx(3e-6, rel=1e-15)
+    assert (second.input, second.displacement, second.flag) == (4.0, None, "")
+    assert set("UR") < set(FLAGS)
+
+
+HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
+
+
+@pytest.mark.parametrize("text, wanted", [
+    ("", ":1: the measured table is empty"),
+    ("frequency,input [g]\n", ":1: column 'frequency'"),
+    ("frequency [Hz],input [lb]\n", ":1: column 'input [lb]'"),
+    ("frequency [Hz],speed [m/s]\n", ":1: column 'speed [m/s]'"),
+    ("frequency [Hz],flag\n", ":1: no column input"),
+    ("flag\n", ":1: no column frequency, input"),
+    (HEAD + "143,5,6.0,,\n143,6\n", ":3: 2 cells under 5 columns"),
+    (HEAD + "143,5,six,,\n", ":2: acceleration: 'six' is not a number"),
+    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a number"),
+    (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
+    (HEAD + ",5,6.0,,\n", ":2: frequency and input are wanted"),
+    (HEAD + "143,,6.0,,\n", ":2: frequency and input are wanted"),
+])  # fmt: skip
+def test_refuses_a_faulty_table(tmp_path, text, wanted):
+    path = tmp_path / "t.csv"
+    path.write_text(text, "utf-8")
+    with pytest.raises(PatchfemError) as caught:
+        read_table(path)
+    assert str(caught.value).startswith(f"{path}{wanted}")
+
+
+def test_refuses_a_file_that_cannot_be_read(tmp_path):
+    (tmp_path / "t.csv").write_bytes(b"frequency [Hz],input [g]\n\xff")
+    for path in (tmp_path / "t.csv", tmp_path / "none.csv", tmp_path):
+        with pytest.raises(PatchfemError, match="cannot be read"):
+            read_table(path)

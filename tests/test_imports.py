@@ -1,0 +1,163 @@
+"""What a scene does not name is not imported, and the command line answers at once."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from time import perf_counter
+
+import pytest
+
+RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
+PATCH = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+element_size = "0.5 mm"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.coating]
+material = "WC-Co"
+thickness = "6 mil"
+[contact.tilt]
+angle = "0.1 mrad"
+"""
+STRUCTURE = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 30
+"""
+POINT = """\
+[normal]
+load = "26 lbf"
+[friction]
+law = "coulomb"
+static = 0.3
+"""
+BENCH = POINT + """\
+[slide]
+kind = "triangle"
+amplitude = "10 um"
+speed = "5 mm/s"
+"""
+MODULES = "import json, sys; print(json.dumps(sorted(sys.modules)))"
+FROM_PYTHON = f"""\
+import sys
+from patchfem.scene import load
+from patchfem.simulate import plan, run
+result = run(plan(load(sys.argv[1])))
+assert result.measures
+{MODULES}
+"""
+FROM_SHELL = f"""\
+import sys
+from patchfem.__main__ import main
+try:
+    main(sys.argv[1:])
+except SystemExit as end:
+    assert not end.code, end.code
+{MODULES}
+"""
+ALWAYS = {"pyvista", "meshio", "numba"}
+
+
+def loaded(code: str, *words) -> set:
+    """Names in sys.modules after `code` ran in a fresh interpreter."""
+    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True,
+                          env=os.environ | {"MPLBACKEND": "svg"}, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def absent(modules: set, *stages) -> None:
+    """None of the packages of ALWAYS and none of these stages (and packages) are among the modules."""
+    for name in {*ALWAYS, *stages}:
+        here = name if name in ("skfem", *ALWAYS) else f"patchfem.{name}"
+        assert not {m for m in modules if m == here or m.startswith(here + ".")}, name
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def write(text):
+        path = tmp_path / "scene.toml"
+        path.write_text(text, "utf-8")
+        return path
+    return write
+
+
+def test_exact_a_patch_needs_no_motion(scene):
+    modules = loaded(FROM_PYTHON, scene(PATCH))
+    absent(modules, "friction", "structure", "dynamics", "response", "simulate_rig", "simulate_march",
+           "simulate_kernels", "compiled")
+    assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor", "skfem"} <= modules
+
+
+def test_exact_a_rubbing_point_needs_no_patch(scene):
+    modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE))
+    absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled")
+    assert {"patchfem.dynamics.events", "patchfem.structure.modes"} <= modules
+
+
+def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
+    modules = loaded(FROM_PYTHON, scene(STRUCTURE))
+    absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled")
+    assert "patchfem.dynamics.events" in modules
+
+
+def test_exact_a_bench_needs_no_structure(scene):
+    modules = loaded(FROM_PYTHON, scene(BENCH))
+    absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled",
+           "dynamics.events", "dynamics.histories")
+    assert "patchfem.friction.local" in modules
+
+
+@pytest.mark.parametrize("text", [POINT + STRUCTURE, STRUCTURE, BENCH], ids=["rig", "linear", "bench"])
+def test_exact_results_without_a_patch_need_no_mesh(scene, tmp_path, text):
+    modules = loaded(FROM_SHELL, "run", scene(text), "-o", tmp_path / "out", "-q")
+    absent(modules, "contact", "mesh", "skfem")
+    assert not list((tmp_path / "out").glob("fields*"))
+
+
+def test_exact_a_patch_is_written_without_pyvista(scene, tmp_path):
+    modules = loaded(FROM_SHELL, "run", scene(PATCH), "-o", tmp_path / "out", "-q")
+    assert not {"pyvista", "vtkmodules", "numba"} & modules
+
+
+@pytest.mark.parametrize("words", [("check", RIG), ("--help",), ("check", "--help"), ("--version",)],
+                         ids=["check", "help", "verb help", "version"])
+def test_exact_light_verbs_import_nothing_heavy(words):
+    modules = loaded(FROM_SHELL, *words)
+    assert not {"numpy", "scipy", "skfem", "numba", "matplotlib", "xarray", "h5py", "pyvista", "meshio"} & modules
+
+
+def best_of(count: int, *words) -> float:
+    """Shortest wall-clock time [s] of an interpreter with these words."""
+    best = float("inf")
+    for _ in range(count):
+        begin = perf_counter()
+        subprocess.run([sys.executable, *words], capture_output=True, check=True)
+        best = min(best, perf_counter() - begin)
+    return best
+
+
+@pytest.mark.parametrize("words", [("--help",), ("check", str(RIG))], ids=["help", "check"])
+def test_always_an_answer_in_a_third_of_a_second(words):
+    if best_of(5, "-c", "pass") > 0.1:
+        pytest.skip("an empty interpreter needs more than 0.1 s here")
+    best = best_of(5, "-m", "patchfem", *words)
+    for _ in range(3):  # a machine busy with other tests gets more chances
+        if best < 0.3:
+            break
+        best = min(best, best_of(5, "-m", "patchfem", *words))
+    assert best < 0.3
