@@ -1,16 +1,22 @@
 """The command line. Nothing scientific is imported until a verb needs it."""
 
-import json
 import os
-import sys
-from pathlib import Path
-from typing import Annotated
+import signal
 
-from cyclopts import App, CycloptsError, Parameter
+signal.signal(signal.SIGINT, lambda *_: os._exit(130))  # until main() takes over, an interrupt just leaves
 
-from . import __version__
+import json  # noqa: E402
+import sys  # noqa: E402
+from pathlib import Path  # noqa: E402
+from typing import Annotated  # noqa: E402
 
-app = App(name="patchfem", version=__version__, help_format="plaintext",
+from cyclopts import App, CycloptsError, Parameter  # noqa: E402
+
+from . import __version__  # noqa: E402
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
 Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
 NOT_BUILT = ("sweep", "cost", "fit", "profile", "compare", "report", "view", "import", "export", "demo", "new",
@@ -49,9 +55,9 @@ def plan(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(na
     found = make(_scene(scene, set_))
     answer = found.as_json()
     if probe and found.scene.contact is not None:
-        from .simulate_patch import solve_both, values
+        from .simulate_patch import solve_all, values
 
-        solved = values(solve_both(found.scene, False)[0])
+        solved = values(solve_all(found.scene, False)[0])
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] \
             if found.scene.contact.shear is not None else "rigid"
         answer["probe"] = solved
@@ -88,21 +94,21 @@ def run(scene: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--
         raise Refused("run: --resume is not yet built; run the scene again")
     found = _scene(scene, set_)
     from .simulate import plan as make
-    from .simulate import run as simulate
-    from .simulate_files import write
+    from .simulate_files import run_into
 
     talk = (lambda text: None) if quiet else say
     what = make(found)
     if verbose:
         talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
-    target = out or Path("out") / found.path.stem
+    target = out if out is not None else Path("out") / found.path.stem
     with _progress(quiet or json_) as progress:
-        result = simulate(what, talk, progress)
-    answer = write(result, target)
+        answer = run_into(what, target, talk, progress)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:
         _print_answer(answer, target, verbose)
+    if answer["outcome"] == "not_converged":
+        raise NotReached
 
 
 class _progress:
@@ -157,6 +163,10 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")
 
 
+class NotReached(Exception):
+    """The run is on disk and marked not_converged, exit code 3."""
+
+
 class Refused(Exception):
     """A request that the command line itself turns down, exit code 2."""
 
@@ -168,8 +178,10 @@ def main(argv: list | None = None) -> None:
 
 
 def _guarded(words: list) -> int:
-    from .scene import SceneError
-
+    try:
+        from .scene import SceneError
+    except KeyboardInterrupt:
+        return 130
     try:
         if words and words[0] in NOT_BUILT:
             raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, mesh")
@@ -183,6 +195,8 @@ def _guarded(words: list) -> int:
     except (Refused, CycloptsError) as error:
         say(f"patchfem: {' '.join(str(error).split())}")
         return 2
+    except NotReached:
+        return 3
     except KeyboardInterrupt:
         say("interrupted; nothing was replaced")
         return 130

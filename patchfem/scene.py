@@ -15,8 +15,19 @@ from typing import Any
 
 from patchfem import scene_tables as tables
 from patchfem.lines import key_lines
+from patchfem.scene_built import combinations, not_yet_built
 from patchfem.scene_read import Draft, apply_set
-from patchfem.scene_rules import ASPERITIES, LAWS, SLIDES, WAVEFORMS, check, drive_unused, not_yet_built, unused
+from patchfem.scene_rules import (
+    ASPERITIES,
+    LAWS,
+    SLIDES,
+    WAVEFORMS,
+    check,
+    drive_unused,
+    kinetic_unused,
+    method_unused,
+    unused,
+)
 from patchfem.scene_text import effects, toml
 from patchfem.scene_types import keys as keys_of
 
@@ -79,7 +90,24 @@ def load(path: str | Path, sets: Iterable[str] = ()) -> Scene:
         line = content.count(b"\n", 0, error.start) + 1
         byte = content[error.start]
         raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
-    return loads(text, path, sets)
+    found = loads(text, path, sets)
+    missing = [_no_file(found, *named) for named in _files(found) if not found.beside(named[1]).is_file()]
+    if missing:
+        raise SceneError(missing)
+    return found
+
+
+def _files(found: Scene) -> list[tuple[str, str]]:
+    """(key, file) of every file that the scene names."""
+    named = [("contact.mesh", found.contact and found.contact.mesh), ("measured.file", found.measured and
+                                                                      found.measured.file)]
+    return [(key, file) for key, file in named if file]
+
+
+def _no_file(found: Scene, key: str, file: str) -> str:
+    line = key_lines(found.text).get(key)
+    where = f"{found.path}:{line}" if line else "--set"
+    return f"{where}: {key}: there is no file {found.beside(file)}; paths are relative to the scene"
 
 
 def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) -> Scene:
@@ -93,9 +121,11 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) 
         apply_set(draft, one)
     draft.read()
     kind = check(draft)
-    if draft.mistakes:
+    wrong = bool(draft.mistakes)
+    combinations(draft, kind)
+    if wrong:
         raise SceneError(draft.lines_of_mistakes())
-    found = _finish(draft.tables)
+    found = _finish(draft.tables, kind)
     for key, message in not_yet_built(found):
         draft.say(key, message)
     if draft.mistakes:
@@ -114,13 +144,13 @@ def _syntax(error: Exception, text: str, path: str | Path) -> str:
     return f"{path}:{line}: not valid TOML: {message[: found.start()] if found else message}{where}"
 
 
-def _finish(found: tables.Tables) -> tables.Tables:
+def _finish(found: tables.Tables, kind: str) -> tables.Tables:
     """Fill the defaults that depend on other keys and drop the keys that the chosen law or kind does not use."""
     new: dict[str, Any] = {}
-    if contact := found.contact:
-        if contact.asperities:
-            asperities = _without(contact.asperities, unused(contact.asperities, "law", ASPERITIES))
-            new["contact"] = contact.model_copy(update={"asperities": asperities})
+    if found.contact:
+        new["contact"] = _contact(found.contact)
+    if found.accuracy.method in method_unused(kind):
+        new["accuracy"] = _without(found.accuracy, ["method"])
     if found.friction:
         new["friction"] = _law(found.friction)
     if slide := found.slide:
@@ -141,8 +171,15 @@ def _finish(found: tables.Tables) -> tables.Tables:
     return found.model_copy(update=new)
 
 
+def _contact(contact: tables.Contact) -> tables.Contact:
+    if contact.asperities:
+        asperities = _without(contact.asperities, unused(contact.asperities, "law", ASPERITIES))
+        contact = contact.model_copy(update={"asperities": asperities})
+    return _without(contact, ["element_size"]) if contact.mesh else contact
+
+
 def _law(law: tables.Friction) -> tables.Friction:
-    law = _without(law, unused(law, "law", LAWS))
+    law = _without(law, unused(law, "law", LAWS) | ({"kinetic"} if kinetic_unused(law) else set()))
     return _filled(law, {"kinetic": law.static}) if law.law in ("coulomb", "nonlocal") else law
 
 

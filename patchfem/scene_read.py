@@ -141,9 +141,20 @@ def _set_value(path: str, text: str) -> Any:
     except (ValueError, RecursionError):
         return text
     value = found["value"]
+    if _ends_in_comment(text):  # a '#' is a sign of the value here, as in 26#
+        return text
     if len(found) > 1 or not isinstance(value, str | bool | int | float | list | dict):
         return text
     return text if plain_text and isinstance(value, int | float) else value
+
+
+def _ends_in_comment(text: str) -> bool:
+    """Whether TOML takes the end of a valid value's text as a comment: it then swallows a bracket behind it."""
+    try:
+        tomllib.loads(f"value = [{text}]")
+    except (ValueError, RecursionError):
+        return "#" in text
+    return False
 
 
 def _owner(key: str) -> tuple[type[Table] | None, str]:

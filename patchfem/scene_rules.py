@@ -6,62 +6,13 @@ what was written. A rule says every mistake it finds and stays silent about valu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, Protocol
 
 from pydantic import BaseModel
 
+from patchfem.scene_built import NOT_YET_BUILT
 from patchfem.scene_tables import Friction, Tables
 from patchfem.scene_types import keys
-
-# Valid in a scene but without an implementation -> what serves meanwhile. Building one means deleting its line.
-NOT_YET_BUILT: dict[str, str] = {
-    "contact.upper": "",
-    "contact.lower": "",
-    "contact.approach": "contact.load",
-    "contact.holder": "",
-    "contact.step": "",
-    "contact.profile": "",
-    "contact.asperities": "",
-    "contact.strips": "",
-    "normal.amplitude": "",
-    "normal.frequency": "",
-    "normal.phase": "",
-    "normal.width": "",
-    "friction.law=tanh": "coulomb, elastic-plastic or nonlocal",
-    "friction.law=convolution": "coulomb, elastic-plastic or nonlocal",
-    "friction.temperature": "",
-    "friction.spread": "",
-    "friction.breakaway": "",
-    "slide.kind=dwell": "constant, sine or triangle",
-    "slide.kind=file": "constant, sine or triangle",
-    "structure.mode.normal": "",
-    "structure.mode.pitch": "",
-    "structure.mode.lateral": "",
-    "structure.mode.yaw": "",
-    "structure.stiffening": "",
-    "structure.bonded": "",
-    "structure.masses": "[[structure.mode]]",
-    "structure.spring": "[[structure.mode]]",
-    "structure.damper": "[[structure.mode]]",
-    "structure.interface": "[friction]",
-    "structure.file": "[[structure.mode]]",
-    "drive.kind=force": "base",
-    "drive.kind=free": "base",
-    "drive.waveform=step": "sine",
-    "drive.waveform=sweep": "sine",
-    "drive.waveform=levels": "sine, one scene per level",
-    "drive.waveform=file": "sine",
-    "wear": "",
-    "accuracy.method=duhamel": "auto, exact or march",
-    "accuracy.method=newmark": "auto, exact or march",
-    "accuracy.method=euler": "auto, exact or march",
-    "accuracy.method=harmonic": "auto, exact or march",
-    "accuracy.harmonics": "",
-    "accuracy.convergence": "",
-    "accuracy.convergence_tolerance": "",
-    "accuracy.stick_speed": "",
-}
 
 # selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
 LAWS: dict[str, tuple[str, str]] = {
@@ -111,19 +62,10 @@ def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
     for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, _drive):
         rule(draft)
-    return _kind(draft)
-
-
-def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
-    """Key and message for everything the tables name that has no implementation yet; a zero number names nothing."""
-    for entry, instead in NOT_YET_BUILT.items():
-        path, _, value = entry.partition("=")
-        use = f"use {instead} meanwhile; " if instead else ""
-        for key, found in _find(tables, path):
-            if value and found == value:
-                yield key, f"'{value}': {use}not yet built"
-            elif not value and found not in (None, (), 0, 0.0):
-                yield key, f"{use}not yet built"
+    kind = _kind(draft)
+    for rule in (_method, _sliding, _run_length):
+        rule(draft, kind)
+    return kind
 
 
 def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> set[str]:
@@ -131,19 +73,6 @@ def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) ->
     needs, can = used[getattr(table, selector)]
     dependent = {key for pair in used.values() for keys in pair for key in keys.split()}
     return (dependent - set(needs.split()) - set(can.split())) & keys(type(table)).keys()
-
-
-def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
-    name, _, rest = path.partition(".")
-    value = getattr(table, name, None)
-    at = f"{at}.{name}" if at else name
-    if not rest:
-        yield at, value
-    elif isinstance(value, tuple):
-        for index, item in enumerate(value):
-            yield from _find(item, rest, f"{at}.{index}")
-    elif value is not None:
-        yield from _find(value, rest, at)
 
 
 def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]) -> None:
@@ -170,6 +99,8 @@ def _contact(draft: Draft) -> None:
         draft.lacks("contact.load", "" if "contact.approach" in NOT_YET_BUILT else "or [contact.approach] instead")
     if contact.element_size and contact.length and contact.element_size > contact.length:
         draft.say("contact.element_size", f"{contact.element_size} m is longer than contact.length {contact.length} m")
+    if contact.element_size and contact.mesh:
+        draft.remark("contact.element_size is not used beside contact.mesh, whose elements are those of the file")
     pieces = [("contact.coating", contact.coating, contact.height)]
     for name in ("upper", "lower"):
         if piece := getattr(contact, name):
@@ -236,6 +167,8 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         draft.say(f"{at}.kinetic", f"law '{law.law}' has one coefficient only; kinetic belongs to coulomb and nonlocal")
     elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
+    elif kinetic_unused(law):
+        draft.remark(f"{at}.kinetic has no effect while the bond length is constant; add rest_growth and slip_growth")
     for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
         if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
             draft.lacks(f"{at}.{other}", f"{key} needs it; leave both out for a constant bond length")
@@ -245,6 +178,15 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     contact = draft.tables.contact
     if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.shear:
         draft.say(f"{at}.reading", "'report' is refused beside [contact.shear]; use 'stretch' or leave out the shear")
+    if law.static == 0 and contact and contact.shear:
+        draft.say(f"{at}.static", "0 beside [contact.shear]: no point carries friction; static > 0 is wanted, or leave "
+                                  "out [contact.shear]")  # fmt: skip
+
+
+def kinetic_unused(law: Friction) -> bool:
+    """Whether a smaller kinetic coefficient stands where no bond ever changes its length."""
+    weaker = law.kinetic is not None and law.static is not None and law.kinetic < law.static
+    return weaker and law.law == "nonlocal" and law.rest_growth is None and law.slip_growth is None
 
 
 def _slide(draft: Draft) -> None:
@@ -371,3 +313,41 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
     if friction and not moves and "slide" not in has:
         draft.lacks_table("slide", "friction needs a motion, [slide] or [structure] with [drive]")
     return "bench" if "slide" in has else "rig"
+
+
+def _method(draft: Draft, kind: str) -> None:
+    accuracy, law, contact = draft.tables.accuracy, draft.tables.friction, draft.tables.contact
+    method = accuracy and accuracy.method
+    if method in method_unused(kind):
+        draft.remark(f"accuracy.method = '{method}' has no meaning in a {kind} scene and is not used")
+    if method != "exact" or kind != "rig" or law is None or law.law is None:
+        return
+    shear = contact is not None and contact.shear is not None
+    if law.law != "coulomb" or shear:
+        beside = " beside [contact.shear]" if shear else ""
+        draft.say("accuracy.method", f"no exact solution exists for law '{law.law}'{beside}; use 'march' or leave "
+                                     "method out")  # fmt: skip
+
+
+def method_unused(kind: str) -> tuple[str, ...]:
+    """Methods that a kind of run gives no meaning: without a time integration there is nothing to choose."""
+    return ("exact", "march") if kind in ("patch", "bench") else ()
+
+
+def _sliding(draft: Draft, kind: str) -> None:
+    structure = draft.tables.structure
+    modes = structure.mode if kind == "rig" and structure is not None else ()
+    if modes and all(mode.slide == 0 for mode in modes):
+        draft.say("structure.mode.0.slide", "0 in every mode, so nothing slides at the patch; give the slide of a mode "
+                                            "that moves it, or leave out [friction] and its load")  # fmt: skip
+
+
+def _run_length(draft: Draft, kind: str) -> None:
+    drive, least = draft.tables.drive, 0.25
+    if kind not in ("rig", "linear") or drive is None:
+        return
+    if drive.cycles is not None and drive.cycles < least:
+        draft.say("drive.cycles", f"at least a quarter of a cycle is wanted, cycles >= {least}, not {drive.cycles:g}")
+    elif drive.duration is not None and drive.frequency and drive.duration * drive.frequency < least:
+        draft.say("drive.duration", f"at least a quarter of a cycle is wanted, duration >= {least / drive.frequency:g} "
+                                    f"s, not {drive.duration:g} s")  # fmt: skip

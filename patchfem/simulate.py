@@ -37,15 +37,20 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
     """
     begin, scene = perf_counter(), what.scene
     seconds, warnings = {}, list(scene.remarks)
-    patch = coarse = None
+    patch, coarse = None, (None, None)
     if scene.contact is not None:
-        from .simulate_patch import solve_both
+        from .simulate_patch import solve_all
 
-        patch, coarse = solve_both(scene, estimate)
+        patch, *coarse = solve_all(scene, estimate)
         seconds["contact"] = perf_counter() - begin
+        warnings += _strained(scene, patch)
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":
-        warnings.append("the pieces do not touch: no friction acts and nothing was run")
+        warnings.append("no friction acts and no motion was computed")
         result = _static(what, patch, coarse, seconds, warnings)
+    elif scene.normal is not None and scene.normal.load == 0:
+        warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
+        result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
+                        seconds, warnings, {})
     else:
         result = _KINDS[what.kind](what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
     seconds["total"] = perf_counter() - begin
@@ -63,13 +68,33 @@ def _loose(result: Result) -> list:
             "contact.element_size or raise accuracy.steps_per_cycle"]
 
 
+def _strained(scene, patch) -> list:
+    """A warning where the load leaves the range of small strains."""
+    deep = patch.pressure.sigma_n.max(initial=0.0) / scene.contact.substrate.young
+    if deep <= 0.02:
+        return []
+    return [f"the peak pressure is {deep:.3g} of Young's modulus, beyond the small strains that are assumed (0.02)"]
+
+
+def _overhang(scene, fine) -> list:
+    """Warnings of a bench whose slide leaves the patch or whose law has no finite peak."""
+    out, travel = [], float(np.abs(fine.slide).max()) / scene.contact.length
+    lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
+    if lost > 0.01:
+        out.append(f"the upper piece slides off the pressure: {100 * lost:.0f} % of the load is not carried at the end")
+    elif travel > 0.1:
+        out.append(f"the slide is {travel:.2g} of the patch; the pressure rides on the upper piece and the overhang is "
+                   "not modelled")
+    return out
+
+
 def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
     from .simulate_patch import measures
 
     p = patch.pressure
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    return Result(what, p.outcome, measures(patch, coarse), None, None, patch, _still(patch), seconds, warnings,
+    return Result(what, p.outcome, measures(patch, *coarse), None, None, patch, _still(patch), seconds, warnings,
                   {"residuals": dict(p.residuals), "iterations": p.iterations})
 
 
@@ -101,6 +126,9 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     from .response.errors import change, step_error, with_errors
 
     scene = what.scene
+    if scene.friction.law == "nonlocal" and scene.friction.order < 0 and scene.friction.initial_bonds > 0:
+        warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
+                    "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
     steps = bench.steps_of(scene)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(scene, patch, steps, frames, say)
@@ -110,8 +138,8 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
         half, quarter = (bench.run(scene, patch, max(4, steps // (4 * k) * 4), 0, say) for k in (2, 4))
         seconds["error"] = half.seconds + quarter.seconds
         others.append(step_error(fine.values, half.values, quarter.values, steps))
-        if coarse is not None:
-            rough = bench.run(scene, coarse, max(4, steps // 16 * 4), 0, say)
+        if coarse[0] is not None:
+            rough = bench.run(scene, coarse[0], max(4, steps // 16 * 4), 0, say)
             others.append(change(quarter.values, rough.values))
             seconds["error"] += rough.seconds
     found = with_errors(fine.values, *others, least=1e-10)
@@ -119,7 +147,8 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     if patch is not None:
         from .simulate_patch import measures
 
-        found = measures(patch, coarse) | {k: m for k, m in found.items() if k != "normal_load"}
+        found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
+        warnings = warnings + _overhang(scene, fine)
         fields = _fields(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
     return Result(what, Outcome.DONE, _without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
                   {"engine": "bench", "steps": steps})
@@ -154,9 +183,10 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     if patch is not None:
         from .simulate_patch import measures
 
-        found = measures(patch, coarse) | {k: m for k, m in found.items() if k != "normal_load"}
+        found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         fields = _rig_fields(scene, settings, patch, raw, drive)
     extra["book"] = raw.book
+    warnings = [*warnings, raw.message] if raw.message else warnings
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 
 
@@ -169,9 +199,9 @@ def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, sa
     frames = FRAMES if patch is not None else 0
     raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
     seconds |= {"march": raw.seconds, "reduce": raw.prepare["reduce"], "load": raw.prepare["load"], "error": 0.0}
-    if not estimate:
+    if not estimate or raw.outcome is Outcome.NOT_CONVERGED:
         return raw, settings, with_errors(raw.values)
-    half, quarter = (rig.run_march(scene, replace(settings, steps=max(4, settings.steps // k)), modes, drive, patch)
+    half, quarter = (rig.run_march(scene, replace(settings, steps=max(1, settings.steps // k)), modes, drive, patch)
                      for k in (2, 4))
     seconds["error"] += half.seconds + quarter.seconds
     rest = _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds)
@@ -197,9 +227,9 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
     from .response.errors import change
 
     out = []
-    few = replace(settings, steps=max(4, settings.steps // 4))
-    if coarse is not None and scene.contact.shear is not None:
-        rough = rig.run_march(scene, few, modes, drive, coarse)
+    few = replace(settings, steps=max(1, settings.steps // 4))
+    if coarse[0] is not None and scene.contact.shear is not None:
+        rough = rig.run_march(scene, few, modes, drive, coarse[0])
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
         if scene.friction.law == "nonlocal":
@@ -227,20 +257,11 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
     shear = scene.contact.shear is not None
     if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or settings.per_point):
         law = rig.law_of(scene, drive.acceleration / drive.omega)
-        modes = None
-        if shear:
-            from .contact.slip import shear_modes
-
-            weight = patch.pieces.interface.weight
-            modes = shear_modes(patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes,
-                                1 / law.ratio if law.ratio > 0 else np.inf)
-        tau, local = bench.point_fields(patch, law, modes, [(s["slide"], s["bonds"]) for s in shots])
+        tau, local = bench.point_fields(patch, law, raw.model.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
-        from .contact.slip import jenkins_set
-
         length = f.bond_length if f.law == "elastic-plastic" else 0.0
-        found = jenkins_set(patch.pieces.tangential, f.static * sigma * patch.pieces.interface.weight, length)
-        tau, local = bench.element_fields(patch, found, [(s["slide"], s["stretch"]) for s in shots], length)
+        states = [(s["slide"], s["stretch"]) for s in shots]
+        tau, local = bench.element_fields(patch, raw.model.reduction, states, length)
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])

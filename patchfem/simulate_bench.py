@@ -9,7 +9,7 @@ import numpy as np
 
 from .core import Missing, PatchfemError
 from .friction.law import Bonds
-from .response.measures import interface_loop
+from .response.measures import harmonic, interface_loop, step_harmonic
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -116,10 +116,10 @@ def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
 
 
 def _values(scene, time, slide, force, load, slip, work, stored, burnt, first, omega) -> dict:
-    ratio = np.divide(force, load, out=np.zeros_like(force), where=load > 0)
+    ratio = force / load[0] if load[0] > 0 else np.zeros_like(force)  # over the load that is applied
     power = np.abs(np.diff(work)).sum()
     miss = abs(work[-1] - (stored[-1] - stored[0]) - burnt)
-    out = {"normal_load": float(load[-1]), "friction_force_peak": float(np.abs(force).max()),
+    out = {"normal_load": float(load[0]), "friction_force_peak": float(np.abs(force).max()),
            "friction_ratio_end": float(ratio[-1]), "friction_ratio_peak": float(np.abs(ratio).max()),
            "slip_amplitude": float(slip[first:].max() - slip[first:].min()) / 2,
            "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0}
@@ -128,13 +128,17 @@ def _values(scene, time, slide, force, load, slip, work, stored, burnt, first, o
         weight = np.zeros(t.size)
         weight[1:] += np.diff(t) / 2
         weight[:-1] += np.diff(t) / 2
-        out |= interface_loop(t, weight, q, f, omega, float(work[-1] - work[first]), 0.0)
+        means = np.divide(np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0)
+        out |= interface_loop(q, harmonic(t, weight, q - q.mean(), omega), step_harmonic(t, means, omega),
+                              work[-1] - work[first], 0.0)
         out["drift_per_cycle"] = float(q[-1] - q[0])
     return out
 
 
 def _frame_numbers(count: int, frames: int) -> np.ndarray:
-    return np.unique(np.linspace(0, count - 1, frames + 1).round().astype(int)) if frames else np.zeros(0, int)
+    """Samples of the frames; the first sample is the pressed state, which is a frame of its own."""
+    at = np.linspace(0, count - 1, frames + 1).round().astype(int)[1:]
+    return np.unique(at[at > 0]) if frames else np.zeros(0, int)
 
 
 def _rigid(scene, patch, time, slide, frames):
@@ -276,19 +280,16 @@ def _points(scene, patch, time, slide, frames, say):
     forces, burnt = np.zeros((time.size, 3)), np.zeros((time.size, 2))
     states, bad = [], 0
     for a, b in pairwise(edges):
-        if frames and a in at:
-            states.append((slide[a], contact.bonds.copy()))
         bad += hub.follow_path(slide[a:b + 1].copy(), float(time[1] - time[0]), model.kind, contact, work_arrays,
                                GOAL * model.limit, burnt[a:b + 1], forces[a:b + 1])
+        if b in at:
+            states.append((slide[b], contact.bonds.copy()))
     if bad:
         from .core import NotConverged
 
         raise NotConverged(f"{scene.path}: {bad} steps of the bench missed the force residual; raise "
                            "accuracy.steps_per_cycle")
-    if frames:
-        states.append((slide[edges[-1]], contact.bonds.copy()))
     work = np.concatenate([[0.0], np.cumsum(forces[:-1, 1] * np.diff(slide))])
     tau, local = point_fields(patch, law, shear, states)
     load = np.full(time.size, patch.pressure.load)
-    return (forces[:, 0], load, forces[:, 2], work, burnt[:, 1], float(burnt[:-1, 0].sum()), edges if frames else at,
-            tau, local)
+    return (forces[:, 0], load, forces[:, 2], work, burnt[:, 1], float(burnt[:-1, 0].sum()), at, tau, local)

@@ -12,7 +12,7 @@ from . import __version__
 from .effects import EFFECTS
 from .export.results import Folder
 from .export.summary import summary, write_json
-from .simulate import Result
+from .simulate import Result, run
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
@@ -53,25 +53,30 @@ def effects_of(result: Result) -> list:
     return out
 
 
-def write(result: Result, target: Path, say=None) -> dict:
-    """Write the results folder `target` (an older one is replaced only when the new one is whole); the summary."""
-    say = say or (lambda text: None)
+def run_into(what, target: Path, say=None, progress=None) -> dict:
+    """Claim the results folder `target`, run the plan, fill the folder; the summary. An older folder of results is
+    replaced only when the new one is whole, and a folder with other files is refused before anything runs."""
     with Folder(target) as folder:
-        begin = perf_counter()
-        text = resolved(result.plan.scene)
-        (folder.path / "scene.resolved.toml").write_text(text, encoding="utf-8")
-        _write_netcdf(result, folder.path / "result.nc", text)
-        data = report_data(result)
-        if result.patch is not None:
-            data["bodies"] = _write_fields(result, folder.path / "fields.vtkhdf")
-        from .export.report import write_report
+        result = run(what, say, progress)
+        return write(result, folder.path)
 
-        result.seconds["files"] = perf_counter() - begin
-        write_report(folder.path / "report.html", data)
-        result.seconds["files"] = perf_counter() - begin
-        answer = summary_of(result)
-        write_json(answer, folder.path / "summary.json")
-    say(f"results in {target}")
+
+def write(result: Result, path: Path) -> dict:
+    """Write every file of a run into the folder `path`; the summary."""
+    begin = perf_counter()
+    text = resolved(result.plan.scene)
+    (path / "scene.resolved.toml").write_text(text, encoding="utf-8")
+    _write_netcdf(result, path / "result.nc", text)
+    data = report_data(result)
+    if result.patch is not None:
+        data["bodies"] = _write_fields(result, path / "fields.vtkhdf")
+    from .export.report import write_report
+
+    result.seconds["files"] = perf_counter() - begin
+    write_report(path / "report.html", data)
+    result.seconds["files"] = perf_counter() - begin
+    answer = summary_of(result)
+    write_json(answer, path / "summary.json")
     return answer
 
 
@@ -167,7 +172,7 @@ def mises(s: np.ndarray) -> np.ndarray:
 def report_data(result: Result) -> dict:
     """Plain arrays and texts for the report page."""
     scene, r, w = result.plan.scene, result.response, result.window
-    data = {"summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
+    data = {"name": scene.path.stem, "summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
             "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
             "x": None if result.patch is None else result.patch.grid.x, "versions": versions()}
     if r is not None:

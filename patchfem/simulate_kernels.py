@@ -11,6 +11,8 @@ from .dynamics.kernels import accelerations, free_slide, move, step_energy, stor
 from .friction.kernels import grow
 from .simulate_step_kernels import (
     COULOMB,
+    JENKINS,
+    LIST,
     POINTS,
     Contact,
     Modes,
@@ -24,7 +26,8 @@ from .simulate_step_kernels import (
     solve_modes,
 )
 
-__all__ = ["Contact", "Modes", "Steps", "Work", "contact_state", "follow_path", "march"]
+__all__ = ["COULOMB", "JENKINS", "LIST", "POINTS", "Contact", "Modes", "Steps", "Work", "contact_state", "follow_path",
+           "march"]
 
 
 @njit(error_model="numpy")
@@ -42,7 +45,7 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
     modes: (omega, 2 zeta omega, slide, base, output); prop: (step, gauss, sine, sine_gauss, weights, dt, beta);
     held: (1,) last friction force (kind 0); ledger (9,): work in, viscous loss, |power in|, friction loss, peak stored,
     iterations, worst iterations, steps without convergence, friction work;
-    rows (steps + 1, 2 n + 4): z, z', q, q', F, slip.
+    rows (steps + 1, 2 n + 5): z, z', q, q', F, slip, mean force of the step that follows.
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 bond list full, 3 not finite.
     """
     omega, damp, slide, base, output = modes
@@ -59,6 +62,7 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
             out += output[k] * state[k, 0]
         force, energy, slip = contact_state(kind, c, q, held[0])
         rows[i, 2 * n], rows[i, 2 * n + 1], rows[i, 2 * n + 2], rows[i, 2 * n + 3] = q, v, force, slip
+        rows[i, 2 * n + 4] = force
         ledger[4] = max(ledger[4], energy + stored(state, omega, mass))
         if not np.isfinite(q + v + force):
             return i, 3
@@ -90,6 +94,7 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
         for k in range(n):
             v1 += slide[k] * state[k, 1]
         held[0] = used
+        rows[i, 2 * n + 4] = used
         ledger[8] += used * dq
         if kind == COULOMB and dq == 0.0:
             accelerations(state, omega, damp, slide, base, mass, drive, 0.0, sine[at + 1, 0], accel)

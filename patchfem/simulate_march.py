@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .compiled import load_kernels
-from .core import BaseSine, Missing, ModalBasis, NotConverged, Outcome, Response
+from .core import BaseSine, Missing, ModalBasis, Outcome, Response
 
 LIST_CAPACITY = 20_000  # bonds of a shared list; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
@@ -17,8 +17,9 @@ MOST_KEPT = 400_000  # samples kept outside the last cycles
 class ContactModel:
     """What the hub needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
 
-    kind as in simulate_kernels; limit: friction limit [N]; fields: keyword arrays of simulate_kernels.Contact;
-    shear_modes: r; follow: pressure stays on the lower piece; length: bond length for the stick criterion [m].
+    kind as in simulate_kernels; limit: friction limit [N]; fields: keyword arrays of simulate_kernels.Contact; follow:
+    pressure stays on the lower piece; length: bond length for the stick criterion [m]; reduction: the JenkinsSet or
+    ShearModes behind the arrays.
     """
 
     kind: int
@@ -26,6 +27,7 @@ class ContactModel:
     fields: dict
     follow: bool = False
     length: float = 0.0
+    reduction: object = None
 
     def build(self, hub):
         """(Contact, Work) with arrays of their own."""
@@ -104,20 +106,20 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MarchResult:
-    """A march: kept samples, the last cycles whole, extremes of every window, the energy ledger and how it ended."""
+    """A march: kept samples, the last cycles whole and their step-mean forces, extremes and phasors per cycle, the
+    energy ledger and how it ended."""
 
     response: Response
     window: Response
+    step_force: np.ndarray
     amplitudes: np.ndarray
+    phasors: np.ndarray
     ledger: dict
     outcome: Outcome | None
     snapshots: list
     window_work: float
     cycles_done: float
-
-
-HISTORIES = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
-             "base_acceleration", "force", "slip")
+    message: str = ""
 
 
 def _response(rows, number, dt, modes, drive) -> Response:
@@ -141,36 +143,43 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
           window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None) -> MarchResult:
     """March from rest for `cycles` drive cycles at `steps_per_cycle` steps.
 
-    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle. NotConverged when
-    a step misses its residual, Missing when a bond list overflows; outcome is set for travel and blow-up only.
+    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle. The outcome is set
+    for travel and where a step missed its residual or the motion is not finite (not_converged, `message` says what);
+    Missing when a bond list overflows.
     """
 
     run = _Run(modes, drive, model, steps_per_cycle, travel, load_kernels(say))
     total, n = round(cycles * steps_per_cycle), modes.omega.size
-    last, kept, kept_at, extremes, snapshots, samples = deque(maxlen=window), [], [], [], [], 0
+    last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
     size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
     while run.done < total and run.outcome is None:
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
-        if len(last) == window and samples < MOST_KEPT:
+        if len(last) == last.maxlen and samples < MOST_KEPT:
             pick = _thinned(last[0][1], n)
             kept.append(last[0][1][pick])
             kept_at.append(last[0][0] + pick)
             samples += len(pick)
         last.append((first, rows, work))
         extremes.append(_extremes(rows, modes, run.prop.dt))
+        phasors.append(_phasor(rows, modes, first, steps_per_cycle))
         size = steps_per_cycle
         if progress is not None:
             progress(run.done / total)
     run.check()
-    rows = np.concatenate([part[:-1] for _, part, _ in last] + [last[-1][1][-1:]])
-    window_rows = _response(rows, last[0][0] + np.arange(len(rows)), run.prop.dt, modes, drive)
-    full = window_rows
-    if kept:
-        head = _response(np.concatenate(kept), np.concatenate(kept_at), run.prop.dt, modes, drive)
-        full = Response(*(np.concatenate([getattr(head, k), getattr(window_rows, k)]) for k in HISTORIES))
-    return MarchResult(full, window_rows, np.array(extremes), run.book(), run.outcome, snapshots,
-                       sum(work for _, _, work in last), run.done / steps_per_cycle)
+    end = list(last)[-window:]
+    rows, first = _joined(end)
+    whole, start = _joined(list(last))
+    number = np.concatenate([*kept_at, start + np.arange(len(whole))])
+    full = _response(np.concatenate([*kept, whole]), number, run.prop.dt, modes, drive)
+    last_rows = _response(rows, first + np.arange(len(rows)), run.prop.dt, modes, drive)
+    return MarchResult(full, last_rows, rows[:-1, 2 * n + 4].copy(), np.array(extremes), np.array(phasors), run.book(),
+                       run.outcome, snapshots, sum(work for _, _, work in end), run.done / steps_per_cycle, run.message)
+
+
+def _joined(parts) -> tuple:
+    """Rows of successive cycles without their shared samples, and the number of the first step."""
+    return np.concatenate([rows[:-1] for _, rows, _ in parts] + [parts[-1][1][-1:]]), parts[0][0]
 
 
 class _Run:
@@ -183,7 +192,7 @@ class _Run:
         self.prop = propagator(modes, drive, steps_per_cycle)
         self.contact, self.work = model.build(hub)
         self.state, self.held = np.zeros((modes.omega.size, 2)), np.zeros(1)
-        self.ledger, self.done, self.outcome = np.zeros(9), 0, None
+        self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
         self.arrays = hub.Modes(*(np.array(v) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide,
                                                         modes.base, modes.output)))
         p = self.prop
@@ -194,7 +203,7 @@ class _Run:
         first, before, parts = self.done, self.ledger[8], []
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
-            rows = np.empty((piece + 1, 2 * self.modes.omega.size + 4))
+            rows = np.empty((piece + 1, 2 * self.modes.omega.size + 5))
             did, status = self.hub.march(self.done, int(piece), self.state, self.held, self.arrays, self.steps,
                                          self.drive.acceleration, self.modes.mass, self.model.kind,
                                          self.model.follow, self.contact, self.work, GOAL * self.model.limit,
@@ -215,7 +224,8 @@ class _Run:
             raise Missing(f"the bond list outgrew {self.contact.bondlist.shape[1]} entries at step {self.done}; loosen "
                           "accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1")
         if status == 3:
-            raise NotConverged(f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle")
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle"
 
     def _snapshot(self, row) -> dict:
         n, c = self.modes.omega.size, self.contact
@@ -223,10 +233,11 @@ class _Run:
                 "slip": row[2 * n + 3], "bonds": c.bonds.copy(), "stretch": c.stretch.copy(), "b": c.b.copy()}
 
     def check(self) -> None:
-        """NotConverged when a step missed its residual."""
+        """Mark the run not_converged when a step missed its residual; what was computed is kept."""
         if self.ledger[7]:
-            raise NotConverged(f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of "
-                               "the friction limit; raise accuracy.steps_per_cycle")
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of the "
+                            "friction limit; raise accuracy.steps_per_cycle")
 
     def book(self) -> dict:
         """The energy ledger [J]."""
@@ -249,6 +260,12 @@ def _extremes(rows, modes, dt) -> tuple:
     n = modes.omega.size
     y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output
     return hermite_extremes(y, v, dt)
+
+
+def _phasor(rows, modes, first: int, around: int) -> complex:
+    """Drive-frequency part of the output over a cycle of samples that begins at step number `first`."""
+    y = rows[:-1, :modes.omega.size] @ modes.output
+    return complex(2 * np.mean(y * np.exp(-2j * np.pi * (first + np.arange(y.size)) / around))) if y.size else 0j
 
 
 def hermite_extremes(y, v, dt) -> tuple:

@@ -34,6 +34,10 @@ class Plan:
 
 def plan(scene, per_point: bool = False) -> Plan:
     """Plan of a scene from its numbers alone: no mesh, no solve. PatchfemError where nothing can run it."""
+    if scene.measured is not None:
+        from .response.measured import read_table
+
+        read_table(scene.beside(scene.measured.file))  # a broken table is named before anything runs
     named = tuple(scene.named())
     unknowns, chain = _sizes(scene)
     engine, steps, seconds = "static", 0, 0.25
@@ -160,6 +164,13 @@ def _verdict(scene, groups) -> list:
         part = min(1.0, 1 / sqrt(tilt)) if tilt > 1 else 1.0
         out.append(f"tilt is {tilt:.3g} of the first-opening tilt: " +
                    ("full contact" if tilt <= 1 else f"partial contact, roughly {100 * part:.0f} % or less"))
+    if scene.kind == "rig" and scene.friction.law == "nonlocal" and not (
+            scene.friction.reading == "stretch" and scene.friction.order == 1):
+        from .simulate_rig import LONGEST, choose, drive_of, list_cost
+
+        seconds = list_cost(scene, choose(scene), drive_of(scene))[1]
+        if seconds > LONGEST:
+            out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than {LONGEST:.0f} s")
     slip = groups.get("slip_length")
     if slip is not None:
         out.append(f"the pieces' own shear gives way by about {slip:.2g} m before the patch slips")

@@ -11,10 +11,14 @@ from .friction.law import Bonds
 from .response.measures import (
     circular_mean,
     classify,
+    harmonic,
     interface_loop,
     run_measures,
     slip_measures,
+    steady_amplitude,
+    step_harmonic,
     window_amplitudes,
+    window_ends,
 )
 from .structure.modes import basis
 
@@ -40,18 +44,21 @@ class Settings:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Raw:
-    """One run before its errors are known: values by measure name, histories, amplitudes per window, snapshots."""
+    """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
+    error) or (None, None), snapshots."""
 
     values: dict
     response: Response
     window: Response
     amplitudes: np.ndarray
+    steady: tuple
     outcome: Outcome | None
     snapshots: list
     book: dict
     seconds: float
     model: object = None
     prepare: dict | None = None
+    message: str = ""
 
 
 def drive_of(scene) -> BaseSine:
@@ -141,7 +148,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
                 raise PatchfemError(f"{scene.path}: friction.kinetic below static with [contact.shear]: not yet "
                                     "built; the exact set of elements needs static = kinetic")
             found = jenkins_set(patch.pieces.tangential, f.static * per_node, length)
-            return hub.jenkins_model(found.stiffness, found.yield_slide)
+            return replace(hub.jenkins_model(found.stiffness, found.yield_slide), reduction=found)
         if f.law == "coulomb":
             return hub.coulomb_model(limit, f.kinetic * load)
         return hub.jenkins_model([limit / length], [length])
@@ -156,7 +163,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
         weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
         reduced = shear_modes(patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes,
                               1 / law.ratio if law.ratio > 0 else np.inf)
-        return hub.points_model(law, weight, sigma, reduced)
+        return replace(hub.points_model(law, weight, sigma, reduced), reduction=reduced)
     if settings.per_point:
         from .simulate_patch import shape_side
 
@@ -186,12 +193,14 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
             values["slip_start_phase"] = circular_mean(done.starts)
         time, weight, slide, rate, force = done.loop
         work = float(weight @ (force * rate)) * drive.period / span
-        values |= interface_loop(time, weight, slide, force, drive.omega, work, modes.mass * modes.omega[0]**2)
+        q, part = (harmonic(time, weight, values_, drive.omega) for values_ in (slide - weight @ slide / span, force))
+        values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2)
     else:
         values.pop("friction_force_peak")
     stuck = f is not None and done.stick >= span * (1 - 1e-12)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window), outcome, [],
+    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
+               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
                done.ledger, perf_counter() - begin)
 
 
@@ -218,12 +227,15 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
     work = float(done.window_work) * drive.period / span if span > 0 else 0.0
-    values |= interface_loop(w.time, weight, w.slide, w.force, drive.omega, work, modes.mass * modes.omega[0]**2)
+    q = harmonic(w.time, weight, w.slide - w.slide.mean(), drive.omega)
+    values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, drive.omega), work,
+                             modes.mass * modes.omega[0]**2)
     length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
     stuck = values["slip_amplitude"] < (1e-3 * length if model.kind else 1e-300)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    return Raw(values, done.response, w, window_amplitudes(done.amplitudes, settings.window), outcome, done.snapshots,
-               done.ledger, seconds, model, {"reduce": reduced, "load": loaded})
+    return Raw(values, done.response, w, window_amplitudes(done.amplitudes, settings.window),
+               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,
+               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message)
 
 
 def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:
@@ -256,13 +268,12 @@ def settle(raw: Raw, measures: dict, tolerance: float) -> tuple:
     """(outcome, measures with the steady estimate where there is one)."""
     if raw.outcome is not None:
         return raw.outcome, measures
-    outcome, steady, error = classify(raw.amplitudes, tolerance)
+    outcome = classify(raw.amplitudes, tolerance)
     if outcome is Outcome.GROWS:
-        measures = {k: replace(m, error=None) for k, m in measures.items()}
-    if steady is not None:
+        return outcome, {k: replace(m, error=None) for k, m in measures.items()}
+    steady, error = raw.steady
+    if outcome is Outcome.TRANSIENT and steady is not None:
         base = measures["relative_displacement_amplitude"]
-        share = abs(steady) / max(abs(base.value), 1e-300)
-        total = (error or 0.0) + (base.error or 0.0) * share
-        measures = measures | {"relative_displacement_amplitude_steady": Measure(float(steady), "m", float(total),
-                                                                                base.floor)}
+        total = error + (base.error or 0.0) * steady / max(abs(base.value), 1e-300)
+        measures = measures | {"relative_displacement_amplitude_steady": Measure(steady, "m", float(total), base.floor)}
     return outcome, measures

@@ -147,7 +147,7 @@ def solve_scalar(free, beta, guess, kind, c, eps, v0, dt, goal):
     for count in range(9, 300):
         force, slope = scalar_force(dq, kind, c, eps, v0, dt)
         miss = dq - free + beta * force
-        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(low) + abs(high)):
+        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.force[2]):
             return dq, force, count
         if miss > 0:
             high = dq
@@ -347,10 +347,10 @@ def contact_state(kind, c, q, held):
             share = c.stiffness[j] * c.limit[j]
             slip += share * (q - c.stretch[j])
             total += share
-        return force, energy, slip / total
+        return force, energy, slip / total if total > 0 else q
     if kind == LIST:
         force = c.force[0] * list_mean(0.0, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, 0.0, 0.0)
-        return force, 0.0, q - force * c.law[2] / c.force[0]
+        return force, 0.0, q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
     weight, bonds, kappa, b = c.weight, c.bonds, c.kappa, c.b
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
     for j in range(weight.size):

@@ -8,7 +8,7 @@ import pytest
 from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
 
 from patchfem.scene import SceneError, load, loads
-from patchfem.scene_rules import NOT_YET_BUILT, _find
+from patchfem.scene_built import NOT_YET_BUILT, _find
 from patchfem.scene_tables import Tables
 from patchfem.scene_types import keys, model_of
 
@@ -172,7 +172,8 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
 
 def test_refuses_report_reading_beside_shear():
     assert "refused beside [contact.shear]" in only(RIG, "contact.shear={}", "friction.reading=report")
-    assert loads(RIG, sets=["friction.reading=report", "friction.order=-0.5"]).friction.order == -0.5
+    sets = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report", "friction.order=-0.5"]
+    assert loads(BENCH, sets=sets).friction.order == -0.5
     assert "must be > -1" in only(RIG, "friction.reading=report", "friction.order=-1")
 
 

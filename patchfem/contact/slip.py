@@ -120,15 +120,15 @@ def _backbone(limit, shape, values, length, slides) -> np.ndarray:
     for slide in slides:
         for _ in range(60):
             xi = slide - shape @ b
-            traction = -np.expm1(-xi / length)
-            slope = np.exp(-xi / length) / length
+            decay = np.exp(np.minimum(-xi / length, 700.0))
+            traction, slope = 1 - decay, decay / length
             missing = b / values - shape.T @ (limit * traction)
             tangent = np.diag(1 / values) + shape.T @ ((limit * slope)[:, None] * shape)
             step = np.linalg.solve(tangent, missing)
             b = b - step
             if np.abs(step).max() <= 1e-11 * (np.abs(b).max() + 1e-300):  # quadratic: the next one is round-off
                 break
-        out.append(limit @ -np.expm1(-(slide - shape @ b) / length))
+        out.append(limit @ -np.expm1(np.minimum(-(slide - shape @ b) / length, 700.0)))
     return np.array(out)
 
 

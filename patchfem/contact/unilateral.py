@@ -19,10 +19,13 @@ def _bordered(c, gap, rigid, target, active):
     """Forces and rigid motions on the active set: [C -R; R^T 0] [f; r] = [-g; target]."""
     caa = c[np.ix_(active, active)]
     r = rigid[active]
-    both = np.linalg.solve(caa, np.column_stack([gap[active], r]))
+    nearest = gap[active].min()  # taken out first: the closing may be far smaller than the gaps
+    both = np.linalg.solve(caa, np.column_stack([gap[active] - nearest, r]))
     free, lift = both[:, 0], both[:, 1:]
     motion = np.linalg.solve(r.T @ lift, target + r.T @ free)
-    return lift @ motion - free, motion
+    force = lift @ motion - free
+    motion[0] += nearest
+    return force, motion
 
 
 def _hull_start(x, gap, target):

@@ -87,8 +87,14 @@ def combine(signals, factors) -> Signal:
     return Signal([term for s, f in zip(signals, factors) if f != 0 for term in s.scaled(f)])
 
 
-def first_root(signals, limit: float, ahead: float) -> float:
+GRAZE = 1e-8  # share of the static friction by which the need may exceed it for an instant: slip below 1e-15 a/omega^2
+
+
+def first_root(signals, limit: float, ahead: float, ignore: float = 0.0) -> float:
     """First time in (0, limit] at which one of the signals, positive just after 0, is no longer positive; inf if none.
+
+    A dip that does not go below -ignore is passed over: near the onset a stick only grazes its limit, and the slip that
+    follows is smaller than the round-off of the motion.
 
     Each step is one that |f''| <= M on the stretch ahead proves free of roots of every signal; the last ones are
     Newton's. NotConverged after 100000 steps.
@@ -102,6 +108,10 @@ def first_root(signals, limit: float, ahead: float) -> float:
         for f, d1, d2, tiny in watched:
             value, slope = f(t), d1(t)
             if value <= tiny:
+                curve = d2(t)
+                if ignore > 0 and curve > 0 and value - slope * slope / (2 * curve) > -ignore:
+                    step = (sqrt(max(slope * slope - 2 * curve * (value - 4 * tiny), 0.0)) - slope) / curve
+                    break
                 if slope < 0 and abs(value / slope) < 1e-6 * ahead:
                     t -= value / slope
                 return t if t <= limit else inf
@@ -125,7 +135,10 @@ def _first_leap(f: Signal, ahead: float) -> float:
     g = f
     for order in range(5):
         value = g(0.0)
-        if value > 1e-10 * g.bound(0.0, ahead):
+        size = 1e-10 * g.bound(0.0, ahead)
+        if order and value < -size:
+            return 0.0
+        if value > size:
             return min(0.5 * (order + 1) * value / max(g.rate().bound(0.0, ahead), 1e-300), ahead) if order else 0.0
         g = g.rate()
     return 1e-9 * ahead
@@ -237,7 +250,7 @@ def run(modes: ModalBasis, drive: BaseSine, static: float, kinetic: float, durat
             force = rig.reaction(modal, theta)
             up = Signal([(0j, static, 0.0, 0.0), *force.scaled(-1.0)])
             down = Signal([(0j, static, 0.0, 0.0), *force.terms])
-            span = min(first_root((up, down), left, ahead), left)
+            span = min(first_root((up, down), left, ahead, GRAZE * static), left)
         else:
             modal = rig.slip(z, v, theta, direction * kinetic)
             force = Signal([(0j, direction * kinetic, 0.0, 0.0)])

@@ -14,15 +14,18 @@ SAMPLES = 400  # per drive cycle in the kept window
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventRun:
-    """An event-driven run. window: uniform samples of the last cycles and both sides of every event; amplitudes
-    (c, 2): extremes of the output per cycle; ledger: energies [J]; events: how many; loop: quadrature arrays
-    (time, weight, slide, rate, force) over the window; stick: time stuck in the window [s]; starts: phases of release;
-    acceleration: largest |absolute acceleration| at the output in the window, both sides of every jump.
+    """An event-driven run. window: uniform samples of the last cycles and both sides of every event.
+
+    amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its drive-frequency part; ledger: energies [J];
+    events: how many; loop: quadrature arrays (time, weight, slide, rate, force) over the window; stick: time stuck in
+    the window [s]; starts: phases of release; acceleration: largest |absolute acceleration| at the output in the
+    window, both sides of every jump.
     """
 
     response: Response
     window: Response
     amplitudes: np.ndarray
+    phasors: np.ndarray
     ledger: dict
     outcome: Outcome | None
     events: int
@@ -88,20 +91,22 @@ def simulate(modes: ModalBasis, drive: BaseSine, static: float, kinetic: float, 
     period, duration = drive.period, cycles * drive.period
     fastest = max(float(modes.omega.max()), drive.omega)
     recent, corners, extremes, ledger, count, peak = [], [], {}, np.zeros(4), 0, 0.0
-    outcome, end = None, duration
+    outcome, end, phasors = None, duration, np.zeros(int(np.ceil(cycles - 1e-9)), complex)
     for phase in run(modes, drive, static, kinetic, duration):
         out = combine(phase.modal, modes.output)
-        crossing = _phase_extremes(phase, out, period, fastest, travel, extremes, int(np.ceil(cycles - 1e-9)))
+        crossing, turns = _phase_extremes(phase, out, period, fastest, travel, extremes, int(np.ceil(cycles - 1e-9)))
         if crossing is not None:
             outcome, end = Outcome.EXCEEDS_TRAVEL, phase.time + crossing
             phase = Phase(phase.time, phase.theta, crossing, phase.direction, phase.modal, phase.force)
         ledger += _energy(phase, modes, drive, fastest)
+        _add_phasor(phase, out, period, phasors)
         peak = max(peak, _stored(phase, modes, 0.0), _stored(phase, modes, phase.span / 2))
         recent.append(phase)
         count += 1
         if len(corners) < 400_000:
-            corners.append((phase.time, [s(0.0) for s in phase.modal], [s.rate()(0.0) for s in phase.modal],
-                            phase.force(0.0)))
+            own = [0.0, *(turns if static == 0 or len(phase.modal) > 1 else [])]
+            corners += [(phase.time + t, [s(t) for s in phase.modal], [s.rate()(t) for s in phase.modal],
+                         phase.force(t)) for t in own if t <= phase.span]
         while len(recent) > 2 and recent[1].time < phase.time - (window + 1) * period:
             recent.pop(0)
         if progress is not None and count % 50 == 0:
@@ -111,7 +116,15 @@ def simulate(modes: ModalBasis, drive: BaseSine, static: float, kinetic: float, 
     stored = _stored(recent[-1], modes, recent[-1].span)
     book = dict(zip(("work_in", "viscous", "power", "friction"), map(float, ledger)))
     book |= {"stored": stored, "peak_stored": max(peak, stored)}
-    return _collect(modes, drive, recent, corners, extremes, book, outcome, count, window, end)
+    return _collect(modes, drive, recent, corners, extremes, phasors, book, outcome, count, window, end)
+
+
+def _add_phasor(phase, out, period: float, phasors) -> None:
+    """Add the samples of the output on a grid of 64 per cycle to the phasor of their cycle."""
+    first = int(np.ceil(phase.time / period * 64 - 1e-9))
+    number = np.arange(first, int(np.ceil((phase.time + phase.span) / period * 64 - 1e-9)))
+    y = out.many(number * (period / 64) - phase.time)
+    np.add.at(phasors, np.minimum(number // 64, len(phasors) - 1), y * np.exp(-2j * np.pi * number / 64) / 32)
 
 
 def _stored(phase, modes, tau) -> float:
@@ -121,37 +134,59 @@ def _stored(phase, modes, tau) -> float:
 
 
 def _phase_extremes(phase, out, period, fastest, travel, extremes, cycles):
-    """Book the extremes of the output over the phase per cycle; time in the phase at which |output| passes travel."""
-    if len(phase.modal) == 1 and phase.direction == 0:
-        tau = np.array([0.0, phase.span])
-    else:
-        tau = np.linspace(0.0, phase.span, max(3, ceil(phase.span * fastest * 6) + 1))
-    y = out.many(tau)
-    rate = out.rate()
-    turning = np.flatnonzero((y[1:-1] - y[:-2]) * (y[2:] - y[1:-1]) <= 0) + 1
-    for k in turning:
-        t = tau[k]
-        for _ in range(4):
-            curve = rate.rate()(t)
-            t = min(max(t - rate(t) / curve, tau[k - 1]), tau[k + 1]) if curve != 0 else t
-        tau[k], y[k] = t, out(t)
-    cycle = np.minimum(np.floor((phase.time + tau) / period + 1e-12), cycles - 1).astype(int)
-    for c in np.unique(cycle):
-        mine = y[cycle == c]
-        low, high = extremes.get(c, (np.inf, -np.inf))
-        extremes[c] = (min(low, float(mine.min())), max(high, float(mine.max())))
-    beyond = np.flatnonzero(np.abs(y) > travel)
-    if beyond.size == 0:
-        return None
-    k = beyond[0]
-    if k == 0:
-        return 0.0
-    from scipy.optimize import brentq
+    """Book the extremes of the output over the phase per cycle. Returns (time in the phase at which |output| passes
+    travel or None, times of the extremes)."""
+    first = min(int(phase.time / period + 1e-12), cycles - 1)
+    last = min(int((phase.time + phase.span) / period - 1e-12), cycles - 1)
+    rate, turns = out.rate(), []
+    for cycle in range(first, max(first, last) + 1):
+        low = max(cycle * period - phase.time, 0.0) if cycle > first else 0.0
+        high = min((cycle + 1) * period - phase.time, phase.span) if cycle < last else phase.span
+        tau, y = _turning(out, rate, low, high, fastest)
+        small, large = extremes.get(cycle, (np.inf, -np.inf))
+        extremes[cycle] = (min(small, float(y.min())), max(large, float(y.max())))
+        turns += sorted({float(tau[np.argmin(y)]), float(tau[np.argmax(y)])})
+        beyond = np.flatnonzero(np.abs(y) > travel)
+        if beyond.size:
+            k = beyond[0]
+            if k == 0:
+                return float(tau[0]), turns
+            from scipy.optimize import brentq
 
-    return float(brentq(lambda t: abs(out(t)) - travel, tau[k - 1], tau[k]))
+            return float(brentq(lambda t: abs(out(t)) - travel, tau[k - 1], tau[k])), turns
+    return None, turns
 
 
-def _collect(modes, drive, recent, corners, extremes, book, outcome, count, window, end) -> EventRun:
+def _turning(out, rate, low: float, high: float, fastest: float) -> tuple:
+    """Times and values of the output on [low, high], the ends and every turning point among them."""
+    if len(out.terms) == 1 and out.terms[0][0] == 0:
+        tau = np.array([low, high])
+        return tau, out.many(tau)
+    return stationary(out, rate, np.linspace(low, high, max(3, ceil((high - low) * fastest * 6) + 1)))
+
+
+def stationary(signal, rate, tau, share: float = 0.0) -> tuple:
+    """Times and values of `signal` at tau (k,) and at the zeros of its rate between them (Newton from the secant,
+    kept inside). share: only zeros beside a value of at least this share of the largest are looked for."""
+    y, slope = signal.many(tau), rate.many(tau)
+    size = np.abs(y)
+    turn = np.flatnonzero((slope[:-1] * slope[1:] < 0) & (np.maximum(size[:-1], size[1:]) >= share * size.max()))
+    extra, curve = [], rate.rate()
+    for k in turn:
+        a, b = tau[k], tau[k + 1]
+        t = a - slope[k] * (b - a) / (slope[k + 1] - slope[k])
+        for _ in range(6):
+            bend = curve(t)
+            t = min(max(t - rate(t) / bend, a), b) if bend != 0 else t
+        extra.append(t)
+    if not extra:
+        return tau, y
+    times = np.concatenate([tau, extra])
+    order = np.argsort(times, kind="stable")
+    return times[order], np.concatenate([y, signal.many(np.array(extra))])[order]
+
+
+def _collect(modes, drive, recent, corners, extremes, phasors, book, outcome, count, window, end) -> EventRun:
     period = drive.period
     first = max(0.0, end - window * period)
     number = max(2, round((end - first) / period * SAMPLES) + 1)
@@ -187,23 +222,14 @@ def _collect(modes, drive, recent, corners, extremes, book, outcome, count, wind
     released = [theta for theta, time in starts if time in stops]
     loop = tuple(np.concatenate(column) for column in zip(*pieces))
     keys = sorted(extremes)
-    return EventRun(full, wide, np.array([extremes[k] for k in keys]), book, outcome, count, loop, stick,
-                    np.array(released), top, end / period)
+    return EventRun(full, wide, np.array([extremes[k] for k in keys]), phasors[:len(keys)], book, outcome, count, loop,
+                    stick, np.array(released), top, end / period)
 
 
 def _peak_acceleration(phase, modes, drive, low: float, high: float, fastest: float) -> float:
-    """Largest |absolute acceleration| of the output between two times of a phase: samples, then Newton on the top."""
+    """Largest |absolute acceleration| of the output between two times of a phase, both ends included."""
     out = combine(phase.modal, modes.output).rate().rate()
     lead = -1j * drive.acceleration * np.exp(1j * phase.theta)
     signal = Signal([*out.terms, (1j * drive.omega, complex(lead), 0.0, 0.0)])
     tau = np.linspace(low, high, max(5, ceil((high - low) * fastest * 8) + 1))
-    y = signal.many(tau)
-    k = int(np.argmax(np.abs(y)))
-    best = abs(float(y[k]))
-    if 0 < k < len(tau) - 1:
-        t, slope = tau[k], signal.rate()
-        for _ in range(4):
-            curve = slope.rate()(t)
-            t = min(max(t - slope(t) / curve, tau[k - 1]), tau[k + 1]) if curve != 0 else t
-        best = max(best, abs(signal(t)))
-    return best
+    return float(np.abs(stationary(signal, signal.rate(), tau, 0.9)[1]).max())

@@ -1,32 +1,90 @@
-"""Static pictures of a run as SVG text, the same bytes for the same numbers."""
+"""Static pictures of a run as SVG text, the same bytes for the same numbers; units are chosen by magnitude."""
 
 import io
+import re
 
 import numpy as np
 
-BLUE, ORANGE, GREY, GREEN = "#1f5f99", "#c8551b", "#8a8a8a", "#2e7d5b"
-STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 9,
+BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
+WIDTH = 9.6  # inches; the page stretches a picture to its text column
+STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 10,
          "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e3e3e3",
-         "axes.axisbelow": True, "figure.constrained_layout.use": True, "lines.linewidth": 1.4}
+         "axes.axisbelow": True, "axes.titlesize": 11, "axes.formatter.useoffset": False, "legend.frameon": False,
+         "legend.fontsize": 9, "figure.constrained_layout.use": True, "lines.linewidth": 1.4}
+LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
+    "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
+    "s": (("us", 1e6), ("ms", 1e3), ("s", 1.0)),
+    "rad": (("urad", 1e6), ("mrad", 1e3), ("rad", 1.0)),
+    "Pa": (("Pa", 1.0), ("kPa", 1e-3), ("MPa", 1e-6), ("GPa", 1e-9)),
+    "N": (("uN", 1e6), ("mN", 1e3), ("N", 1.0), ("kN", 1e-3)),
+    "J": (("nJ", 1e9), ("uJ", 1e6), ("mJ", 1e3), ("J", 1.0)),
+    "N m": (("uN m", 1e6), ("mN m", 1e3), ("N m", 1.0)),
+    "N m-1": (("N/m", 1.0), ("N/mm", 1e-3), ("N/um", 1e-6)),
+    "m3": (("um^3", 1e18), ("mm^3", 1e9)),
+}
+SPARSE = 20  # kept samples per cycle below which a line through them would not be the motion
+DOTS, BANDS = 800, 1500
 
 
-def _figure(columns: int = 1, height: float = 2.6):
+def step_of(ladder: tuple, size: float) -> tuple:
+    """(name, scale) of the smallest unit of a ladder in which `size` [SI] stays below 1000."""
+    for name, scale in ladder:
+        if abs(size) * scale < 1000:
+            return name, scale
+    return ladder[-1]
+
+
+def axis_unit(values, unit: str) -> tuple:
+    """(name, scale) for an axis that shows `values` [SI]."""
+    values = np.asarray(values)
+    return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def envelope(time, value, period: float) -> tuple:
+    """(middle, lowest, highest) of the samples of each cycle; a cycle without samples is a gap of NaN.
+
+    time, value: (k,), ascending; cycles are put together where there are more than a picture can show.
+    """
+    many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / BANDS)))
+    number = np.floor(time / (many * period) + 1e-9).astype(int)
+    count = number[-1] + 1
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, number, value)
+    np.maximum.at(high, number, value)
+    empty = low > high
+    low[empty] = high[empty] = np.nan
+    return (np.arange(count) + 0.5) * many * period, low, high
+
+
+def whole_from(time, period: float, window_start: float) -> float:
+    """Time [s] from which the kept samples show the motion itself: every later cycle holds at least SPARSE of them.
+
+    The last window is always kept whole, so the answer is never later than its start.
+    """
+    counts = np.bincount(np.floor(time / period + 1e-9).astype(int))[:-1]
+    thin = np.flatnonzero(counts < SPARSE)
+    return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
+
+
+def _figure(columns: int = 1, height: float = 3.2, **layout):
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7.2, height))
+    figure = Figure(figsize=(WIDTH, height))
     FigureCanvasSVG(figure)
-    return figure, figure.subplots(1, columns, squeeze=False)[0]
+    axes = figure.subplots(1, columns, squeeze=False, **layout)[0]
+    if columns > 1:
+        for axis in axes:
+            axis.locator_params(axis="x", nbins=6)
+    return figure, axes
 
 
 def _svg(figure) -> str:
-    import matplotlib
-
+    """The drawing alone, without date, creator or any address but those of the XML namespaces."""
     text = io.StringIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(text, format="svg", metadata={"Date": None})
+    figure.savefig(text, format="svg", dpi=180, metadata={"Date": None})
     body = text.getvalue()
-    return body[body.index("<svg"):]
+    return re.sub(r"\s*<metadata>.*?</metadata>", "", body[body.index("<svg"):], flags=re.DOTALL)
 
 
 def _styled(draw):
@@ -39,95 +97,187 @@ def _styled(draw):
     return wrapped
 
 
+def part_in_contact(x, sigma) -> tuple | None:
+    """(first, last) x [m] to show where less than half the length is pressed, None where all of it is worth showing."""
+    used = np.flatnonzero(sigma > 0)
+    if not used.size or used.size >= 0.5 * x.size:
+        return None
+    pad = 0.15 * (x[used[-1]] - x[used[0]]) + (x[1] - x[0])
+    return max(x[0], x[used[0]] - pad), min(x[-1], x[used[-1]] + pad)
+
+
 @_styled
-def interface(x, fields: dict, friction: bool) -> str:
-    """sigma_n(x) of the pressed state and, with friction, tau(x) in the frame of the largest resultant."""
-    both = friction and "shear_stress" in fields
-    figure, axes = _figure(2 if both else 1)
-    axes[0].fill_between(x * 1e3, fields["normal_stress"][0] / 1e6, color=BLUE, alpha=0.15, lw=0)
-    axes[0].plot(x * 1e3, fields["normal_stress"][0] / 1e6, color=BLUE)
-    axes[0].set(xlabel="x [mm]", ylabel="normal stress [MPa]", title="Pressure on the interface")
+def interface(x, fields: dict) -> str:
+    """sigma_n(x) of the pressed state and, where some shear acts, tau(x) with the frame of the largest resultant."""
+    sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
+    both = tau is not None and bool(np.any(tau))
+    figure, axes = _figure(2 if both else 1, 3.2)
+    part = part_in_contact(x, sigma) or (x[0], x[-1])
+    along, mm = axis_unit(part, "m")
+    unit, scale = axis_unit(sigma, "Pa")
+    axes[0].fill_between(x * mm, sigma * scale, color=BLUE, alpha=0.15, lw=0)
+    axes[0].plot(x * mm, sigma * scale, color=BLUE)
+    axes[0].set(ylabel=f"normal stress [{unit}]", title="Pressure on the interface")
     if both:
-        tau = fields["shear_stress"]
-        frame = int(np.argmax(np.abs(tau.sum(axis=1))))
+        unit, scale = axis_unit(tau, "Pa")
+        frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         for k in range(1, len(tau)):
-            axes[1].plot(x * 1e3, tau[k] / 1e6, color=GREY, lw=0.6, alpha=0.6)
-        axes[1].plot(x * 1e3, tau[frame] / 1e6, color=ORANGE)
-        axes[1].set(xlabel="x [mm]", ylabel="shear stress [MPa]",
-                    title=f"Shear, largest at {fields['time'][frame] * 1e3:.3f} ms")
-    used = np.flatnonzero(fields["normal_stress"][0] > 0)
-    if used.size and used.size < 0.5 * x.size:
-        pad = 0.15 * (x[used[-1]] - x[used[0]]) + (x[1] - x[0])
-        for axis in axes:
-            axis.set_xlim(max(x[0], x[used[0]] - pad) * 1e3, min(x[-1], x[used[-1]] + pad) * 1e3)
+            axes[1].plot(x * mm, tau[k] * scale, color=GREY, lw=0.6, alpha=0.6)
+        axes[1].plot(x * mm, tau[frame] * scale, color=ORANGE)
+        name, per = axis_unit(fields["time"], "s")
+        axes[1].set(ylabel=f"shear stress [{unit}]",
+                    title=f"Shear stress, largest resultant at {fields['time'][frame] * per:.4g} {name}")
+    for axis in axes:
+        axis.set(xlabel=f"x [{along}]", xlim=(part[0] * mm, part[1] * mm))
     return _svg(figure)
 
 
+def closer(x, depth, sigma, ratio: float) -> tuple:
+    """(left, right, height) [m] of the part of both pieces that shows the contact, right - left = 2 height ratio."""
+    used = np.flatnonzero(sigma > 0)
+    first, last, length = x[used[0]], x[used[-1]], x[-1] - x[0]
+    width = min(1.6 * (last - first) + 2 * (x[1] - x[0]), 0.4 * length)
+    middle = (first + last) / 2
+    if last - first > width:
+        middle = x[np.flatnonzero(sigma >= (1 - 1e-6) * sigma.max())[0]]
+    height = min(width / ratio / 2, depth[-1])
+    left = min(max(middle - width / 2, x[0]), x[-1] - width)
+    return left, left + width, height
+
+
 @_styled
-def bodies(x, depth, mises, gap_scale: str = "") -> str:
-    """Von Mises stress [Pa] of both pieces, pressed: mises (2, nx - 1, ny - 1) for the lower and the upper piece."""
-    figure, (axis,) = _figure(1, 3.2)
-    top = np.quantile(mises, 0.995) / 1e6
-    for k, side in ((0, -1), (1, 1)):
-        mesh = axis.pcolormesh(x * 1e3, side * depth * 1e3, mises[k].T / 1e6, cmap="viridis", vmin=0, vmax=top,
-                               rasterized=True)
-    axis.axhline(0, color="white", lw=0.8)
-    axis.set(xlabel="x [mm]", ylabel="y [mm]", title="Von Mises stress of the pressed pieces [MPa]", aspect="equal")
-    axis.grid(False)
-    figure.colorbar(mesh, ax=axis, shrink=0.9)
+def bodies(x, depth, mises, sigma) -> str:
+    """Von Mises stress [Pa] of both pieces, pressed: the whole pair, and closer where sigma (m,) [Pa] is not zero.
+
+    mises (2, nx - 1, ny - 1): of the lower and the upper piece; colours end at all but the sharpest cells.
+    """
+    tall = 3.7
+    wide = min(max(tall * (x[-1] - x[0]) / (2 * depth[-1]), 1.5), 4.2)
+    rest = WIDTH - wide - 2.3
+    figure, axes = _figure(2, tall + 0.7, width_ratios=(wide, rest))
+    box = closer(x, depth, sigma, rest / tall)
+    (unit, scale), top = axis_unit(mises, "Pa"), 0.0
+    for axis, (left, right, height) in zip(axes[::-1], (box, (x[0], x[-1], depth[-1]))):
+        name, size = axis_unit((left, right, height), "m")
+        i = slice(max(np.searchsorted(x, left, "right") - 1, 0), np.searchsorted(x, right) + 1)
+        j = slice(0, np.searchsorted(depth, height) + 1)
+        cells = mises[:, i.start:i.stop - 1, :j.stop - 1] * scale
+        top = top or float(np.quantile(cells, 0.998))  # the framed part comes first and sets the colours
+        for k, side in ((0, -1), (1, 1)):
+            mesh = axis.pcolormesh(x[i] * size, side * depth[j] * size, cells[k].T, cmap="viridis", vmin=0, vmax=top,
+                                   rasterized=True)
+        axis.axhline(0, color="white", lw=0.6)
+        axis.set(xlabel=f"x [{name}]", ylabel=f"y [{name}]", aspect="equal", xlim=(left * size, right * size),
+                 ylim=(-height * size, height * size))
+        axis.grid(False)
+    size = axis_unit((x[0], x[-1], depth[-1]), "m")[1]
+    left, right, height = box
+    axes[0].plot(np.array([left, right, right, left, left]) * size,
+                 np.array([-1, -1, 1, 1, -1]) * height * size, color=ORANGE, lw=1.0)
+    axes[0].set_title("Von Mises stress")
+    axes[1].set_title("The framed part")
+    figure.colorbar(mesh, ax=list(axes), label=unit, extend="max", fraction=0.05, pad=0.02)
     return _svg(figure)
 
 
 @_styled
 def loop(slide, force, title: str) -> str:
     """Friction force [N] against slide [m]."""
-    figure, (axis,) = _figure(1, 3.0)
-    axis.plot(slide * 1e6, force, color=BLUE, lw=1.0)
-    axis.set(xlabel="slide [um]", ylabel="friction force [N]", title=title)
+    figure, (axis,) = _figure(1, 3.6)
+    along, um = axis_unit(slide, "m")
+    up, scale = axis_unit(force, "N")
+    axis.plot(slide * um, force * scale, color=BLUE, lw=1.0)
+    axis.set(xlabel=f"slide [{along}]", ylabel=f"friction force [{up}]", title=title)
     return _svg(figure)
 
 
 @_styled
-def histories(time, displacement, window: dict | None) -> str:
-    """The whole run and, for a rig, its last three cycles with input and response acceleration."""
-    figure, axes = _figure(2 if window else 1, 3.0)
-    axes[0].plot(time, displacement * 1e6, color=BLUE, lw=0.7)
-    axes[0].set(xlabel="time [s]", ylabel="displacement [um]", title="Whole run")
+def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles") -> str:
+    """The whole run beside its last cycles (a rig) or beside its friction force (a bench).
+
+    history: time, displacement, force; window: the last cycles alone, with base and block acceleration;
+    period [s] of the drive, None where every sample was kept.
+    """
+    forced = window is None and bool(np.any(history["force"]))
+    figure, axes = _figure(2 if window or forced else 1, 3.6)
+    name, per = axis_unit(history["time"], "s")
+    start = window["time"][0] if window else 0.0
+    _whole_run(axes[0], history, period, per, start)
+    axes[0].set(xlabel=f"time [{name}]", title="Whole run")
+    if forced:
+        up, scale = axis_unit(history["force"], "N")
+        axes[1].plot(history["time"] * per, history["force"] * scale, color=ORANGE, lw=1.0)
+        axes[1].set(xlabel=f"time [{name}]", ylabel=f"friction force [{up}]", title="Friction force")
     if window:
-        t = (window["time"] - window["time"][0]) * 1e3
-        axes[1].plot(t, window["acceleration"] / 9.80665, color=ORANGE, label="block, absolute")
-        axes[1].plot(t, window["base"] / 9.80665, color=GREY, label="base")
-        axes[1].set(xlabel="time [ms]", ylabel="acceleration [g]", title="Last cycles")
-        axes[1].legend(frameon=False, fontsize=8, loc="upper center", ncols=2, bbox_to_anchor=(0.5, -0.22))
-        twin = axes[1].twinx()
-        twin.plot(t, window["displacement"] * 1e6, color=BLUE, lw=1.0)
-        twin.set_ylabel("displacement [um]", color=BLUE)
-        twin.grid(False)
+        _last_cycles(axes[1], window, title)
     return _svg(figure)
+
+
+def _whole_run(axis, history, period, per, window_start) -> None:
+    time, value = history["time"], history["displacement"]
+    unit, scale = axis_unit(value, "m")
+    axis.set_ylabel(f"displacement [{unit}]")
+    begin = whole_from(time, period, window_start) if period else time[0]
+    late = time >= begin
+    if not late.all():
+        middle, low, high = envelope(time[~late], value[~late], period)
+        axis.fill_between(middle * per, low * scale, high * scale, color=BLUE, alpha=0.22, lw=0)
+        if (~late).sum() <= DOTS:
+            axis.plot(time[~late] * per, value[~late] * scale, ".", color=BLUE, ms=2.0, mew=0)
+    axis.plot(time[late] * per, value[late] * scale, color=BLUE, lw=0.7)
+
+
+def _last_cycles(axis, window: dict, title: str) -> None:
+    """Accelerations on the left axis, displacement on the right one, both axes in the colours of their curves."""
+    name, per = axis_unit(window["time"] - window["time"][0], "s")
+    unit, scale = axis_unit(window["displacement"], "m")
+    t = (window["time"] - window["time"][0]) * per
+    twin = axis.twinx()
+    lines = [*axis.plot(t, window["acceleration"] / 9.80665, color=ORANGE, label="block acceleration (left)"),
+             *axis.plot(t, window["base"] / 9.80665, color=ORANGE, lw=1.0, ls="--", label="base acceleration (left)"),
+             *twin.plot(t, window["displacement"] * scale, color=BLUE, lw=1.2, label="displacement (right)")]
+    axis.set(xlabel=f"time [{name}]", title=title)
+    axis.set_ylabel("acceleration [g]", color=ORANGE)
+    twin.set_ylabel(f"displacement [{unit}]", color=BLUE)
+    twin.spines["right"].set_visible(True)
+    twin.grid(False)
+    for one, side, colour in ((axis, "left", ORANGE), (twin, "right", BLUE)):
+        one.tick_params(axis="y", colors=colour)
+        twin.spines[side].set_color(colour)
+        one.spines[side].set_color(colour)
+        low, high = one.dataLim.intervaly
+        if low < 0 < high:  # zero at mid-height on both sides
+            one.set_ylim(-1.08 * max(-low, high), 1.08 * max(-low, high))
+    axis.legend(handles=lines, loc="upper center", ncols=2, bbox_to_anchor=(0.5, -0.17))
 
 
 @_styled
 def measured(rows: list, frequency: float, level: float, acceleration, displacement) -> str:
     """Measured acceleration and displacement against input at one frequency, with the computed point.
 
-    rows: objects of the measured table; acceleration, displacement: (value, error) computed, in SI.
+    rows: objects of the measured table; acceleration, displacement: (value, error) computed, in SI, or None.
     """
-    figure, axes = _figure(2)
+    figure, axes = _figure(2, 3.6)
     near = [r for r in rows if abs(r.frequency - frequency) < 0.5]
+    legend = {}
     for axis, name, unit, scale, found in ((axes[0], "acceleration", "g", 9.80665, acceleration),
                                            (axes[1], "displacement", "mil", 25.4e-6, displacement)):
+        read = [r for r in near if getattr(r, name) is not None]
         for repeat, marker in ((False, "o"), (True, "s")):
-            pick = [r for r in near if getattr(r, name) is not None and ("R" in r.flag) == repeat]
+            pick = [r for r in read if ("R" in r.flag) == repeat]
             if pick:
-                axis.plot([r.input / 9.80665 for r in pick], [getattr(r, name) / scale for r in pick], marker,
-                          color=GREY, ms=5, label="measured, repeat" if repeat else "measured")
-        for r in near:
-            if "U" in r.flag:
-                axis.axvline(r.input / 9.80665, color=ORANGE, lw=0.8, ls=":", label="unstable")
-        axis.errorbar([level / 9.80665], [found[0] / scale], yerr=[(found[1] or 0) / scale], fmt="D", color=BLUE,
-                      ms=6, capsize=3, label="computed")
-        axis.set(xlabel="input [g]", ylabel=f"{name} [{unit}]", title=f"{frequency:g} Hz")
+                text = "measured, repeat run" if repeat else "measured"
+                legend[text], = axis.plot([r.input / 9.80665 for r in pick], [getattr(r, name) / scale for r in pick],
+                                          marker, color=GREY, ms=6, ls="none")
+        for place in sorted({r.input / 9.80665 for r in near if "U" in r.flag}):
+            legend["unstable in the test"] = axis.axvline(place, color=ORANGE, lw=1.2, ls=":")
+        if found is not None:
+            legend["computed"] = axis.errorbar([level / 9.80665], [found[0] / scale], yerr=[(found[1] or 0) / scale],
+                                               fmt="D", color=BLUE, ms=6, capsize=3)
+        word = "" if read else ", not measured"
+        axis.set(xlabel="input [g]", ylabel=f"{name} [{unit}]",
+                 title=f"{name.capitalize()} at {frequency:g} Hz{word}")
+        axis.margins(x=0.08, y=0.1)
         axis.set_ylim(bottom=0)
-        axis.margins(x=0.08)
-        axis.legend(frameon=False, fontsize=8)
+    figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=max(1, len(legend)))
     return _svg(figure)

@@ -1,7 +1,9 @@
 """report.html: one page that stands alone, the verdict first; pictures are inline SVG, nothing is fetched."""
 
 import re
+import tomllib
 from html import escape
+from math import floor, isfinite, log10, pi
 from pathlib import Path
 
 import numpy as np
@@ -13,68 +15,137 @@ CSS = """
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);max-width:62rem;margin:2rem auto;padding:0 1.2rem}
 h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.1rem;margin:2rem 0 .4rem}
 .verdict{background:var(--tint);border-left:4px solid var(--accent);padding:.8rem 1rem;margin:1rem 0;font-size:1.05rem}
-.warn{border-color:#c8551b}table{border-collapse:collapse;width:100%;font-size:.92rem}
+.v{white-space:nowrap}.warn{border-color:#c8551b;font-size:1rem}.warn p{margin:.2rem 0}
+table{border-collapse:collapse;width:100%;font-size:.92rem}
 td,th{padding:.25rem .6rem;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
-td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}th{color:var(--soft);font-weight:600}
-svg{max-width:100%;height:auto}figure{margin:1rem 0}figcaption,.soft{color:var(--soft);font-size:.9rem}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}th{color:var(--soft);font-weight:600}
+figure{margin:1.6rem 0}figure svg{display:block;width:100%;height:auto}
+figcaption,.soft{color:var(--soft);font-size:.9rem}figcaption{margin-top:.3rem}
 pre{background:var(--tint);padding:.8rem;overflow:auto;font-size:.82rem}details{margin:.6rem 0}
-@media print{details{display:none}body{margin:0}}
+@media print{details{display:none}body{margin:0}figure{break-inside:avoid}}
 """
-SHOP = {"m": (("um", 1e6), ("mil", 1 / 25.4e-6)), "m s-2": (("g", 1 / 9.80665),),
-        "Pa": (("MPa", 1e-6), ("psi", 1 / 6894.757)),
-        "N": (("lbf", 1 / 4.4482216152605),), "N m-1": (("N/um", 1e-6), ("lbf/in", 0.0254 / 4.4482216152605)),
-        "rad": (("mrad", 1e3), ("deg", 57.29577951308232)), "J": (("mJ", 1e3), ("in lbf", 8.850745791327184)),
-        "N m": (("in lbf", 8.850745791327184),)}
+G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
+DEG = ("deg", 180 / pi)
+WORKSHOP = {  # as pictures.LADDERS
+    "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)), "m3": (("in^3", INCH**-3),), "rad": (DEG,),
+    "N": (("lbf", 1 / LBF),), "N m": (("lbf in", 1 / LBF / INCH),), "J": (("in lbf", 1 / LBF / INCH),),
+    "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
+    "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
+SETTLED = ("steady", "stuck", "done")
 
 
-def number(value) -> str:
-    """Six significant digits, or a dash for nothing."""
-    return "&ndash;" if value is None else f"{value:.6g}"
+def matched(value, error=None) -> tuple:
+    """Value and error as texts that end at the same digit, the second of the error; six digits of the value at most."""
+    if value is None:
+        return "&ndash;", "&ndash;"
+    second = "&ndash;" if error is None else f"{error:.2g}"
+    if not error or not isfinite(error) or not isfinite(value) or value == 0:
+        return f"{value:.6g}", second
+    size, place = floor(log10(abs(value))), int(f"{error:.1e}".split("e")[1]) - 1  # of the first and the last digit
+    if place < size - 5:
+        return f"{value:.6g}", second
+    if not -4 <= size < 6 or place > 0:
+        return f"{value:.{max(0, size - place)}e}", f"{error:.1e}"
+    return f"{value:.{-place}f}", f"{error:.{-place}f}"
 
 
-def shop(value, unit: str) -> str:
-    """The value in the units of a workshop, where the unit has any."""
-    if value is None or unit not in SHOP:
+def units(name: str, value: float, unit: str) -> list:
+    """[(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first."""
+    if name.endswith("fraction"):
+        return [("%", 100.0)]
+    if name.endswith("phase"):
+        return [DEG]
+    if unit == "m s-2":
+        return [("g", 1 / G)]
+    ladders = [table[unit] for table in (pictures.LADDERS, WORKSHOP) if unit in table]
+    return [pictures.step_of(ladder, value) for ladder in ladders]
+
+
+def pair(name: str, measure: dict) -> str:
+    """`14.808 ± 0.041 um`: a measure with its error in the first of its units."""
+    value, error = measure["value"], measure["error"]
+    unit, scale = (units(name, value, measure["unit"]) or [("" if measure["unit"] == "1" else measure["unit"], 1.0)])[0]
+    value, error = matched(value * scale, None if error is None else error * scale)
+    return f"{value} {unit}".strip() if error.startswith("&") else f"{value} ± {error} {unit}".strip()
+
+
+def others(name: str, measure: dict) -> str:
+    """The value in its other units, to the digits its error allows; nothing for a value that is zero within it."""
+    value, error = measure["value"], measure["error"]
+    if value is None or not isfinite(value) or abs(value) <= (error or 0.0):
         return ""
-    return " = ".join(f"{value * scale:.4g} {name}" for name, scale in SHOP[unit])
+    out = []
+    for unit, scale in units(name, value, measure["unit"]):
+        if scale == 1.0 or abs(value) * scale < 1e-3:
+            continue
+        sharp = error is None or error < 1e-4 * abs(value)
+        text = f"{value * scale:.5g}" if sharp else matched(value * scale, error * scale)[0]
+        out.append(f"{text} {unit}")
+    return " = ".join(out)
+
+
+def cycles(data: dict) -> float | None:
+    """Cycles that were run, None where the run has none."""
+    period = data.get("loop", {}).get("period")
+    if period:
+        time = data["history"]["time"]
+        return float(time[-1] - time[0]) / period
+    return tomllib.loads(data["resolved"]).get("slide", {}).get("cycles")
+
+
+def part_of_cycle(data: dict) -> bool:
+    """Whether the run ended before its first cycle did."""
+    count = cycles(data)
+    return count is not None and count < 1 - 1e-6
+
+
+def pressed(data: dict) -> bool:
+    """Whether there is a patch and some of it is in contact."""
+    return data["x"] is not None and bool(data["fields"]) and bool(np.any(data["fields"]["normal_stress"][0] > 0))
 
 
 def verdict(data: dict) -> str:
-    """The answer in one or two sentences, with the error of each number."""
-    measures, parts = data["summary"]["measures"], []
+    """The answer in a few sentences, with the error of each number."""
+    summary, parts = data["summary"], []
+    measures, outcome = summary["measures"], summary["outcome"]
 
-    def said(name, scale, unit, text):
+    def said(name, text):
         found = measures.get(name)
         if found and found["value"] is not None:
-            error = f" ± {found['error'] * scale:.2g}" if found["error"] is not None else ""
-            parts.append(text.format(f"{found['value'] * scale:.4g}{error} {unit}".strip()))
+            parts.append(text.format(f"<span class=v>{escape(pair(name, found))}</span>"))
 
-    said("relative_displacement_amplitude", 1e6, "um", "the block moves {} half peak-to-peak")
-    said("absolute_acceleration_peak", 1 / 9.80665, "g", "peak acceleration {}")
-    if "relative_displacement_amplitude" not in measures:
-        said("friction_ratio_peak", 1, "", "friction ratio peaks at {}")
-    said("loop_area", 1e3, "mJ", "{} dissipated per cycle")
-    said("contact_fraction", 100, "%", "contact on {} of the patch")
-    if data["summary"]["kind"] == "patch":
-        said("pressure_peak", 1e-6, "MPa", "peak pressure {}")
-    outcome = data["summary"]["outcome"]
-    return f"<b>{escape(outcome)}</b>: {escape(data['sentence'])} " + escape("; ".join(parts)) + "."
+    if outcome != "no_contact":
+        said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
+        said("relative_displacement_amplitude_steady", "it would settle at {}")
+        said("absolute_acceleration_peak", "peak acceleration {}")
+        if "relative_displacement_amplitude" not in measures:
+            said("friction_ratio_peak", "friction ratio peaks at {}")
+        if not part_of_cycle(data):
+            said("loop_area", "{} dissipated per cycle")
+        said("contact_fraction", "contact on {} of the length")
+        if summary["kind"] == "patch":
+            said("pressure_peak", "peak pressure {}")
+    text = "; ".join(parts)
+    if part_of_cycle(data) and text:
+        text = f"in {cycles(data):.2g} of a cycle {text}"
+    answer = f"<b>{escape(outcome)}</b>: {escape(data['sentence'])}"
+    return f"{answer} {text[0].upper() + text[1:]}." if text else answer
 
 
 def page(data: dict) -> str:
     """The whole page from the plain data of a run."""
     summary = data["summary"]
-    title = summary["title"] or "patchfem run"
+    title = summary["title"] or data.get("name") or "patchfem run"
     parts = [f"<h1>{escape(title)}</h1><p class=soft>patchfem {escape(summary['patchfem'])} &middot; "
              f"{escape(summary['kind'])} &middot; engine {escape(data['engine'] or 'static')} &middot; "
              f"{summary['seconds'].get('total', 0):.2f} s</p>", f"<p class=verdict>{verdict(data)}</p>"]
-    if summary["warnings"]:
-        items = "".join(f"<li>{escape(w)}</li>" for w in summary["warnings"])
-        parts.append(f"<div class='verdict warn'><ul>{items}</ul></div>")
-    parts += _figures(data)
+    warnings = [w for w in summary["warnings"] if w != data["sentence"]]
+    if warnings:
+        parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
+    parts += [_placed(number, *shown) for number, shown in enumerate(figures(data))]
     if "measured" in data:
         parts.append(_table_one(data))
-    parts += [_measures(summary), _cost(data)]
+    parts += [_measures(data), _cost(data)]
     parts.append(f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>")
     parts.append(f"<details><summary>Scene in SI, every default written out</summary><pre>{escape(data['resolved'])}"
                  "</pre></details>")
@@ -85,84 +156,143 @@ def page(data: dict) -> str:
             f"<title>{escape(title)}</title><style>{CSS}</style></head><body>{body}</body></html>\n")
 
 
-def _figures(data: dict) -> list:
-    out = []
+def _placed(number: int, svg: str, caption: str) -> str:
+    """A figure; one page holds many pictures, so their ids are told apart by the number."""
+    svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
+    svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
+    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
 
-    def add(svg, caption):
-        # one page holds many pictures: their ids must not meet
-        tag = f"f{len(out)}"
-        svg = re.sub(r'id="([^"]+)"', rf'id="{tag}\1"', svg)
-        svg = re.sub(r'(url\(|href=")#', rf"\1#{tag}", svg)
-        out.append(f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>")
 
-    if data["x"] is not None and data["fields"]:
-        add(pictures.interface(data["x"], data["fields"], "shear_stress" in data["fields"]),
-            "Normal stress of the pressed pieces; shear stress in the frames of the last cycle, the largest in colour.")
-    if "bodies" in data:
-        add(pictures.bodies(data["x"], data["bodies"]["depth"], data["bodies"]["mises"]),
-            "Both pieces with their coatings under the load alone.")
-    if "loop" in data and np.any(data["loop"]["force"]):
-        add(pictures.loop(data["loop"]["slide"], data["loop"]["force"], "Friction loop"),
-            "Resultant friction force against the slide of the interface, over the last window.")
-    if "history" in data:
-        window = None
-        if "window" in data:
-            w = data["window"]
-            late = w["time"] >= w["time"][-1] - 3 * data["loop"]["period"]
-            window = {k: v[late] for k, v in w.items()}
-        add(pictures.histories(data["history"]["time"], data["history"]["displacement"], window),
-            "Displacement over the whole run (thinned before the last window) and the last cycles.")
-    if "measured" in data and data["measured"].get("input") is not None:
-        m, found = data["measured"], data["summary"]["measures"]
-        pair = [(found[k]["value"], found[k]["error"]) for k in ("absolute_acceleration_peak",
-                                                                "relative_displacement_amplitude")]
-        pair[0] = tuple(None if v is None else v * m["gain"] for v in pair[0])
-        add(pictures.measured(m["rows"], m["frequency"], m["input"], *pair),
-            "Measured responses at the drive frequency and the computed point"
-            + (f" (reading factor {m['gain']:g})." if m["gain"] != 1 else "."))
-    return out
+def figures(data: dict) -> list:
+    """[(svg, caption)] of the pictures that this run has something to show in."""
+    drawn = [draw(data) for draw in (_interface, _bodies, _loop, _histories, _measured)]
+    return [shown for shown in drawn if shown is not None]
+
+
+def _interface(data: dict) -> tuple | None:
+    if not pressed(data):
+        return None
+    fields, caption = data["fields"], "Normal stress of the pressed pieces"
+    if np.any(fields.get("shear_stress", 0.0)):
+        span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
+        caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
+    if pictures.part_in_contact(data["x"], fields["normal_stress"][0]):
+        length, scale = pictures.axis_unit(data["x"], "m")
+        caption += f". Shown is the part in contact, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
+    return pictures.interface(data["x"], fields), caption + "."
+
+
+def _bodies(data: dict) -> tuple | None:
+    if "bodies" not in data or not pressed(data):
+        return None
+    effects = [e["effect"] for e in data["summary"]["effects"]]
+    coated = "with their coatings " if "contact.coating" in effects else ""
+    cause = "at the prescribed approach" if "contact.approach" in effects else "under the load"
+    alone = "" if data["summary"]["kind"] == "patch" else " alone, before any slide"
+    mises = data["bodies"]["mises"]
+    unit, scale = pictures.axis_unit(mises, "Pa")
+    return (pictures.bodies(data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
+            f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {mises.max() * scale:.3g} {unit}.")
+
+
+def _loop(data: dict) -> tuple | None:
+    if "loop" not in data or not np.any(data["loop"]["force"]) or np.ptp(data["loop"]["slide"]) == 0:
+        return None
+    own = data["loop"]
+    whole = "window" not in data or part_of_cycle(data)
+    span = "the whole run" if whole else f"the last {(own['time'][-1] - own['time'][0]) / own['period']:.3g} cycles"
+    title = "Friction force against slide" if part_of_cycle(data) or cycles(data) is None else "Friction loop"
+    return (pictures.loop(own["slide"], own["force"], title),
+            f"Resultant friction force against the slide of the interface, over {span}.")
+
+
+def _histories(data: dict) -> tuple | None:
+    if "history" not in data:
+        return None
+    history, period, window, title = data["history"], data["loop"].get("period"), None, ""
+    if "window" not in data:
+        force = " and friction force" if np.any(history["force"]) else ""
+        return pictures.histories(history, None, None), f"Slide{force} over the whole run."
+    w = data["window"]
+    late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
+    window = {k: v[late] for k, v in w.items()}
+    count = (window["time"][-1] - window["time"][0]) / period
+    title = f"The run's {count:.2g} cycles" if count >= cycles(data) - 1e-6 else f"Last {count:.2g} cycles"
+    title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
+    caption = "Displacement over the whole run; beside it accelerations (left axis) and displacement (right axis)."
+    begin = pictures.whole_from(history["time"], period, w["time"][0])
+    kept = int(np.sum(history["time"] < begin))
+    if kept:
+        what = "reversals were kept: dots, with a band from the lowest to the highest of each cycle." \
+            if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
+        unit, scale = pictures.axis_unit(history["time"], "s")
+        caption += f" Before {begin * scale:.4g} {unit} only {what}"
+    return pictures.histories(history, window, period, title), caption
+
+
+def _measured(data: dict) -> tuple | None:
+    m, found = data.get("measured", {}), data["summary"]["measures"]
+    if m.get("input") is None or m.get("frequency") is None:
+        return None
+    points = []
+    for name, gain in (("absolute_acceleration_peak", m["gain"]), ("relative_displacement_amplitude", 1.0)):
+        one = found.get(name, {"value": None})
+        points.append(None if one["value"] is None else
+                      (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
+    factor = f" (reading factor {m['gain']:g})" if m["gain"] != 1 else ""
+    return (pictures.measured(m["rows"], m["frequency"], m["input"], *points),
+            f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
+
+
+def _unsettled(data: dict) -> str:
+    outcome = data["summary"]["outcome"]
+    return "" if outcome in SETTLED else f" The run ended as {outcome}: the computed values are not of a steady motion."
 
 
 def _table_one(data: dict) -> str:
     m, found = data["measured"], data["summary"]["measures"]
-    if m.get("input") is None:
+    if m.get("input") is None or m.get("frequency") is None:
         return ""
     rows = []
     for r in m["rows"]:
         if abs(r.frequency - m["frequency"]) > 0.5 or abs(r.input - m["input"]) > 0.01 * m["input"]:
             continue
-        for name, key, scale, unit in (("acceleration", "absolute_acceleration_peak", 9.80665, "g"),
+        for name, key, scale, unit in (("acceleration", "absolute_acceleration_peak", G, "g"),
                                        ("displacement", "relative_displacement_amplitude", 25.4e-6, "mil")):
-            value = getattr(r, name)
-            if value is None:
+            value, mine = getattr(r, name), found.get(key, {"value": None})["value"]
+            if value is None or mine is None:
                 continue
-            mine = found[key]["value"] * (m["gain"] if name == "acceleration" else 1.0)
-            kind = f"{name}{' (repeat)' if 'R' in r.flag else ''}"
+            mine = mine * (m["gain"] if name == "acceleration" else 1.0)
+            kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
+            ratio = f"{mine / value:.2f}" if value else "&ndash;"
             rows.append(f"<tr><td>{kind}</td><td class=n>{value / scale:.3g} {unit}</td>"
-                        f"<td class=n>{mine / scale:.3g} {unit}</td><td class=n>{mine / value:.2f}</td></tr>")
+                        f"<td class=n>{mine / scale:.3g} {unit}</td><td class=n>{ratio}</td></tr>")
     if not rows:
         return "<p class=soft>No measured row has this frequency and input.</p>"
-    return ("<h2>Against the measurement</h2><table><tr><th>reading<th>measured<th>computed<th>ratio</tr>"
-            + "".join(rows) + "</table>")
+    return ("<h2>Against the measurement</h2><table><tr><th>reading<th class=n>measured<th class=n>computed"
+            f"<th class=n>ratio</tr>{''.join(rows)}</table><p class=soft>{escape(_unsettled(data).strip())}</p>")
 
 
-def _measures(summary: dict) -> str:
+def _measures(data: dict) -> str:
     rows = []
-    for name, m in summary["measures"].items():
-        rows.append(f"<tr><td>{escape(name)}</td><td class=n>{number(m['value'])}</td>"
-                    f"<td class=n>{number(m['error'])}</td><td>{escape(m['unit'])}</td>"
-                    f"<td>{escape(shop(m['value'], m['unit']))}</td></tr>")
-    return ("<h2>Measures</h2><table><tr><th>measure<th>value<th>error (±)<th>unit<th>in other units</tr>"
-            + "".join(rows) + "</table>")
+    for name, m in data["summary"]["measures"].items():
+        value, error = matched(m["value"], m["error"])
+        rows.append(f"<tr><td>{escape(name)}</td><td class=n>{value}</td><td class=n>{error}</td>"
+                    f"<td>{escape(m['unit'])}</td><td>{escape(others(name, m))}</td></tr>")
+    note = (f"<p class=soft>The run holds {cycles(data):.2g} of a cycle: measures per cycle are not those of a whole "
+            "one.</p>") if part_of_cycle(data) else ""
+    return ("<h2>Measures</h2><table><tr><th>measure<th class=n>value<th class=n>error (±)<th>unit<th>in other units"
+            f"</tr>{''.join(rows)}</table>{note}")
 
 
 def _cost(data: dict) -> str:
     summary = data["summary"]
     rows = "".join(f"<tr><td>{escape(e['effect'])}</td><td>{escape(e['equations'])}</td>"
-                   f"<td class=n>{e['seconds']:.4f}</td></tr>" for e in summary["effects"])
+                   f"<td class=n>{e['seconds']:.3f}</td></tr>" for e in summary["effects"])
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    return (f"<h2>What ran and what it cost</h2><table><tr><th>effect<th>equations<th>seconds</tr>{rows}</table>"
-            f"<p class=soft>{escape(parts)}. The law and the modes share one loop; its time stands with the law.</p>"
+    shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
+    return (f"<h2>What ran and what it cost</h2><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
+            f"</table><p class=soft>{escape(parts)}.{shared}</p>"
             f"<p class=soft>Not in the scene, so neither imported nor computed: "
             f"{escape(', '.join(summary['not_in_scene']))}.</p>")
 

@@ -1,39 +1,71 @@
-"""The results folder: everything is written into DIR.partial and renamed to DIR when whole."""
+"""The results folder: everything is written into DIR.partial and renamed to DIR when whole.
+
+Only folders that hold nothing but patchfem results are ever replaced; anything else is refused before a run starts.
+"""
 
 import os
 import shutil
 from pathlib import Path
 
-from ..core import Missing
+from ..core import Missing, PatchfemError
+
+FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml")
+LOCK = ".writer"
 
 
 class Folder:
-    """Context of a results folder. `path` is the partial folder to write into; leaving without an error renames it."""
+    """Context of a results folder, claimed at entry. `path` is the partial folder to write into; leaving without an
+    error renames it, leaving with one removes it. PatchfemError for a target that holds other files or is in use,
+    Missing where it cannot be written."""
 
     def __init__(self, target: Path):
-        self.target = Path(target)
+        self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.with_name(self.target.name + ".partial")
+        self.shown = target
 
     def __enter__(self) -> "Folder":
+        if Path.cwd().is_relative_to(self.target):
+            raise PatchfemError(f"{self.shown}: the working folder cannot be replaced by results; name another -o")
+        for place in (self.target, self.path):
+            _only_ours(place, self.shown)
         try:
             if self.path.exists():
                 shutil.rmtree(self.path)
             self.path.mkdir(parents=True)
+            (self.path / LOCK).write_text(str(os.getpid()))
         except OSError as error:
-            raise Missing(f"{self.target}: the results folder cannot be made ({error.strerror})") from None
+            raise Missing(f"{self.shown}: the results folder cannot be made ({error.strerror})") from None
         return self
 
     def __exit__(self, kind, value, trace) -> None:
         if kind is not None:
+            shutil.rmtree(self.path, ignore_errors=True)
             return
         try:
+            (self.path / LOCK).unlink()
+            old = self.target.with_name(f".{self.target.name}.old{os.getpid()}")
             if self.target.exists():
-                old = self.target.with_name(f".{self.target.name}.old{os.getpid()}")
                 os.replace(self.target, old)
-                os.replace(self.path, self.target)
-                shutil.rmtree(old) if old.is_dir() else old.unlink()
-            else:
-                os.replace(self.path, self.target)
+            os.replace(self.path, self.target)
+            shutil.rmtree(old, ignore_errors=True)
         except OSError as error:
-            raise Missing(f"{self.target}: the results cannot be put in place ({error.strerror}); they are in "
-                          f"{self.path}") from None
+            raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
+                          f"{self.path.name} beside it") from None
+
+
+def _only_ours(place: Path, shown) -> None:
+    """Refuse a place that is no folder, holds foreign files or is being written by a living process."""
+    if not place.exists():
+        return
+    if not place.is_dir():
+        raise PatchfemError(f"{shown}: {place.name} is a file, a results folder would replace it; name another -o")
+    foreign = sorted(p.name for p in place.iterdir()
+                     if p.name.removesuffix(".partial") not in FILES and p.name != LOCK)
+    if foreign:
+        raise PatchfemError(f"{shown}: {place.name} holds files that are not patchfem results ({', '.join(foreign[:3])}"
+                            f"{', ...' if len(foreign) > 3 else ''}); name another -o")
+    lock = place / LOCK
+    if lock.is_file():
+        writer = lock.read_text()
+        if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
+            raise PatchfemError(f"{shown}: another run (process {writer}) is writing it; name another -o or wait")

@@ -35,6 +35,9 @@ def read_table(path: Path) -> list:
     if not lines:
         raise PatchfemError(f"{path}:1: the measured table is empty")
     columns = [_column(path, cell.strip()) for cell in lines[0]]
+    twice = {name for name, _ in columns if [n for n, _ in columns].count(name) > 1}
+    if twice:
+        raise PatchfemError(f"{path}:1: two columns are named {', '.join(sorted(twice))}")
     missing = {"frequency", "input"} - {name for name, _ in columns}
     if missing:
         raise PatchfemError(f"{path}:1: no column {', '.join(sorted(missing))}; a header is like `frequency [Hz]`")
@@ -62,10 +65,9 @@ def _row(path, number: int, columns, cells) -> Row:
                 raise PatchfemError(f"{path}:{number}: flag '{cell}'; known letters are {', '.join(FLAGS)}")
             values[name] = cell
         elif cell:
-            try:
-                values[name] = float(cell) * factor
-            except ValueError:
-                raise PatchfemError(f"{path}:{number}: {name}: '{cell}' is not a number") from None
+            if not re.fullmatch(r"\+?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell):
+                raise PatchfemError(f"{path}:{number}: {name}: '{cell}' is not a number >= 0")
+            values[name] = float(cell) * factor
     if values.get("frequency") is None or values.get("input") is None:
         raise PatchfemError(f"{path}:{number}: frequency and input are wanted in every row")
     return Row(**values)

@@ -34,15 +34,22 @@ def harmonic(time, weight, values, omega) -> complex:
     return 2 * np.sum(weight * values * np.exp(-1j * omega * time)) / np.sum(weight)
 
 
-def interface_loop(time, weight, slide, force, omega, work: float, stiffness: float) -> dict:
+def step_harmonic(time, means, omega) -> complex:
+    """First Fourier coefficient of a force whose mean (k - 1,) over each step between `time` (k,) is known: exact for
+    a force that is constant in each step, so a jump at a sample costs nothing."""
+    turn = np.exp(-1j * omega * time)
+    return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
+
+
+def interface_loop(slide, q: complex, f: complex, work: float, stiffness: float) -> dict:
     """Loop area per cycle [J], equivalent stiffness [N/m] and damping [1] of the interface alone.
 
-    work: friction work over the window per cycle; stiffness K = moving_mass omega_1^2, 0 leaves the damping out.
-    The stiffness is the part of the force in phase with the slide, over the slide amplitude: int F cos/(pi A).
+    slide (k,) over the window; q, f: first Fourier coefficients of slide and force; work: friction work per cycle;
+    stiffness K = moving_mass omega_1^2, 0 leaves the damping out. The stiffness is the part of the force in phase with
+    the slide, over the slide amplitude: int F cos/(pi A).
     """
     amplitude = (slide.max() - slide.min()) / 2
-    out = {"loop_area": work}
-    q, f = harmonic(time, weight, slide - slide.mean(), omega), harmonic(time, weight, force, omega)
+    out = {"loop_area": float(work)}
     if amplitude > 0 and abs(q) > 0:
         out["equivalent_stiffness"] = float((f * q.conjugate()).real / abs(q) / amplitude)
         if stiffness > 0:
@@ -116,34 +123,74 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
     return (tail[:, :, 1].max(axis=1) - tail[:, :, 0].min(axis=1)) / 2
 
 
-def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> tuple:
-    """(outcome, steady estimate or None, its error) from the amplitudes of successive windows.
+def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> Outcome:
+    """steady, transient or grows from the amplitudes of successive windows.
 
-    steady: the last change stays below the tolerance and so does what a geometric tail would still add. A slow tail is
-    extrapolated (Aitken) and counts as transient; without a shrinking change the motion grows when it still rises.
+    steady: the last change stays below the tolerance and so does what a geometric tail would still add. Without a
+    shrinking change the motion grows when it still rises; anything else is transient.
     """
     a = np.asarray(amplitudes, float)
     if a.size == 1:
-        return Outcome.TRANSIENT, None, None
-    change = a[-1] - a[-2]
-    scale = tolerance * abs(a[-1]) + floor
+        return Outcome.TRANSIENT
+    change, scale = a[-1] - a[-2], tolerance * abs(a[-1]) + floor
     if a.size == 2:
-        return (Outcome.STEADY if abs(change) < scale else Outcome.TRANSIENT), None, None
-    before = a[-2] - a[-3]
+        return Outcome.STEADY if abs(change) < scale else Outcome.TRANSIENT
+    rest = tail(a[-3:])
+    rest = np.inf if rest is None else abs(rest)
+    endless = not np.isfinite(rest) and _rises(a) and abs(change) > 0.05 * scale
+    if abs(change) < scale and (rest < scale or not (np.isfinite(rest) or endless)):
+        return Outcome.STEADY
+    return Outcome.GROWS if _rises(a) and not np.isfinite(rest) else Outcome.TRANSIENT
+
+
+def tail(three) -> complex | None:
+    """What a geometric tail through three equally spaced values still adds to the last one (Aitken); None where the
+    changes do not shrink. Complex values carry a beat: its ratio is complex."""
+    before, change = three[1] - three[0], three[2] - three[1]
     ratio = change / before if before != 0 else 0.0
-    rest = change * ratio / (1 - ratio) if abs(ratio) < 0.9995 else np.inf
-    rising = a.size > 3 and change > 0 and bool(np.all(np.diff(a[-4:]) > 0))
-    endless = not np.isfinite(rest) and rising and abs(change) > 1e-3 * scale
-    if abs(change) < scale and (abs(rest) < scale or not (np.isfinite(rest) or endless)):
-        return Outcome.STEADY, None, None
-    if np.isfinite(rest):
-        earlier = None
-        if a.size > 3 and a[-3] != a[-4] and abs(before / (a[-3] - a[-4])) < 0.9995:
-            r = before / (a[-3] - a[-4])
-            earlier = abs(a[-1] + rest - (a[-2] + before * r / (1 - r)))
-        if abs(rest) < 20 * abs(a[-1]) + floor:
-            return Outcome.TRANSIENT, a[-1] + rest, earlier if earlier is not None else abs(rest)
-    return (Outcome.GROWS if rising else Outcome.TRANSIENT), None, None
+    return change * ratio / (1 - ratio) if abs(ratio) < 0.9995 else None
+
+
+def steady_amplitude(amplitudes, phasors) -> tuple:
+    """(steady amplitude, its error) by extrapolation, (None, None) where there is no bounded tail to be seen.
+
+    amplitudes, phasors: (w,) of the last cycle of successive windows; the phasor is the drive-frequency part of the
+    motion. What is left of a decaying free motion turns and shrinks by one complex factor per window, so the phasors
+    are extrapolated (Aitken); the waveform, amplitude over |phasor|, settles with the size of that factor. The error is
+    six times the spread of the last estimates plus twice what the waveform still changes; where it is as large as what
+    was added there is no estimate.
+    """
+    a, p = np.asarray(amplitudes, float), np.asarray(phasors, complex)
+    if a.size < 5 or not np.all(np.abs(p[-5:]) > 0):
+        return None, None
+    shape = a / np.abs(p)
+    ends = []
+    for k in range(3):
+        rest = tail(p[p.size - 3 - k:p.size - k])
+        if rest is None:
+            return None, None
+        ends.append(abs(p[p.size - 1 - k] + rest))
+    shrink = min(abs(p[-1] - p[-2]) / abs(p[-2] - p[-3]), 0.9995)
+    settle = (shape[-1] - shape[-2]) * shrink / (1 - shrink)
+    value = ends[0] * (shape[-1] + settle)
+    error = 6 * (max(ends) - min(ends)) * shape[-1] + 2 * abs(settle) * ends[0] + 1e-9 * value
+    added = abs(value - a[-1])
+    return (float(value), float(error)) if error < max(added, 1e-6 * value) and value < 20 * a[-1] else (None, None)
+
+
+def window_ends(extremes, phasors, window: int) -> tuple:
+    """(amplitudes, phasors) of the last cycle of each window; extremes (c, 2), phasors (c,) per cycle."""
+    pick = np.arange(len(phasors) - 1, -1, -window)[::-1]
+    return (extremes[pick, 1] - extremes[pick, 0]) / 2, phasors[pick]
+
+
+def _rises(a) -> bool:
+    """Whether the last windows rise one after the other, by steps alike: noise does not."""
+    steps = np.diff(a[-6:])
+    if a.size < 4 or steps.min() <= 0:
+        return False
+    ratios = steps[1:] / steps[:-1]
+    return bool(np.all(ratios > 0.5) and np.all(ratios < 3))
 
 
 def run_measures(window: Response, extremes, book: dict, drive: BaseSine, last: int, peak: float | None = None) -> dict:

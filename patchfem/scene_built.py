@@ -1,0 +1,145 @@
+"""What a scene may say but no run can do yet: the list of keys without an implementation, and combinations.
+
+Each message says what serves meanwhile and ends in "not yet built". Building one means deleting its line or rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from patchfem.scene_tables import Contact, Friction, Tables
+
+if TYPE_CHECKING:
+    from patchfem.scene_rules import Draft
+
+# Valid in a scene but without an implementation -> what serves meanwhile.
+NOT_YET_BUILT: dict[str, str] = {
+    "contact.upper": "",
+    "contact.lower": "",
+    "contact.approach": "contact.load",
+    "contact.holder": "",
+    "contact.step": "",
+    "contact.profile": "",
+    "contact.asperities": "",
+    "contact.strips": "",
+    "normal.amplitude": "",
+    "normal.frequency": "",
+    "normal.phase": "",
+    "normal.width": "",
+    "friction.law=tanh": "coulomb, elastic-plastic or nonlocal",
+    "friction.law=convolution": "coulomb, elastic-plastic or nonlocal",
+    "friction.temperature": "",
+    "friction.spread": "",
+    "friction.breakaway": "",
+    "slide.kind=dwell": "constant, sine or triangle",
+    "slide.kind=file": "constant, sine or triangle",
+    "structure.mode.normal": "",
+    "structure.mode.pitch": "",
+    "structure.mode.lateral": "",
+    "structure.mode.yaw": "",
+    "structure.stiffening": "",
+    "structure.bonded": "",
+    "structure.masses": "[[structure.mode]]",
+    "structure.spring": "[[structure.mode]]",
+    "structure.damper": "[[structure.mode]]",
+    "structure.interface": "[friction]",
+    "structure.file": "[[structure.mode]]",
+    "drive.kind=force": "base",
+    "drive.kind=free": "base",
+    "drive.waveform=step": "sine",
+    "drive.waveform=sweep": "sine",
+    "drive.waveform=levels": "sine, one scene per level",
+    "drive.waveform=file": "sine",
+    "wear": "",
+    "accuracy.method=duhamel": "auto, exact or march",
+    "accuracy.method=newmark": "auto, exact or march",
+    "accuracy.method=euler": "auto, exact or march",
+    "accuracy.method=harmonic": "auto, exact or march",
+    "accuracy.harmonics": "",
+    "accuracy.convergence": "",
+    "accuracy.convergence_tolerance": "",
+    "accuracy.stick_speed": "",
+}
+
+
+def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
+    """Key and message for everything the tables name that has no implementation yet; a zero number names nothing."""
+    for entry, instead in NOT_YET_BUILT.items():
+        path, _, value = entry.partition("=")
+        use = f"use {instead} meanwhile; " if instead else ""
+        for key, found in _find(tables, path):
+            if value and found == value:
+                yield key, f"'{value}': {use}not yet built"
+            elif not value and found not in (None, (), 0, 0.0):
+                yield key, f"{use}not yet built"
+
+
+def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
+    name, _, rest = path.partition(".")
+    value = getattr(table, name, None)
+    at = f"{at}.{name}" if at else name
+    if not rest:
+        yield at, value
+    elif isinstance(value, tuple):
+        for index, item in enumerate(value):
+            yield from _find(item, rest, f"{at}.{index}")
+    elif value is not None:
+        yield from _find(value, rest, at)
+
+
+def combinations(draft: Draft, kind: str) -> None:
+    """Say every combination of built keys that a run of this kind cannot do yet; silent about values not there."""
+    contact, law, accuracy = draft.tables.contact, draft.tables.friction, draft.tables.accuracy
+    shear = contact is not None and contact.shear is not None
+    if kind == "linear" and accuracy and accuracy.method == "march":
+        draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
+    if kind not in ("bench", "rig") or law is None:
+        return
+    if shear:
+        _behind_shear(draft, law)
+    elif kind == "rig" and law.law == "nonlocal" and law.reading == "report" and _inside(law.order, -1, 0):
+        draft.say("friction.order", f"{law.order:g} in a rig: use order >= 0 or a bench, [slide]; not yet built")
+    if contact is not None:
+        _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
+
+
+def _behind_shear(draft: Draft, law: Friction) -> None:
+    least = -1 if law.reading == "report" else 0
+    if law.law == "nonlocal" and law.order != 1 and (law.order == 0 or _inside(law.order, least)):
+        draft.say("friction.order", f"{law.order:g} beside [contact.shear]: use order = 1; not yet built")
+    if law.law == "coulomb" and law.static is not None and _inside(law.kinetic, -1, law.static):
+        draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside [contact.shear]: leave "
+                                      "kinetic out; not yet built")  # fmt: skip
+
+
+def _only_on_upper(kind: str, law: Friction, shear: bool) -> str:
+    """What keeps the pressure of such a run on the upper piece; empty where it may lie on the lower one as well."""
+    if shear:
+        return "beside [contact.shear]"
+    if kind == "bench":
+        return ""
+    if law.law in ("coulomb", "elastic-plastic"):
+        return f"in a rig with law '{law.law}'"
+    if law.law == "nonlocal" and law.reading == "report":
+        return "in a rig with reading 'report'"
+    if law.law == "nonlocal" and law.order is not None and law.order != 1:
+        return f"in a rig with order = {law.order:g}"
+    return ""
+
+
+def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
+    sides = {f"contact.{name}.on": shape.on for name, shape in (("tilt", contact.tilt), ("crown", contact.crown))
+             if shape is not None and shape.on is not None}  # fmt: skip
+    lower = [key for key, side in sides.items() if side == "lower"]
+    if len(set(sides.values())) > 1:
+        key = "contact.crown.on" if draft.given("contact.crown.on") else "contact.tilt.on"
+        piece = "the upper piece" if only_upper else "one piece"
+        draft.say(key, "contact.tilt and contact.crown lie on different pieces: put both shapes on "
+                       f"{piece}; not yet built")  # fmt: skip
+    elif lower and only_upper:
+        draft.say(lower[0], f"'lower' {only_upper}: put the shapes on the upper piece; not yet built")
+
+
+def _inside(value: float | None, low: float, high: float = float("inf")) -> bool:
+    return value is not None and low < value < high

@@ -1,0 +1,298 @@
+"""The report page: one file that stands alone, says what the run was, and rounds and scales its numbers truly."""
+
+import pickle
+import re
+import subprocess
+import sys
+from copy import deepcopy
+from html.parser import HTMLParser
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.__main__ import main
+from patchfem.core import G_N, Outcome
+from patchfem.export import pictures, report
+from patchfem.quantities import KINDS
+
+PERIOD, MIL = 1 / 143, 25.4e-6
+KIND = {"m": "length", "s": "time", "rad": "angle", "Pa": "pressure", "N": "force", "N m": "moment",
+        "N m-1": "stiffness"}
+
+
+def measure(value, unit, error=None):
+    return {"value": value, "unit": unit, "error": error, "floor": 0.0}
+
+
+def base(kind, outcome, effects, measures, title="a title") -> dict:
+    """What every page is made of; the rest is added per kind."""
+    rows = [{"effect": name, "equations": "a < b & c", "seconds": 0.1} for name in effects]
+    return {"name": "scene-file", "scene": 'title = "<b>"', "resolved": "", "sentence": Outcome(outcome).sentence,
+            "engine": "", "fields": {}, "x": None, "versions": {"python": "3"},
+            "summary": {"patchfem": "0", "title": title, "kind": kind, "outcome": outcome, "measures": measures,
+                        "effects": rows, "not_in_scene": ["wear"], "warnings": [], "seconds": {"total": 1.0}}}
+
+
+def patch(load=1.0, frames=1, effects=("contact",)) -> dict:
+    """A Hertzian pressure over a tenth of 10 mm, and a stress that fades with depth."""
+    x, depth = np.linspace(-5e-3, 5e-3, 201), np.linspace(0, 5e-3, 21)
+    sigma = load * 5e7 * np.sqrt(np.maximum(0, 1 - (x / 0.5e-3)**2))
+    data = base("patch", "done" if load else "no_contact", effects,
+                {"contact_fraction": measure(0.1 * load, "1", 0.005), "pressure_peak": measure(5e7 * load, "Pa", 2e4),
+                 "moment": measure(3.2e-16, "N m", 4.1e-16), "contact_half_width": measure(5e-4 * load, "m", 1e-6)})
+    fields = {"time": np.arange(frames) * 1e-3, "normal_stress": np.tile(sigma, (frames, 1))}
+    if frames > 1:
+        fields["shear_stress"] = 0.3 * sigma * np.sin(np.arange(frames))[:, None]
+    mises = np.tile((sigma[1:] + sigma[:-1])[:, None] / 2 * np.exp(-depth[1:] / 1e-3), (2, 1, 1))
+    return data | {"x": x, "fields": fields, "bodies": {"depth": depth, "mises": mises}}
+
+
+def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "structure")) -> dict:
+    """A settled sine over `cycles`, its reversals alone before the last three cycles, over a patch, with a table."""
+    keep = min(cycles, 3.0)
+    late = np.linspace((cycles - keep) * PERIOD, cycles * PERIOD, round(keep * 400) + 1)
+    early = (np.arange(0, 2 * (cycles - keep)) / 2 + 0.25) * PERIOD
+    time = np.concatenate([early, late])
+    wave = {t.size: np.sin(2 * np.pi * t / PERIOD) for t in (late, time)}
+    whole, end = 1.4808e-5 * wave[time.size], wave[late.size]
+    data = patch(frames=5, effects=effects)
+    data["summary"] |= {"kind": "rig", "outcome": "steady", "title": title}
+    data["summary"]["measures"] |= {
+        "relative_displacement_amplitude": measure(1.48081e-5, "m", 4.1e-8),
+        "absolute_acceleration_peak": measure(5.2 * G_N, "m s-2", 0.1), "loop_area": measure(1.96e-3, "J", 5.8e-6),
+        "slip_start_phase": measure(2.89849, "rad", 1.6)}
+    rows = [SimpleNamespace(frequency=143.0, input=5 * G_N, acceleration=6 * G_N, displacement=0.23 * MIL, flag=""),
+            SimpleNamespace(frequency=143.0, input=8 * G_N, acceleration=None, displacement=None, flag="U")]
+    return data | {
+        "engine": "march", "history": {"time": time, "displacement": whole, "force": 30 * wave[time.size]},
+        "window": {"time": late, "displacement": 1.4808e-5 * end, "acceleration": 50 * end, "base": 49 * end},
+        "loop": {"slide": 1.4808e-5 * end, "force": 30 * np.cos(2 * np.pi * late / PERIOD), "time": late,
+                 "period": PERIOD},
+        "measured": {"rows": rows, "frequency": 143.0, "gain": 1.0, "input": 5 * G_N}}
+
+
+def bench() -> dict:
+    """Two cycles of a slide at one point."""
+    data = base("bench", "done", ("normal", "friction.law=coulomb"), {"friction_ratio_peak": measure(0.3, "1", 1e-6),
+                                                                      "loop_area": measure(1e-3, "J", 1e-9)})
+    time = np.linspace(0, 0.02, 401)
+    slide, force = 1e-5 * np.sin(200 * np.pi * time), 30 * np.cos(200 * np.pi * time)
+    return data | {"resolved": "[slide]\ncycles = 2.0\n", "history": {"time": time, "displacement": slide,
+                                                                     "force": force},
+                   "loop": {"slide": slide, "force": force, "time": time}}
+
+
+PAGES = {"patch": patch, "no contact": lambda: patch(load=0.0), "rig": rig, "short": lambda: rig(0.3), "bench": bench}
+
+
+@pytest.fixture(scope="module")
+def pages():
+    return {name: (data := make(), report.page(data)) for name, make in PAGES.items()}
+
+
+class Parsed(HTMLParser):
+    """Ids, references, tags and the first cell of each table row."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.tags, self.cells = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        for name, value in attributes:
+            if name == "id":
+                self.ids.append(value)
+            if name in ("href", "xlink:href", "src"):
+                self.links.append(value)
+
+    def handle_data(self, text):
+        if self.tags[-1:] == ["td"]:
+            self.cells.append(text)
+
+
+def captions(page) -> str:
+    return " ".join(re.findall(r"<figcaption>(.*?)</figcaption>", page))
+
+
+def spoken(page) -> str:
+    """The verdict as it is read."""
+    return re.sub(r"<[^>]+>", "", re.search(r"<p class=verdict>(.*?)</p>", page)[1])
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_always_one_file_that_fetches_nothing(pages, name):
+    text = pages[name][1]
+    seen = Parsed(text)
+    assert not {"script", "link", "iframe", "img", "object", "metadata"} & set(seen.tags)
+    assert all(link.startswith(("#", "data:")) for link in seen.links)
+    assert "http" not in re.sub(r'xmlns(:\w+)?="[^"]*"', "", text) and "@import" not in text
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", text))
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_always_ids_are_unique_and_references_meet_one(pages, name):
+    text = pages[name][1]
+    seen = Parsed(text)
+    assert len(seen.ids) == len(set(seen.ids))
+    wanted = {link[1:] for link in seen.links if link.startswith("#")} | set(re.findall(r"url\(#([^)]*)\)", text))
+    assert wanted <= set(seen.ids)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_always_the_verdict_first_and_every_measure_listed(pages, name):
+    data, text = pages[name]
+    at = text.index("<p class=verdict>")
+    assert all(tag not in text[:at] for tag in ("<figure", "<table", "<h2"))
+    assert spoken(text).startswith(f"{data['summary']['outcome']}: {data['sentence']}")
+    assert set(data["summary"]["measures"]) <= set(Parsed(text).cells)
+
+
+def test_always_captions_speak_of_what_the_run_has(pages):
+    words = {name: captions(text) for name, (_, text) in pages.items()}
+    assert "shear" not in words["patch"] and "cycle" not in words["patch"] and "coating" not in words["patch"]
+    assert "with their coatings" in words["rig"] and "4 frames of the last cycle" in words["rig"]
+    assert "over the last 3 cycles" in words["rig"] and "only reversals were kept" in words["rig"]
+    assert "frames of the run" in words["short"] and "last cycle" not in words["short"]
+    assert "whole run" in words["bench"] and "cycle" not in words["bench"]
+    coated = captions(report.page(patch(effects=("contact", "contact.coating"))))
+    assert "with their coatings under the load." in coated
+
+
+def test_always_no_picture_where_nothing_touches(pages):
+    data, text = deepcopy(pages["no contact"])
+    assert "<svg" not in text and spoken(text) == f"no_contact: {data['sentence']}"
+    data["summary"]["warnings"] = [data["sentence"], "another one"]
+    assert report.page(data).count(data["sentence"]) == 1
+
+
+def test_always_a_part_of_a_cycle_claims_nothing_per_cycle(pages):
+    assert "1.9600 ± 0.0058 mJ dissipated per cycle" in spoken(pages["rig"][1])
+    assert "per cycle" not in spoken(pages["short"][1]) and "In 0.3 of a cycle" in spoken(pages["short"][1])
+
+
+def test_always_the_heading_is_the_title_or_the_file():
+    data = rig(title="")
+    assert "<h1>scene-file</h1>" in report.page(data)
+    data.pop("name")
+    assert "<h1>patchfem run</h1>" in report.page(data)
+    assert "&lt;b&gt;" in report.page(data)
+
+
+@pytest.mark.parametrize("name", ["rig", "bench"])
+def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
+    data = PAGES[name]()
+    (tmp_path / "data").write_bytes(pickle.dumps(data))
+    code = ("import pickle, sys; from patchfem.export.report import write_report; "
+            "write_report(sys.argv[2], pickle.load(open(sys.argv[1], 'rb')))")
+    subprocess.run([sys.executable, "-c", code, tmp_path / "data", tmp_path / "page.html"], check=True,
+                   env={"PYTHONHASHSEED": "7", "PATH": "", "MPLCONFIGDIR": str(tmp_path)})
+    text = report.page(deepcopy(data))
+    assert text == report.page(data) == (tmp_path / "page.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("value, error, texts", [
+    (14.808123, 0.0187, ("14.808", "0.019")), (166.07, 91.7, ("166", "92")), (1.0, 0.0996, ("1.00", "0.10")),
+    (115.653762, 1.2e-8, ("115.654", "1.2e-08")), (5.3907e8, 1.7e6, ("5.391e+08", "1.7e+06")),
+    (448.0, 250.0, ("4.5e+02", "2.5e+02")), (1.0, 9.96, ("1", "10")), (0.0, 1e-3, ("0", "0.001")),
+    (2.5, 0.0, ("2.5", "0")), (0.3, None, ("0.3", "&ndash;")), (None, None, ("&ndash;", "&ndash;"))])
+def test_exact_value_and_error_end_at_the_same_digit(value, error, texts):
+    assert report.matched(value, error) == texts
+
+
+@given(st.floats(1e-20, 1e12), st.floats(-12, 1))
+def test_always_rounding_hides_less_than_the_error(size, share):
+    error = size * 10**share
+    for value in (size, -size):
+        said, margin = map(float, report.matched(value, error))
+        assert abs(said - value) <= max(0.0501 * error, 5.01e-6 * size)
+        assert abs(margin - error) <= 0.0501 * error
+
+
+@pytest.mark.parametrize("name, value, unit, error, text", [
+    ("relative_displacement_amplitude_steady", 0.01106, "m", None, "11.06 mm = 435.43 mil"),
+    ("relative_displacement_amplitude", 1.48081e-5, "m", 1.9e-8, "14.808 um = 0.58300 mil"),
+    ("slip_start_phase", 2.898, "rad", 0.0012, "166.043 deg"),
+    ("rotation", 1e-4, "rad", 1e-16, "100 urad = 0.0057296 deg"),
+    ("pressure_centre", 3.4e-18, "m", 4.5e-18, ""),  # zero within its error
+    ("drift_per_cycle", 8.1e-22, "m", 1e-25, ""),  # smaller than any unit
+    ("approach", 0.0, "m", 0.0, ""),
+    ("pressure_peak", 7.9044e6, "Pa", 4.5e5, "7.90 MPa = 1.146 ksi"),
+    ("contact_fraction", 0.2225, "1", 0.005, "22.25 %"),
+    ("normal_stiffness", 5.3907e8, "N m-1", 1.7e6, "539.1 N/um = 3078.2 klbf/in"),
+    ("absolute_acceleration_peak", 5 * G_N, "m s-2", None, "5 g"),
+    ("energy_balance", 1e-13, "1", 0.0, "")])
+def test_exact_units_follow_the_size(name, value, unit, error, text):
+    assert report.others(name, measure(value, unit, error)) == text
+
+
+def test_exact_units_are_those_of_the_unit_table():
+    for table in (pictures.LADDERS, report.WORKSHOP):
+        for unit, ladder in table.items():
+            known = KINDS.get(KIND.get(unit), {})
+            for name, scale in ladder:
+                if name in known:
+                    assert scale * known[name] == pytest.approx(1, rel=1e-12), name
+            assert [s for _, s in ladder] == sorted((s for _, s in ladder), reverse=True)
+
+
+@given(st.sampled_from(sorted(pictures.LADDERS)), st.floats(1e-12, 1e12))
+def test_always_a_unit_is_the_smallest_below_a_thousand(unit, size):
+    ladder = pictures.LADDERS[unit]
+    name, scale = pictures.step_of(ladder, size)
+    smaller = [s for _, s in ladder if s > scale]
+    assert size * scale < 1000 or (name, scale) == ladder[-1]
+    assert all(size * s >= 1000 for s in smaller)
+
+
+def test_exact_the_band_joins_the_reversals_of_each_cycle():
+    number = np.arange(20)
+    time, high = (number / 2 + 0.25) * PERIOD, 1 + number // 2
+    gone = (number // 2 != 3) & (number // 2 != 4)
+    middle, low, top = pictures.envelope(time[gone], ((-1.0)**number * high)[gone], PERIOD)
+    assert middle == pytest.approx((np.arange(10) + 0.5) * PERIOD)
+    assert np.isnan(low[3:5]).all() and np.isnan(top[3:5]).all()
+    kept = np.array([0, 1, 2, 5, 6, 7, 8, 9])
+    assert np.array_equal(top[kept], kept + 1) and np.array_equal(low[kept], -kept - 1.0)
+
+
+def test_exact_the_line_begins_where_the_samples_show_the_motion():
+    sparse, dense = np.arange(0, 10, 0.5), np.arange(10, 14.05, 0.01)
+    assert pictures.whole_from(np.concatenate([sparse, dense]), 1.0, 12.0) == 10.0
+    assert pictures.whole_from(np.concatenate([sparse, dense]), 1.0, 9.0) == 9.0  # the window is kept whole
+    assert pictures.whole_from(dense, 1.0, 12.0) == dense[0]
+    assert pictures.whole_from(np.linspace(0, 0.3, 5), 1.0, 0.0) == 0.0
+
+
+def test_exact_the_framed_part_holds_the_contact():
+    x, depth = np.linspace(-6, 6, 241), np.linspace(0, 6, 50)
+    for left, right in ((-6, -3), (-1, 1), (5, 6)):
+        a, b, height = pictures.closer(x, depth, np.where((x >= left) & (x <= right), 1.0, 0.0), 1.2)
+        assert -6 <= a <= left + 1e-9 and right - 1e-9 <= b <= 6 and b - a == pytest.approx(2.4 * height)
+    a, b, _ = pictures.closer(x, depth, 1 + x**2, 1.2)  # a flat punch: the corner with its peak
+    assert a == -6 and b - a == pytest.approx(0.4 * 12)
+
+
+def test_exact_a_run_gives_the_page_what_it_reads(tmp_path):
+    (tmp_path / "swing.toml").write_text("""\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.02
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 20
+""", "utf-8")
+    with pytest.raises(SystemExit) as end:
+        main(["run", str(tmp_path / "swing.toml"), "-o", str(tmp_path / "out"), "-q"])
+    text = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert not end.value.code and "<h1>swing</h1>" in text
+    assert text.count("<svg") == 1 and "friction" not in captions(text)  # no contact, no friction: the motion alone

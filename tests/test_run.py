@@ -1,0 +1,548 @@
+"""Scenes of every kind through the command line: exit codes, the results folder, and what must hold inside it."""
+
+import contextlib
+import io
+import json
+import socket
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOHDF import vtkHDFReader
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+
+from patchfem import closed_forms, simulate_files, simulate_march
+from patchfem.__main__ import NOT_BUILT, main
+from patchfem.core import G_N, Outcome
+from patchfem.effects import EFFECTS, NOT_YET_BUILT
+from patchfem.scene import load, loads
+from patchfem.simulate import plan, run
+
+STUDIES = Path(__file__).parents[1] / "studies"
+LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143
+PATCH = """\
+title = "a small patch"
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+element_size = "0.5 mm"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.coating]
+material = "WC-Co"
+thickness = "6 mil"
+[contact.tilt]
+angle = "0.02 mrad"
+"""
+SHEAR = "[contact.shear]\n"
+POINT = '[normal]\nload = "26 lbf"\n'
+COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
+SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
+STRUCTURE = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 30
+"""
+STEPS = "[accuracy]\nsteps_per_cycle = 200\n"
+SCENES = {
+    "patch": PATCH, "bench": POINT + COULOMB + SLIDE, "bench patch": PATCH + SHEAR + COULOMB + SLIDE + STEPS,
+    "linear": STRUCTURE, "rig": POINT + COULOMB + STRUCTURE, "rig march": POINT + NONLOCAL + STRUCTURE + STEPS,
+    "rig patch": PATCH + SHEAR + NONLOCAL + STRUCTURE + STEPS,
+}  # fmt: skip
+WITH_FIELDS = ["patch", "bench patch", "rig patch"]
+
+
+def cli(*words) -> SimpleNamespace:
+    """Exit code, stdout and stderr of the command line."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return SimpleNamespace(code=end.value.code or 0, out=out.getvalue(), err=err.getvalue())
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """name -> (results folder, answer of --json) of every scene, each run once."""
+    base, out = tmp_path_factory.mktemp("runs"), {}
+
+    def of(name):
+        if name not in out:
+            path = base / f"{name}.toml"
+            path.write_text(SCENES[name], "utf-8")
+            answer = cli("run", path, "-o", base / name, "--json")
+            assert answer.code == 0, answer.err
+            out[name] = base / name, answer
+        return out[name]
+    return of
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text, name="scene.toml"):
+        path = tmp_path / name
+        path.write_text(text, "utf-8")
+        return path
+    return write
+
+
+def netcdf(folder):
+    with xr.open_dataset(folder / "result.nc", engine="h5netcdf") as data:
+        return data.load()
+
+
+class Fields:
+    """fields.vtkhdf as VTK's own reader gives it."""
+
+    def __init__(self, folder):
+        self.reader = vtkHDFReader()
+        self.reader.SetFileName(str(folder / "fields.vtkhdf"))
+        self.reader.UpdateInformation()
+        self.steps = self.reader.GetNumberOfSteps()
+
+    def frame(self, step):
+        self.reader.SetStep(step)
+        self.reader.Update()
+        grid = self.reader.GetOutput()
+        points, cells = grid.GetPointData(), grid.GetCellData()
+        ends, nodes = (vtk_to_numpy(a) for a in (grid.GetCells().GetOffsetsArray(),
+                                                 grid.GetCells().GetConnectivityArray()))
+        units = grid.GetFieldData().GetAbstractArray("units")
+        return SimpleNamespace(
+            place=vtk_to_numpy(grid.GetPoints().GetData()), time=self.reader.GetTimeValue(),
+            cells=[nodes[a:b] for a, b in pairwise(ends)],
+            units=dict(units.GetValue(i).rstrip("]").split(" [") for i in range(units.GetNumberOfValues())),
+            **{part.GetArrayName(i): vtk_to_numpy(part.GetArray(i)).copy()
+               for part in (points, cells) for i in range(part.GetNumberOfArrays())})
+
+
+# what every run leaves behind
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_summary(done, name):
+    folder, answer = done(name)
+    summary = json.loads((folder / "summary.json").read_text("utf-8"))
+    assert json.loads(answer.out) == summary and len(answer.out.strip().splitlines()) == 1
+    assert set(summary) == {"patchfem", "title", "kind", "outcome", "measures", "effects", "not_in_scene", "warnings",
+                            "seconds"}
+    assert summary["kind"] == name.split()[0] and summary["outcome"] in set(Outcome)
+    for one in summary["measures"].values():
+        assert set(one) == {"value", "unit", "error", "floor"}
+    for one in summary["effects"]:
+        assert set(one) == {"effect", "equations", "seconds"} and one["seconds"] >= 0
+    named = [one["effect"] for one in summary["effects"]]
+    assert named == load(folder.with_suffix(".toml")).named()
+    assert set(summary["not_in_scene"]) == {*EFFECTS, *NOT_YET_BUILT} - set(named)
+    assert summary["seconds"]["total"] > 0
+    there = {path.name for path in folder.iterdir()}
+    assert there == {"summary.json", "result.nc", "report.html", "scene.resolved.toml"} | (
+        {"fields.vtkhdf"} if name in WITH_FIELDS else set())
+    assert not folder.with_name(folder.name + ".partial").exists()
+
+
+MEASURES = {
+    "patch": "normal_load contact_fraction pressure_peak pressure_centre approach rotation moment normal_stiffness "
+             "tangential_stiffness contact_half_width",
+    "bench": "friction_force_peak friction_ratio_end friction_ratio_peak slip_amplitude loop_area energy_balance "
+             "equivalent_stiffness normal_load",
+    "linear": "relative_displacement_amplitude absolute_acceleration_peak energy_balance drift_per_cycle",
+    "rig": "relative_displacement_amplitude absolute_acceleration_peak slip_amplitude stick_fraction normal_load "
+           "friction_force_peak loop_area equivalent_stiffness equivalent_damping energy_balance drift_per_cycle "
+           "slip_start_phase",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_measures_of_the_kind(done, name):
+    measures = json.loads(done(name)[1].out)["measures"]
+    wanted = MEASURES[name.split()[0]].split() + (MEASURES["patch"].split() if name in WITH_FIELDS else [])
+    assert set(wanted) <= set(measures)
+    assert all(measures[key]["value"] is not None for key in wanted)
+    if "energy_balance" in measures:
+        assert measures["energy_balance"]["value"] <= 1e-10
+    if "normal_load" in measures:
+        assert measures["normal_load"]["value"] == pytest.approx(LOAD, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_resolved_scene_is_the_scene(done, name):
+    folder, _ = done(name)
+    first, again = load(folder.with_suffix(".toml")), load(folder / "scene.resolved.toml")
+    assert again.named() == first.named() and again.resolved() == first.resolved()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_netcdf(done, name):
+    folder, answer = done(name)
+    data, kind = netcdf(folder), name.split()[0]
+    for variable in data.variables.values():
+        if variable.dtype.kind == "f":
+            assert "units" in variable.attrs
+    if kind != "patch":
+        wanted = {"relative_displacement": "m", "relative_velocity": "m s-1"}
+        if kind != "linear":
+            wanted |= {"friction_force": "N", "normal_load": "N"}
+        if kind != "bench":
+            wanted |= {"absolute_acceleration": "m s-2", "base_acceleration": "m s-2", "modal_coordinate": "m"}
+            assert data.modal_coordinate.dims == ("time", "mode") and list(data.mode.values) == ["axial"]
+        assert {key: data[key].attrs["units"] for key in wanted} == wanted
+        assert (np.diff(data.time) > 0).all() and data.time[0] == 0
+    assert data.attrs["Conventions"].startswith("CF-") and data.attrs["outcome"] == json.loads(answer.out)["outcome"]
+    text = json.dumps(data.attrs)
+    assert str(folder.parent) not in text and socket.gethostname() not in text.replace("localhost", "")
+    if name in WITH_FIELDS:
+        units = {"weight": "m2", "normal_stress": "Pa", "gap": "m"}
+        assert {key: data[key].attrs["units"] for key in units} == units
+        np.testing.assert_allclose((data.weight * data.normal_stress).sum("x"), LOAD, rtol=1e-10)
+        assert float(data.weight.sum()) == pytest.approx(WIDTH * 0.0127, rel=1e-12)
+        assert (data.normal_stress >= 0).all() and (data.gap >= 0).all()
+        assert float((data.normal_stress * data.gap).max()) == 0.0
+        centre = float((data.x * data.weight * data.normal_stress).sum("x")[0]) / LOAD
+        assert centre == pytest.approx(json.loads(answer.out)["measures"]["pressure_centre"]["value"], rel=1e-9)
+        assert ((data.status == 0) == (data.normal_stress == 0)).all()
+
+
+@pytest.mark.parametrize("name", ["linear", "rig", "rig march", "rig patch"])
+def test_exact_histories_are_dense_at_the_end(done, name):
+    data = netcdf(done(name)[0])
+    period = 1 / 143
+    end = float(data.time[-1])
+    assert end == pytest.approx(30 * period, rel=1e-12)
+    for cycle in (1, 2):
+        inside = (data.time >= end - cycle * period) & (data.time < end - (cycle - 1) * period)
+        assert int(inside.sum()) >= 100
+    np.testing.assert_allclose(data.base_acceleration, 5 * G_N * np.sin(OMEGA * data.time), atol=1e-9)
+    assert float(data.relative_displacement[0]) == 0.0 == float(data.relative_velocity[0])
+    if name != "linear":
+        assert float(np.abs(data.friction_force).max()) <= 0.3 * LOAD * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", ["rig", "rig march", "rig patch", "linear"])
+def test_exact_newton_holds_at_every_sample(done, name):
+    """m (a_abs) = -k q - c v - F at each kept sample."""
+    data, mass = netcdf(done(name)[0]), 0.884
+    force = data.friction_force if name != "linear" else 0.0
+    wanted = -OMEGA**2 * data.relative_displacement - 2 * 0.003 * OMEGA * data.relative_velocity - force / mass
+    np.testing.assert_allclose(data.absolute_acceleration, wanted, rtol=0, atol=1e-9 * float(np.abs(wanted).max()))
+
+
+def test_exact_shear_frames_carry_the_friction_force(done):
+    data = netcdf(done("rig patch")[0])
+    total = (data.weight * data.shear_stress).sum("x").values
+    at = np.interp(data.frame_time.values[1:], data.time.values, data.friction_force.values)
+    np.testing.assert_allclose(total[1:], at, rtol=0, atol=1e-8 * 0.3 * LOAD)
+    limit = 0.3 * data.normal_stress
+    assert float((np.abs(data.shear_stress) - limit).max()) <= 1e-9 * float(limit.max())
+
+
+def test_exact_linear_response(done):
+    """30 cycles at resonance from rest: the amplitude rises as 1 - exp(-zeta w t) towards a/(2 zeta w^2)."""
+    answer = json.loads(done("linear")[1].out)
+    steady = 5 * G_N / (2 * 0.003 * OMEGA**2)
+    found = answer["measures"]["relative_displacement_amplitude"]["value"]
+    assert found == pytest.approx(steady * (1 - np.exp(-0.003 * 2 * np.pi * 30)), rel=1e-2)
+    limit = answer["measures"]["relative_displacement_amplitude_steady"]
+    assert answer["outcome"] == "transient" and limit["value"] == pytest.approx(steady, abs=limit["error"])
+    assert limit["error"] < 0.05 * steady
+
+
+def test_exact_rig_at_a_point(done):
+    answer = json.loads(done("rig")[1].out)["measures"]
+    ratio = 0.3 * LOAD / 0.884 / (5 * G_N)
+    undamped = closed_forms.two_stop_amplitude(ratio) * 5 * G_N / OMEGA**2
+    assert answer["relative_displacement_amplitude"]["value"] == pytest.approx(undamped, rel=0.06)
+    assert answer["friction_force_peak"]["value"] == pytest.approx(0.3 * LOAD, rel=1e-12)
+    loop = closed_forms.coulomb_loop_area(answer["slip_amplitude"]["value"], 0.3 * LOAD)
+    assert answer["loop_area"]["value"] == pytest.approx(loop, rel=1e-6)  # the last 3 cycles still settle
+    stiffness = 0.884 * OMEGA**2
+    damping = loop / (2 * np.pi * stiffness * answer["relative_displacement_amplitude"]["value"]**2)
+    assert answer["equivalent_damping"]["value"] == pytest.approx(damping, rel=1e-6)
+
+
+def test_exact_bench_at_a_point(done):
+    answer = json.loads(done("bench")[1].out)["measures"]
+    assert answer["friction_ratio_peak"]["value"] == pytest.approx(0.3, rel=1e-12)
+    assert answer["slip_amplitude"]["value"] == pytest.approx(10e-6, rel=1e-9)
+    assert answer["loop_area"]["value"] == pytest.approx(closed_forms.coulomb_loop_area(10e-6, 0.3 * LOAD), rel=1e-9)
+
+
+# fields
+
+@pytest.mark.parametrize("name", WITH_FIELDS)
+def test_exact_fields_hold_both_bodies(done, name):
+    folder, _ = done(name)
+    fields, data = Fields(folder), netcdf(folder)
+    assert fields.steps == data.sizes["frame"]
+    first = fields.frame(0)
+    wanted = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "normal_stress": "Pa", "gap": "m"}
+    assert wanted.items() <= first.units.items()
+    assert set(np.unique(first.part)) == {0, 1, 2} and (first.part == 0).sum() == (first.part == 1).sum()
+    for part, side in ((0, -1), (1, 1)):
+        heights = np.concatenate([first.place[c, 1] for c, p in zip(first.cells, first.part) if p == part])
+        assert np.abs(heights).max() == pytest.approx(6.35e-3) and (side * heights >= 0).all()
+        assert {len(c) for c, p in zip(first.cells, first.part) if p == part} == {4}
+    np.testing.assert_allclose([fields.frame(k).time for k in range(fields.steps)], data.frame_time, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", WITH_FIELDS)
+def test_exact_the_interface_closes_where_it_is_pressed(done, name):
+    folder, _ = done(name)
+    fields, data = Fields(folder), netcdf(folder)
+    for step in (0, fields.steps - 1):
+        frame = fields.frame(step)
+        nodes = np.flatnonzero(np.isfinite(frame.gap)).reshape(3, -1)  # lower body, upper body, line between them
+        np.testing.assert_allclose(frame.place[nodes[0]], frame.place[nodes[1]], atol=1e-15)
+        opening = frame.displacement[nodes[1], 1] - frame.displacement[nodes[0], 1]
+        np.testing.assert_allclose(opening, frame.gap[nodes[0]], atol=1e-12)
+        np.testing.assert_allclose(opening[data.normal_stress[step] > 0], 0.0, atol=1e-12)
+        np.testing.assert_allclose(frame.normal_stress[nodes[0]], data.normal_stress[step], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", WITH_FIELDS)
+def test_exact_every_row_of_cells_carries_the_load(done, name):
+    """A horizontal cut through either body balances the load and the friction force, tension > 0."""
+    folder, _ = done(name)
+    fields, data = Fields(folder), netcdf(folder)
+    for step in range(0, fields.steps, 5):
+        frame = fields.frame(step)
+        shear = float((data.weight * data.shear_stress).sum("x")[step]) if "shear_stress" in data else 0.0
+        for part in (0, 1):
+            mine = np.flatnonzero(frame.part == part)
+            corners = frame.place[np.array([frame.cells[k] for k in mine])]
+            width, height = np.ptp(corners[:, :, 0], axis=1), corners[:, :, 1].mean(axis=1)
+            stress = frame.stress[mine].astype(float)
+            _, row = np.unique(height.round(9), return_inverse=True)
+            assert row.max() > 5
+            np.testing.assert_allclose(np.bincount(row, -stress[:, 1] * width) * WIDTH, LOAD, rtol=2e-6)
+            np.testing.assert_allclose(np.bincount(row, stress[:, 3] * width) * WIDTH, shear, atol=1e-5 * LOAD)
+
+
+# numbers that must agree with each other
+
+def test_exact_pressure_on_the_upper_piece_is_one_point():
+    """Rigid slide, constant load: the path of every interface point gives the resultant of the lumped contact."""
+    text = PATCH + NONLOCAL + STRUCTURE + STEPS
+    each = run(plan(loads(text), True), per_point=True, estimate=False)
+    point = run(plan(loads(POINT + NONLOCAL + STRUCTURE + STEPS)), estimate=False)
+    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
+                 "friction_force_peak", "equivalent_stiffness"):
+        assert each.measures[name].value == pytest.approx(point.measures[name].value, rel=1e-10)
+    for name in ("slide", "force", "slip", "acceleration"):
+        mine, other = getattr(each.response, name), getattr(point.response, name)
+        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-10 * np.abs(other).max())
+    lumped = run(plan(loads(text)), estimate=False)
+    assert any("nothing spatial acts" in sentence for sentence in lumped.warnings)
+    assert lumped.measures["loop_area"].value == pytest.approx(point.measures["loop_area"].value, rel=1e-10)
+
+
+@pytest.mark.parametrize("law", ["nonlocal", "elastic-plastic"])
+@pytest.mark.parametrize("steps", [100, 200, 400])
+def test_always_half_the_step_stays_within_the_error(law, steps):
+    def at(count, estimate):
+        sets = [f"accuracy.steps_per_cycle={count}", f"friction.law={law}"]
+        found = run(plan(loads(POINT + NONLOCAL + STRUCTURE + STEPS, sets=sets)), estimate=estimate)
+        return found.measures["relative_displacement_amplitude"]
+
+    coarse = at(steps, True)
+    assert abs(at(2 * steps, False).value - coarse.value) < coarse.error
+
+
+def test_exact_march_of_a_rigid_law_meets_the_event_engine():
+    sets = ["drive.cycles=60"]
+    text = POINT + COULOMB + STRUCTURE
+    exact = run(plan(loads(text, sets=sets))).measures["relative_displacement_amplitude"].value
+    marched = run(plan(loads(text, sets=[*sets, "accuracy.method=march", "accuracy.steps_per_cycle=800"])))
+    found = marched.measures["relative_displacement_amplitude"]
+    assert found.value == pytest.approx(exact, rel=2e-3)
+    assert abs(found.value - exact) < found.error
+
+
+def test_exact_mesh_round_trip(written, tmp_path):
+    """The patch on the mesh that was written is the patch on the mesh that was made."""
+    scene = written(PATCH)
+    answer = cli("mesh", scene, "-o", tmp_path / "pair.msh")
+    assert answer.code == 0 and "pair.msh" in answer.out
+    made = run(plan(load(scene)), estimate=False).measures
+    read = run(plan(load(scene, ["contact.mesh=pair.msh"])), estimate=False).measures
+    for key in made:
+        assert read[key].value == pytest.approx(made[key].value, rel=1e-9, abs=1e-18), key
+    assert cli("run", scene, "--set", "contact.mesh=pair.msh", "--set", "contact.height=7 mm", "-o",
+               tmp_path / "out").code == 2
+
+
+def test_exact_mesh_for_vtk(written, tmp_path):
+    assert cli("mesh", written(PATCH), "-o", tmp_path / "pair.vtu").code == 0
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(tmp_path / "pair.vtu"))
+    reader.Update()
+    place = vtk_to_numpy(reader.GetOutput().GetPoints().GetData())
+    assert np.ptp(place, axis=0) == pytest.approx([0.0127, 0.0127, 0.0], rel=1e-12)
+    assert np.unique(place[:, 0].round(9)).size == 27
+
+
+@pytest.mark.parametrize("path", sorted(STUDIES.rglob("*.toml")), ids=lambda p: str(p.relative_to(STUDIES)))
+def test_always_shipped_scenes_load_and_plan(path):
+    scene = load(path)
+    found = plan(scene)
+    assert found.kind == scene.kind and set(found.effects) <= set(EFFECTS)
+    assert scene.measured is None or scene.beside(scene.measured.file).is_file()
+
+
+def test_exact_plan_as_json(written):
+    answer = cli("plan", written(SCENES["rig patch"]), "--json")
+    found = json.loads(answer.out)
+    assert answer.code == 0
+    assert {"kind", "effects", "not_in_scene", "unknowns", "steps", "seconds", "bytes", "stiffness_chain",
+            "groups"} <= set(found)
+    assert found["groups"]["D"] == pytest.approx(0.3 * LOAD / (0.884 * 5 * G_N), rel=1e-12)
+    assert found["stiffness_chain"]["bonds"] == pytest.approx(0.3 * LOAD / 1e-6, rel=1e-12)
+
+
+def test_exact_stuck_and_apart(written, tmp_path):
+    stuck = cli("run", written(POINT + COULOMB + STRUCTURE), "--set", "drive.acceleration=3 g", "--json", "-o",
+                tmp_path / "a")
+    assert json.loads(stuck.out)["outcome"] == "stuck"
+    assert json.loads(stuck.out)["measures"]["relative_displacement_amplitude"]["value"] == 0.0
+    apart = cli("run", written(PATCH), "--set", "contact.load=0 N", "--json", "-o", tmp_path / "b")
+    assert apart.code == 0 and json.loads(apart.out)["outcome"] == "no_contact"
+
+
+# exit codes
+
+def test_refuses_mistakes_with_one_line_each(written, tmp_path):
+    scene = written(PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
+    answer = cli("run", scene, "-o", tmp_path / "out")
+    assert answer.code == 2 and answer.out == ""
+    lines = answer.err.splitlines()
+    assert len(lines) >= 2 and all(line.startswith(f"{scene}:") for line in lines)
+    assert cli("check", scene).err == answer.err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [("run",), ("run", "none.toml"), ("frobnicate",), ("run", "a.toml", "--frob"),
+                                   ("mesh", "a.toml")], ids=" ".join)
+def test_refuses_bad_requests(words):
+    answer = cli(*words)
+    assert answer.code == 2 and answer.err and "Traceback" not in answer.err
+
+
+@pytest.mark.parametrize("verb", NOT_BUILT)
+def test_refuses_verbs_not_yet_built(verb):
+    answer = cli(verb, "scene.toml")
+    assert answer.code == 2 and "not yet built" in answer.err
+
+
+@pytest.mark.parametrize("sets", [
+    ("contact.asperities.law=linear", "contact.asperities.normal_stiffness=1e13 Pa/m"),
+    ("contact.strips.count=8",), ("contact.step.height=1 um", "contact.step.at=2 mm"),
+    ("contact.holder.rotational_stiffness=1e4 N m/rad",), ("friction.law=tanh", "friction.reference_speed=1 mm/s"),
+    ("friction.spread=5 um",), ("structure.bonded.stiffness=4.6e6 N/m",), ("structure.stiffening.cubic=1e12 N/m^3",),
+    ("wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"), ("accuracy.method=harmonic",),
+], ids=lambda sets: sets[0].split("=")[0])  # fmt: skip
+def test_refuses_keys_not_yet_built(written, tmp_path, sets):
+    words = [word for one in sets for word in ("--set", one)]
+    answer = cli("run", written(PATCH + NONLOCAL + STRUCTURE), "-o", tmp_path / "out", *words)
+    assert answer.code == 2 and "not yet built" in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_refuses_resume_and_a_mesh_without_a_patch(written, tmp_path):
+    scene = written(POINT + COULOMB + STRUCTURE)
+    assert "not yet built" in cli("run", scene, "--resume").err
+    assert cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
+    exact = cli("run", written(POINT + NONLOCAL + STRUCTURE), "--set", "accuracy.method=exact", "-o", tmp_path / "o")
+    assert exact.code == 2 and "no exact solution" in exact.err
+
+
+def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
+    scene = written(POINT + NONLOCAL + STRUCTURE)
+    costly = cli("run", scene, "--set", "friction.reading=report", "--set", "drive.cycles=10000000", "-o",
+                 tmp_path / "out")
+    assert costly.code == 4 and "bond list" in costly.err
+    assert cli("run", written(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
+
+
+@pytest.mark.parametrize("raised, code", [(KeyboardInterrupt(), 130), (MemoryError(), 4), (ValueError("odd"), 1),
+                                          (PermissionError(13, "Permission denied", "x"), 4)])
+def test_exact_codes_of_interruptions(written, tmp_path, monkeypatch, raised, code):
+    def stop(*_):
+        raise raised
+
+    monkeypatch.setattr(simulate_files, "run", stop)
+    answer = cli("run", written(POINT + COULOMB + SLIDE), "-o", tmp_path / "out")
+    assert answer.code == code and len(answer.err.splitlines()) <= 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_exact_an_old_folder_survives_a_failing_run(written, tmp_path, monkeypatch):
+    scene, out = written(SCENES["rig patch"]), tmp_path / "out"
+
+    def state():
+        return {path.name: path.read_bytes() for path in out.iterdir()}
+
+    assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5").code == 0
+    before = state()
+
+    import patchfem.export.report as report
+
+    def full(*_):
+        raise OSError(28, "No space left on device", "report.html")
+
+    monkeypatch.setattr(report, "write_report", full)
+    full_disk = cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5")
+    assert full_disk.code == 4 and state() == before
+    monkeypatch.undo()
+    assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=6").code == 0
+    assert state()["summary.json"] != before["summary.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
+
+
+def test_exact_the_installed_command(written, tmp_path):
+    """One run in a process of its own: the answer on stdout, nothing else there, and exit code 0."""
+    one = subprocess.run([sys.executable, "-m", "patchfem", "run", str(written(POINT + COULOMB + SLIDE)), "--json"],
+                         capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert one.returncode == 0 and "Traceback" not in one.stderr
+    assert json.loads(one.stdout)["kind"] == "bench"
+    assert (tmp_path / "out" / "scene" / "summary.json").is_file()
+
+
+def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    monkeypatch.setattr(simulate_march, "GOAL", 1e-60)  # a residual that no step can meet
+    failed = cli("run", written(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5")
+    assert failed.code == 3 and "missed the force residual" in failed.err
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    assert summary["outcome"] == "not_converged" and (out / "fields.vtkhdf").is_file()
+
+
+def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monkeypatch):
+    scene, mine = written(POINT + COULOMB + SLIDE), tmp_path / "mine"
+    mine.mkdir()
+    (mine / "data.txt").write_text("years of work", "utf-8")
+    for target in (mine, mine / "data.txt", tmp_path):
+        refused = cli("run", scene, "-o", target)
+        assert refused.code == 2 and len(refused.err.splitlines()) == 1
+    assert (mine / "data.txt").read_text("utf-8") == "years of work"
+    monkeypatch.chdir(mine)
+    for target in (".", "..", ""):
+        assert cli("run", scene, "-o", target).code == 2
+    partial = tmp_path / "next.partial"
+    partial.mkdir()
+    (partial / ".writer").write_text("1", "utf-8")  # a process that lives
+    busy = cli("run", scene, "-o", tmp_path / "next")
+    assert busy.code == 2 and "another run" in busy.err

@@ -1,0 +1,187 @@
+"""What no run can do is refused by `check` already, at its line and key; what merely has no effect is remarked."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import pytest
+from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
+
+from patchfem.scene import SceneError, load, loads
+
+SHEAR = "contact.shear={}"
+COULOMB, PLASTIC = "friction.law=coulomb", "friction.law=elastic-plastic"
+LOWER = "contact.tilt.on=lower"
+PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
+POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
+REPORT = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report"]
+NOT_BUILT = "not yet built"
+
+# (text, sets, key, what the message says)
+REFUSED = [
+    (RIG, [SHEAR, "friction.order=0.5"], "friction.order", "0.5 beside [contact.shear]: use order = 1"),
+    (RIG, [SHEAR, "friction.order=0"], "friction.order", "0 beside [contact.shear]: use order = 1"),
+    (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2"], "friction.order", "use order = 1; not yet built"),
+    (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "leave kinetic out; not yet built"),
+    (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 beside"),
+    (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put both shapes on one piece; not yet"),
+    (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "on one piece; not yet built"),
+    (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "on the upper piece; not yet built"),
+    (RIG, [SHEAR, LOWER], "contact.tilt.on", "'lower' beside [contact.shear]: put the shapes on the upper piece"),
+    (PATCH_BENCH, [SHEAR, LOWER], "contact.tilt.on", "'lower' beside [contact.shear]"),
+    (RIG, [COULOMB, LOWER], "contact.tilt.on", "'lower' in a rig with law 'coulomb': put the shapes on the upper"),
+    (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
+    (RIG, ["friction.reading=report", LOWER], "contact.tilt.on", "'lower' in a rig with reading 'report'"),
+    (RIG, ["friction.order=0.5", LOWER], "contact.tilt.on", "'lower' in a rig with order = 0.5"),
+    (RIG, ["friction.reading=report", "friction.order=-0.5"], "friction.order", "use order >= 0 or a bench"),
+    (LINEAR, ["accuracy.method=march"], "accuracy.method", "'march' without friction: leave method out"),
+]
+PLAIN = [
+    (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is wanted"),
+    (PATCH_BENCH, [SHEAR, "friction.static=0"], "friction.static", "or leave out [contact.shear]"),
+    (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists for law 'nonlocal'; use 'march'"),
+    (RIG, ["accuracy.method=exact", PLASTIC], "accuracy.method", "for law 'elastic-plastic'; use 'march' or leave"),
+    (RIG, ["accuracy.method=exact", COULOMB, SHEAR], "accuracy.method", "law 'coulomb' beside [contact.shear]"),
+    (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle is wanted, cycles >= 0.25, not 0.2"),
+    (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle is wanted"),
+]
+
+
+@pytest.mark.parametrize("text, sets, key, says", REFUSED + PLAIN)
+def test_refuses_what_no_run_can_do(text, sets, key, says):
+    message = only(text, *sets)
+    assert message.startswith(f"--set: {key}: ") and says in message
+    assert message.endswith(NOT_BUILT) == ((text, sets, key, says) in REFUSED)
+
+
+def test_refuses_at_the_line_of_the_file():
+    text = RIG.replace("static = 0.30", "static = 0.30\norder = 0.5")
+    text = text.replace("[friction]", "[contact.shear]\n[friction]")
+    text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
+    text += '[accuracy]\nmethod = "exact"\n'
+    assert mistakes(text) == [
+        f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' beside [contact.shear]: put the shapes on the upper "
+        "piece; not yet built",
+        f"a.toml:{line_of(text, 'order')}: friction.order: 0.5 beside [contact.shear]: use order = 1; not yet built",
+        f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' beside "
+        "[contact.shear]; use 'march' or leave method out",
+    ]
+
+
+def test_refuses_combinations_beside_the_list_of_keys():
+    found = mistakes(RIG, SHEAR, "friction.order=2", "contact.strips.count=8")
+    assert [message.split(": ")[1] for message in found] == ["friction.order", "contact.strips"]
+
+
+def test_refuses_a_rig_in_which_nothing_slides():
+    text = RIG.replace("slide = 0.8", "slide = 0.0").replace("slide = 0.1", "slide = 0.0")
+    message = only(text)
+    assert message.startswith(f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: 0 in every mode")
+    assert loads(RIG, sets=["structure.mode.axial.slide=0"]).structure.mode[1].slide == 0.1
+    assert loads(text[text.index("[structure]") :]).kind == "linear"
+
+
+def test_refuses_a_duration_below_a_quarter_of_a_cycle():
+    text = LINEAR.replace("cycles = 200", 'duration = "1 ms"')
+    assert f"a.toml:{line_of(text, 'duration')}: drive.duration: at least a quarter of a cycle is wanted" in only(text)
+    assert only(text).endswith("duration >= 0.00174825 s, not 0.001 s")
+    assert loads(text, sets=["drive.duration=1.75 ms"]).drive.duration == 1.75e-3
+    assert loads(LINEAR, sets=["drive.cycles=0.25"]).drive.cycles == 0.25
+
+
+ALLOWED = [
+    (RIG, [LOWER], "rig"),
+    (RIG, [LOWER, "contact.crown.radius=1 m", "contact.crown.on=lower"], "rig"),
+    (PATCH, [LOWER], "patch"),
+    (PATCH, [LOWER, "contact.crown.radius=1 m"], "patch"),
+    (PATCH_BENCH, [LOWER], "bench"),
+    (PATCH_BENCH, [LOWER, PLASTIC, "friction.bond_length=1 um"], "bench"),
+    (PATCH_BENCH, [LOWER, *REPORT, "friction.order=-0.5"], "bench"),
+    (RIG, ["friction.order=0"], "rig"),
+    (RIG, ["friction.order=0", "friction.reading=report"], "rig"),
+    (RIG, [SHEAR, PLASTIC], "rig"),
+    (RIG, [SHEAR, COULOMB], "rig"),
+    (RIG, ["friction.static=0"], "rig"),
+    (RIG, [SHEAR, "friction.kinetic=0.2", "friction.rest_growth=1 g", "friction.slip_growth=1 um"], "rig"),
+    (POINT_RIG, ["accuracy.method=exact", "friction.kinetic=0.2"], "rig"),
+    (RIG, ["accuracy.method=march"], "rig"),
+    (LINEAR, ["accuracy.method=exact"], "linear"),
+]
+
+
+@pytest.mark.parametrize("text, sets, kind", ALLOWED)
+def test_exact_what_runs_is_let_through(text, sets, kind):
+    assert loads(text, sets=sets).kind == kind
+
+
+@pytest.mark.parametrize(
+    "text, sets, remark",
+    [
+        (PATCH, ["accuracy.method=exact"], "accuracy.method = 'exact' has no meaning in a patch scene and is not used"),
+        (BENCH, ["accuracy.method=march"], "accuracy.method = 'march' has no meaning in a bench scene and is not used"),
+        (RIG, ["friction.kinetic=0.2"], "friction.kinetic has no effect while the bond length is constant; "
+                                        "add rest_growth and slip_growth"),
+        (PATCH, ["contact.mesh=a.msh", "contact.element_size=100 um"],
+         "contact.element_size is not used beside contact.mesh, whose elements are those of the file"),
+    ],
+)  # fmt: skip
+def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
+    scene = loads(text, sets=sets)
+    assert scene.remarks == [remark]
+    assert loads(scene.resolved()).remarks == [] and loads(scene.resolved()).tables() == scene.tables()
+
+
+@pytest.mark.parametrize(
+    "one, key, says",
+    [
+        ("contact.load=26#", "contact.load", "'#' is ambiguous"),
+        ("contact.load=26 # heavy", "contact.load", "unknown unit '# heavy'"),
+        ("friction.static=0.3#", "friction.static", "a plain number is wanted, not '0.3#'"),
+        ("accuracy.steps_per_cycle=400 # fine", "accuracy.steps_per_cycle", "not '400 # fine'"),
+        ("contact.shear={} # on", "contact.shear", "a table [contact.shear] is wanted, not '{} # on'"),
+    ],
+)
+def test_refuses_a_hash_in_a_set_as_part_of_its_value(one, key, says):
+    message = only(RIG, one)
+    assert message.startswith(f"--set: {key}: ") and says in message
+
+
+def test_exact_a_hash_reads_the_same_in_a_set_and_in_the_file():
+    in_file = only(RIG.replace('"26 lbf"', '"26#"'))
+    assert in_file.partition(": ")[2] == only(RIG, "contact.load=26#").partition(": ")[2]
+    assert loads(RIG, sets=["title=run #3"]).title == loads(RIG, sets=['title="run #3"']).title == "run #3"
+    assert loads(RIG, sets=['measured={file = "a#b.csv"}']).measured.file == "a#b.csv"
+
+
+STUDIES = sorted((Path(__file__).parent.parent / "studies").rglob("*.toml"))
+
+
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
+def test_exact_studies_load(path):
+    assert load(path).remarks == []
+
+
+OPTIONS = [
+    ["", COULOMB, PLASTIC], ["", "friction.reading=report"], ["", "friction.order=0.5", "friction.order=-0.5"],
+    ["", SHEAR], ["", LOWER], ["", "contact.crown.radius=1 m"], ["", "friction.kinetic=0.2"],
+    ["", "accuracy.method=exact", "accuracy.method=march"],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [RIG, PATCH_BENCH], ids=["rig", "bench"])
+def test_always_a_scene_that_loads_can_be_planned(text):
+    """No combination passes the scene's rules and is then turned down by the choice of an engine."""
+    from patchfem.simulate_plan import plan
+
+    passed = 0
+    for sets in product(*OPTIONS):
+        chosen = [one for one in (*REPORT[:2], *sets) if one]
+        try:
+            scene = loads(text, sets=chosen)
+        except SceneError as error:
+            keys = [message.split(": ")[1] for message in error.mistakes]
+            assert len(set(keys)) == len(keys), error.mistakes
+        else:
+            passed += bool(plan(scene))
+    assert passed > 50
