@@ -189,6 +189,7 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
             last, before = abs(value - second[name]), abs(second[name] - third[name])
             factor = 3 if name == "contact_half_width" else 2
             error = max(factor * max(last, before / 2), least.get(name, 0.0), 1e-12 * abs(value))
+            error = 0.0 if mine["normal_load"] == 0 else error
         out[name] = Measure(value, UNITS[name], error, floors.get(name, 0.0))
     return out
 

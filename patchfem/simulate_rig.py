@@ -173,6 +173,11 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     return hub.points_model(law, [1.0], [load])
 
 
+def whole(span: float, drive: BaseSine) -> bool:
+    """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
+    return span > drive.period * (1 - 1e-6)
+
+
 def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None) -> Raw:
     """Closed-form run of a Coulomb scene, or of a structure without friction."""
     from .dynamics.histories import simulate
@@ -194,7 +199,7 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
         time, weight, slide, rate, force = done.loop
         work = float(weight @ (force * rate)) * drive.period / span
         q, part = (harmonic(time, weight, values_, drive.omega) for values_ in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2)
+        values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2) if whole(span, drive) else {}
     else:
         values.pop("friction_force_peak")
     stuck = f is not None and done.stick >= span * (1 - 1e-12)
@@ -228,8 +233,9 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     span = w.time[-1] - w.time[0]
     work = float(done.window_work) * drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), drive.omega)
-    values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, drive.omega), work,
-                             modes.mass * modes.omega[0]**2)
+    if whole(span, drive):
+        values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, drive.omega), work,
+                                 modes.mass * modes.omega[0]**2)
     length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
     stuck = values["slip_amplitude"] < (1e-3 * length if model.kind else 1e-300)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)

@@ -74,10 +74,10 @@ def only(text: str, *sets: str) -> str:
 
 
 FULL = [
-    "contact.tilt.on=lower", "contact.crown.radius=1 m", "contact.crown.on=lower", "contact.mesh=a \"b\" \\ é.msh",
+    "contact.tilt.on=upper", "contact.crown.radius=1 m", "contact.crown.on=upper", "contact.mesh=a \"b\" \\ é.msh",
     "contact.element_size=100 um", "contact.plane=stress", "contact.pairs=2", "contact.shear={}",
     "friction.rest_growth=10 m/s^2", "friction.slip_growth=0.2 um", "friction.rest_speed=10 um/s",
-    "friction.order=0.5", "friction.kinetic=0.25", "structure.travel=5 mm", "structure.mode.second.base=-0.2",
+    "friction.initial_bonds=0.5", "friction.kinetic=0.25", "structure.travel=5 mm", "structure.mode.second.base=-0.2",
     "accuracy.tail=1e-6", "accuracy.merge=1e-5", "accuracy.shear_modes=12", "accuracy.steps_per_cycle=400",
     'contact.substrate={young = "121.3 GPa", poisson = 0.31, density = "4370 kg/m^3"}',
     'measured={file = "t.csv", acceleration_gain = 1.1}',

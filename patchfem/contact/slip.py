@@ -105,7 +105,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     elastic = 2 * np.abs(shape @ (values * (shape.T @ limit[index]))).max()
     slides = (6 * bond_length + elastic) * (np.arange(1, 25) / 24) ** 2
     many = max(64, 4 * count)
-    with threadpool_limits(1, "blas"):
+    with threadpool_limits(1, "blas"), np.errstate(over="ignore", invalid="ignore"):
         full = _backbone(limit[index], shape[:, :many], values[:many], bond_length, slides)
         few = _backbone(limit[index], shape[:, :count], values[:count], bond_length, slides)
     error = float(np.abs(full - few).max() / limit.sum())
