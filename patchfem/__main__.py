@@ -156,8 +156,10 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     if found.contact is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
-    from .simulate_patch import grid_of
+    from .simulate_patch import grid_of, unlike
 
+    if unlike(found.contact):
+        raise Refused(f"{scene}: contact.upper, contact.lower: a mesh of unlike pieces is not yet built")
     grid = grid_of(found)
     write_mesh(grid, out)
     print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")

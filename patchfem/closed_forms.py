@@ -10,47 +10,38 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import gamma, gammainc, gammaincc, hyp1f1
 
+from .closed_contact import (  # noqa: F401  (one door for users: contact forms are read from here too)
+    cattaneo_shear,
+    cattaneo_stick_half_width,
+    combined_modulus,
+    hertz_half_width,
+    hertz_peak,
+    hertz_pressure,
+    kern_fraction,
+    layered_compliance,
+    positive,
+    punch_contact,
+    punch_pressure,
+    punch_rotation,
+    rounded_punch_half_width,
+    rounded_punch_pressure,
+    wedge_linear,
+    wedge_loop,
+    wedge_opening,
+    wedge_skin,
+    westergaard_approach,
+    westergaard_full_pressure,
+    westergaard_half_width,
+    westergaard_pressure,
+    westergaard_stiffness,
+)
+
 COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven at its own frequency
-
-
-def _positive(**values):
-    for name, value in values.items():
-        if not np.all(np.asarray(value, float) > 0):
-            raise ValueError(f"{name} must be positive, got {value}")
 
 
 def _reading(reading):
     if reading not in ("stretch", "report"):
         raise ValueError(f"reading must be 'stretch' or 'report', got {reading!r}")
-
-
-def combined_modulus(young, poisson, young_lower=None, poisson_lower=None) -> float:
-    """E* [Pa] of two bodies in plane strain, 1/E* = (1 - nu^2)/E of both; alike where the lower is left out."""
-    young_lower = young if young_lower is None else young_lower
-    poisson_lower = poisson if poisson_lower is None else poisson_lower
-    _positive(young=young, young_lower=young_lower)
-    return 1 / ((1 - poisson**2) / young + (1 - poisson_lower**2) / young_lower)
-
-
-def hertz_half_width(line_load, radius, modulus):
-    """Half width [m] of the line contact of a crown, gap x^2/(2 radius): a = sqrt(4 P R/(pi E*)) (Hertz 1882).
-
-    line_load P [N/m], radius R [m], modulus E* [Pa] of `combined_modulus`; bodies thick against a.
-    ValueError unless all are positive.
-    """
-    _positive(line_load=line_load, radius=radius, modulus=modulus)
-    return np.sqrt(4 * line_load * radius / (np.pi * modulus))
-
-
-def hertz_peak(line_load, radius, modulus):
-    """Largest pressure [Pa] of the line contact, 2 P/(pi a); arguments as in `hertz_half_width`."""
-    return 2 * line_load / (np.pi * hertz_half_width(line_load, radius, modulus))
-
-
-def hertz_pressure(x, line_load, radius, modulus):
-    """Pressure [Pa] at x [m] from the middle, p_0 sqrt(1 - x^2/a^2), 0 outside; arguments as in `hertz_half_width`."""
-    half = hertz_half_width(line_load, radius, modulus)
-    return hertz_peak(line_load, radius, modulus) * np.sqrt(np.maximum(1 - (np.asarray(x) / half)**2, 0))
 
 
 def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
@@ -59,7 +50,7 @@ def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
     speed [m/s] of either sign, ratio = eps_k/eps_0, rest_growth a_s [m s-2], slip_growth l_k [m]; ValueError unless
     the last four are positive.
     """
-    _positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
+    positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
     w = np.asarray(speed)**2 / (rest_growth * slip_growth)
     return length * (1 + ratio * w) / (1 + w)
 
@@ -81,7 +72,7 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
     limit*(P(p + 1, x) + m_0 phi_p(x)), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
     Stretch p = 1, m_0 = 1 and report p = 0, m_0 = 0 are both 1 - e^-x. ValueError for p <= -1 or a slide < 0.
     """
-    _positive(length=length)
+    positive(length=length)
     x = np.asarray(slide, float) / length
     if order <= -1:
         raise ValueError(f"order must exceed -1, got {order}")
@@ -99,7 +90,7 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
     e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
     ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
     """
-    _positive(length=length)
+    positive(length=length)
     _reading(reading)
     x = np.asarray(back, float) / length
     if np.any(x < 0):
@@ -122,7 +113,7 @@ def stretch_loop(amplitude, length, limit=1.0):
     4 limit (A - eps tanh(A/eps)) and limit tanh(A/eps); amplitude A [m] half peak-to-peak.
     ValueError unless amplitude and length are positive.
     """
-    _positive(amplitude=amplitude, length=length)
+    positive(amplitude=amplitude, length=length)
     end = np.tanh(np.asarray(amplitude) / length)
     return 4 * limit * (amplitude - length * end), limit * end
 
@@ -133,7 +124,7 @@ def report_loop(amplitude, length, limit=1.0):
     4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
     ValueError unless amplitude and length are positive.
     """
-    _positive(amplitude=amplitude, length=length)
+    positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
     return 4 * limit * (amplitude / np.tanh(2 * amplitude / length) - length / 2), limit * np.ones_like(amplitude)
 
@@ -144,7 +135,7 @@ def jenkins_loop(amplitude, length, limit=1.0):
     Below the yield slide (amplitude <= length) the loop is a line: (0, limit A/eps).
     ValueError unless amplitude and length are positive.
     """
-    _positive(amplitude=amplitude, length=length)
+    positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
     return 4 * limit * np.maximum(amplitude - length, 0), limit * np.minimum(amplitude / length, 1)
 
@@ -160,13 +151,13 @@ def decay_half_cycles(start, friction) -> int:
     start x_0 [m], friction F/k [m]. The report leaves N_0 in 3.11 unrounded, but (-1)^N_0 needs an integer.
     ValueError unless friction is positive.
     """
-    _positive(friction=friction)
+    positive(friction=friction)
     return max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
 
 
 def decay_rest(start, friction, omega) -> tuple:
     """(time [s], place [m]) at which a Coulomb oscillator released at `start` comes to rest; arguments of `decay`."""
-    _positive(omega=omega)
+    positive(omega=omega)
     count = decay_half_cycles(start, friction)
     sign = 1.0 if start >= 0 else -1.0
     return np.pi * count / omega, sign * (-1.0)**count * (abs(start) - 2 * count * friction)
@@ -204,7 +195,7 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     antisymmetric over half a drive period, which gives A and B; the rest follows from the particular
     amplitude 1/|1 - r^2 + 2 i xi r|.
     """
-    _positive(r=r)
+    positive(r=r)
     if friction < 0 or not 0 <= damping < 1:
         raise ValueError(f"friction must be >= 0 and damping in [0, 1), got {friction}, {damping}")
     if damping == 0 and r == 1:

@@ -20,6 +20,11 @@ EFFECTS = {
     "contact": Effect("patchfem.contact.unilateral", "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
                       (), ("pressure",)),
     "contact.coating": Effect("", "Lame pair of the layer in the coating rows"),
+    "contact.upper": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
+    "contact.lower": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
+    "contact.approach": Effect("", "delta given, N = sum f"),
+    "contact.holder": Effect("", "sum f x = N offset + K theta"),
+    "contact.step": Effect("patchfem.contact.gaps", "g += height H(x - at)"),
     "contact.tilt": Effect("patchfem.contact.gaps", "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect("patchfem.contact.gaps", "g += x^2/(2 radius)"),
@@ -47,12 +52,12 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "contact.upper", "contact.lower", "contact.approach", "contact.holder", "contact.step", "contact.profile",
-    "contact.asperities.law=linear", "contact.asperities.law=exponential", "contact.asperities.law=hertz",
-    "contact.strips", "friction.law=tanh", "friction.law=convolution", "friction.temperature", "slide.kind=dwell",
-    "slide.kind=file", "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free",
-    "drive.waveform=step", "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear",
-    "accuracy.method=duhamel", "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",
+    "contact.profile", "contact.asperities.law=linear", "contact.asperities.law=exponential",
+    "contact.asperities.law=hertz", "contact.strips", "friction.law=tanh", "friction.law=convolution",
+    "friction.temperature", "slide.kind=dwell", "slide.kind=file", "structure.stiffening", "structure.bonded",
+    "drive.kind=force", "drive.kind=free", "drive.waveform=step", "drive.waveform=sweep", "drive.waveform=levels",
+    "drive.waveform=file", "wear", "accuracy.method=duhamel", "accuracy.method=newmark", "accuracy.method=euler",
+    "accuracy.method=harmonic",
 )
 
 

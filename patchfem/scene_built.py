@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
-    "contact.upper": "",
-    "contact.lower": "",
-    "contact.approach": "contact.load",
-    "contact.holder": "",
-    "contact.step": "",
+    "contact.holder.tangential_stiffness": "",
     "contact.profile": "",
     "contact.asperities": "",
     "contact.strips": "",
@@ -94,6 +90,8 @@ def combinations(draft: Draft, kind: str) -> None:
     shear = contact is not None and contact.shear is not None
     if kind == "linear" and accuracy and accuracy.method == "march":
         draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
+    if contact is not None:
+        _approach(draft, contact)
     if kind not in ("bench", "rig") or law is None:
         return
     if shear:
@@ -102,6 +100,17 @@ def combinations(draft: Draft, kind: str) -> None:
         draft.say("friction.order", f"{law.order:g} in a rig: use order >= 0 or a bench, [slide]; not yet built")
     if contact is not None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
+
+
+def _approach(draft: Draft, contact: Contact) -> None:
+    if contact.approach is not None:
+        for name in ("load_line", "holder"):
+            if getattr(contact, name) is not None:
+                draft.say(f"contact.{name}", "beside [contact.approach]: use contact.load; not yet built")
+    if contact.mesh is not None:
+        for name in ("upper", "lower"):
+            if getattr(contact, name) is not None:
+                draft.say(f"contact.{name}", "beside contact.mesh: leave mesh out; not yet built")
 
 
 def _behind_shear(draft: Draft, law: Friction) -> None:
@@ -129,14 +138,14 @@ def _only_on_upper(kind: str, law: Friction, shear: bool) -> str:
 
 
 def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
-    sides = {f"contact.{name}.on": shape.on for name, shape in (("tilt", contact.tilt), ("crown", contact.crown))
-             if shape is not None and shape.on is not None}  # fmt: skip
+    shapes = (("tilt", contact.tilt), ("crown", contact.crown), ("step", contact.step))
+    sides = {f"contact.{name}.on": shape.on for name, shape in shapes if shape is not None and shape.on is not None}
     lower = [key for key, side in sides.items() if side == "lower"]
     if len(set(sides.values())) > 1:
-        key = "contact.crown.on" if draft.given("contact.crown.on") else "contact.tilt.on"
+        key = next((key for key in reversed(sides) if draft.given(key)), next(iter(sides)))
         piece = "the upper piece" if only_upper else "one piece"
-        draft.say(key, "contact.tilt and contact.crown lie on different pieces: put both shapes on "
-                       f"{piece}; not yet built")  # fmt: skip
+        names = " and ".join(key.removesuffix(".on") for key in sides)
+        draft.say(key, f"{names} lie on different pieces: put all shapes on {piece}; not yet built")
     elif lower and only_upper:
         draft.say(lower[0], f"'lower' {only_upper}: put the shapes on the upper piece; not yet built")
 

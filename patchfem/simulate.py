@@ -44,6 +44,9 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
         patch, *coarse = solve_all(scene, estimate)
         seconds["contact"] = perf_counter() - begin
         warnings += _strained(scene, patch)
+        if patch.upper is not patch.piece:
+            warnings.append("the pieces are unlike: what shear does to the normal closing, and the load to the slide, "
+                            "is left out")
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = _static(what, patch, coarse, seconds, warnings)

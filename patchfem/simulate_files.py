@@ -128,39 +128,47 @@ def _write_netcdf(result: Result, path: Path, text: str) -> None:
 
 def _write_fields(result: Result, path: Path) -> dict:
     """Both bodies and the interface, frame by frame, of one pair; the pressed state for the report's picture."""
-    from .contact.elasticity import cell_stress, displacement
     from .export.vtkhdf import bodies, write_series
-    from .mesh.files import pair_mesh
 
     patch, fields = result.patch, result.fields
-    piece, weight = patch.piece, patch.pieces.interface.weight
-    per = 1 / patch.pieces.interface.width
     times = fields["time"]
-    tau = fields.get("shear_stress", np.zeros((len(times), patch.grid.x.size)))
-    shear = np.concatenate([np.zeros((1, tau.shape[1])), tau * weight * per])
-    normal = np.zeros_like(shear)
-    normal[0] = patch.pressure.sigma_n * weight * per
-    u = displacement(piece, shear, normal)
-    down, along = u[:1], u[1:]
-    s_down, s_along = cell_stress(piece, down)[0], cell_stress(piece, along)[0]
-    flip = np.array([1, 1, 1, -1.0])  # the inward axis points to -y in the lower piece, to +y in the upper one
-    s_lower, s_upper = (s_down + s_along) * flip, s_down - s_along
-    p, y = patch.pressure, np.tile(patch.grid.depth, patch.grid.x.size)
-    x = np.repeat(patch.grid.x, patch.grid.depth.size)
-    lower = (down + along) * [1, -1]
-    upper = (down - along) * [1, 1]
-    upper[..., 0] += fields.get("holder_slide", np.zeros(len(times)))[:, None] - p.rotation * y
-    upper[..., 1] += p.rotation * x - p.approach
     interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
-    points, quads, lines, point_data, cell_data = bodies(
-        pair_mesh(patch.grid), len(times), lower, upper, s_lower, s_upper, mises(s_lower), mises(s_upper), interface,
-        patch.grid.depth.size)
+    low, high = _body(patch, fields, "lower"), _body(patch, fields, "upper")
+    points, quads, lines, point_data, cell_data = bodies(low, high, interface)
     units = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "part": "1", "material": "1",
              "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1"}
     used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
     write_series(path, points, quads, lines, times, point_data, cell_data, used)
-    shape = (2, patch.grid.x.size - 1, patch.grid.depth.size - 1)
-    return {"depth": patch.grid.depth, "mises": np.stack([mises(s_lower)[0], mises(s_upper)[0]]).reshape(shape)}
+    shape = (patch.grid.x.size - 1, -1)
+    return {"depth": (patch.grid.depth, patch.upper_grid.depth),
+            "mises": [body["mises"][0].reshape(shape) for body in (low, high)]}
+
+
+def _body(patch, fields: dict, side: str) -> dict:
+    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface."""
+    from .contact.elasticity import cell_stress, displacement
+
+    lower = side == "lower"
+    piece, grid = (patch.piece, patch.grid) if lower else (patch.upper, patch.upper_grid)
+    sign = -1.0 if lower else 1.0
+    force = patch.pieces.interface.weight / patch.pieces.interface.width
+    tau = fields.get("shear_stress", np.zeros((len(fields["time"]), grid.x.size)))
+    shear = np.concatenate([np.zeros((1, grid.x.size)), -sign * tau * force])
+    normal = np.zeros_like(shear)
+    normal[0] = patch.pressure.sigma_n * force
+    u = displacement(piece, shear, normal)
+    move = (u[:1] + u[1:]) * [1.0, sign]
+    stress = cell_stress(piece, u)[0]
+    stress = (stress[:1] + stress[1:]) * np.array([1.0, 1.0, 1.0, sign])
+    rows = grid.depth.size
+    x, depth = np.repeat(grid.x, rows), np.tile(grid.depth, grid.x.size)
+    if not lower:
+        p = patch.pressure
+        move[..., 0] += fields.get("holder_slide", np.zeros(len(tau)))[:, None] - p.rotation * depth
+        move[..., 1] += p.rotation * x - p.approach
+    quads = piece.cells if not lower else piece.cells[:, ::-1]
+    return {"points": np.stack([x, sign * depth], axis=1), "quads": quads, "rows": rows,
+            "material": piece.is_coating, "displacement": move, "stress": stress, "mises": mises(stress)}
 
 
 def mises(s: np.ndarray) -> np.ndarray:

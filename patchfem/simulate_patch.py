@@ -6,9 +6,9 @@ from time import perf_counter
 import numpy as np
 
 from .contact.elasticity import Layers, Piece, assemble, interface_compliance
-from .contact.gaps import crown, tilt
+from .contact.gaps import crown, step, tilt
 from .contact.slip import normal_stiffness, tangential_stiffness
-from .contact.unilateral import press
+from .contact.unilateral import press, press_by
 from .core import Compliance, Interface, Measure, Outcome, PatchfemError, Pressure, frozen_array
 from .mesh.tensor import TensorGrid, coarser, graded_grid
 
@@ -17,10 +17,13 @@ AUTOMATIC_CELLS = 200
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patch:
-    """One solved patch; forces, areas and stiffnesses are of all pairs together."""
+    """One solved patch; forces, areas and stiffnesses are of all pairs together. grid, piece: the lower piece (its
+    columns are the interface), upper_grid, upper: the other one, the same objects where the pieces are alike."""
 
     grid: TensorGrid
+    upper_grid: TensorGrid
     piece: Piece
+    upper: Piece
     pieces: Compliance
     gap: np.ndarray
     pressure: Pressure
@@ -32,23 +35,35 @@ class Patch:
         return self.pressure.sigma_n > 0
 
 
-def layers_of(contact) -> Layers:
-    """Elastic layers of a scene's [contact]."""
-    coat = contact.coating.material if contact.coating else contact.substrate
-    return Layers((coat.young, coat.poisson), (contact.substrate.young, contact.substrate.poisson), contact.plane)
+def piece_of(contact, side: str) -> tuple:
+    """(height, substrate, coating or None) of one piece, its own table before the common keys."""
+    own = getattr(contact, side)
+    height, substrate, coating = contact.height, contact.substrate, contact.coating
+    if own is not None:
+        height, substrate = own.height or height, own.substrate or substrate
+        coating = None if own.coating == "none" else own.coating or coating
+    return height, substrate, coating
 
 
-def grid_of(scene) -> TensorGrid:
-    """The tensor grid a scene asks for: made, or recognised in the mesh file it names."""
+def layers_of(contact, side: str) -> Layers:
+    """Elastic layers of one piece."""
+    _, substrate, coating = piece_of(contact, side)
+    coat = coating.material if coating else substrate
+    return Layers((coat.young, coat.poisson), (substrate.young, substrate.poisson), contact.plane)
+
+
+def grid_of(scene, side: str = "lower") -> TensorGrid:
+    """The tensor grid of a piece: made, or recognised in the mesh file the scene names."""
     contact = scene.contact
-    thickness = contact.coating.thickness if contact.coating else 0.0
+    height, _, coating = piece_of(contact, side)
+    thickness = coating.thickness if coating else 0.0
     if contact.mesh is None:
         size = contact.element_size or contact.length / AUTOMATIC_CELLS
-        return graded_grid(contact.length, contact.height, size, thickness)
+        return graded_grid(contact.length, height, size, thickness)
     from .mesh.files import read_grid
 
     grid = read_grid(scene.beside(contact.mesh))
-    for key, mine, wanted in (("length", grid.length, contact.length), ("height", grid.height, contact.height),
+    for key, mine, wanted in (("length", grid.length, contact.length), ("height", grid.height, height),
                               ("coating.thickness", grid.coating, thickness)):
         if abs(mine - wanted) > 1e-6 * contact.length:
             raise PatchfemError(f"{scene.path}: contact.{key} is {wanted:.9g} m, the mesh has {mine:.9g} m")
@@ -57,42 +72,62 @@ def grid_of(scene) -> TensorGrid:
 
 def shape_side(contact) -> str:
     """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
-    sides = {part.on for part in (contact.tilt, contact.crown) if part is not None}
+    sides = {part.on for part in (contact.tilt, contact.crown, contact.step) if part is not None}
     if len(sides) > 1:
-        raise PatchfemError("contact.tilt.on and contact.crown.on name different pieces; not yet built: put both "
-                            "shapes on one piece")
+        raise PatchfemError("contact: the shapes lie on different pieces (key `on`); not yet built: put all on one")
     return sides.pop() if sides else "upper"
 
 
-def solve(scene, grid: TensorGrid) -> Patch:
-    """Assemble, condense and press the pieces of a scene on `grid`."""
+SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: crown(x, part.radius),
+          "step": lambda x, part: step(x, part.height, part.at)}
+
+
+def solve(scene, grid: TensorGrid, upper_grid: TensorGrid | None = None) -> Patch:
+    """Assemble, condense and press the pieces of a scene on `grid` (and `upper_grid` where the upper piece differs)."""
     contact, seconds = scene.contact, {}
-    start = perf_counter()
-    piece = assemble(grid.x, grid.depth, grid.coating_rows, layers_of(contact))
-    seconds["assemble"] = perf_counter() - start
-    nn, tt, _ = interface_compliance(piece)
     width = contact.width * contact.pairs
     interface = Interface(grid.x, frozen_array(grid.tributary() * width), width)
-    # the mirror image doubles nn and tt and cancels nt: normal and shear decouple
-    pieces = Compliance(interface, frozen_array(2 * nn / width), frozen_array(2 * tt / width))
+    start = perf_counter()
+    piece = assemble(grid.x, grid.depth, grid.coating_rows, layers_of(contact, "lower"))
+    upper = piece if upper_grid is None else assemble(upper_grid.x, upper_grid.depth, upper_grid.coating_rows,
+                                                      layers_of(contact, "upper"))
+    seconds["assemble"] = perf_counter() - start
+    low = interface_compliance(piece)
+    high = low if upper is piece else interface_compliance(upper)
+    # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
+    pieces = Compliance(interface, frozen_array((low[0] + high[0]) / width), frozen_array((low[1] + high[1]) / width))
     seconds["condense"] = perf_counter() - start - seconds["assemble"]
-    gap, angle = np.zeros(grid.x.size), 0.0
-    for name, part in (("tilt", contact.tilt), ("crown", contact.crown)):
+    gap = np.zeros(grid.x.size)
+    for name, shape in SHAPES.items():
+        part = getattr(contact, name)
         if part is not None:
             begin = perf_counter()
-            gap = gap + (tilt(grid.x, part.angle) if name == "tilt" else crown(grid.x, part.radius))
-            angle += part.angle if name == "tilt" and part.on == "upper" else 0.0
+            gap = gap + shape(grid.x, part)
             seconds[name] = perf_counter() - begin
+    angle = contact.tilt.angle if contact.tilt is not None and contact.tilt.on == "upper" else 0.0
     begin = perf_counter()
-    pressure = press(pieces, gap, contact.load, moment_of(contact), angle)
+    if contact.approach is not None:
+        pressure = press_by(pieces, gap, contact.approach.distance, angle)
+    else:
+        pressure = press(pieces, gap, contact.load, moment_of(contact), angle, spring=spring_of(contact))
     seconds["press"] = perf_counter() - begin
-    return Patch(grid, piece, pieces, frozen_array(gap), pressure, seconds)
+    return Patch(grid, upper_grid or grid, piece, upper, pieces, frozen_array(gap), pressure, seconds)
+
+
+def unlike(contact) -> bool:
+    """Whether the pieces differ in height, material or coating."""
+    return piece_of(contact, "lower") != piece_of(contact, "upper")
+
+
+def spring_of(contact) -> float:
+    """Rotational stiffness of the holder [N m/rad], 0 where none is named."""
+    return (contact.holder.rotational_stiffness or 0.0) if contact.holder is not None else 0.0
 
 
 def moment_of(contact) -> float | None:
     """Moment of the load about the middle of the patch [N m], None where the rotation is held."""
     if contact.load_line is None:
-        return None
+        return 0.0 if spring_of(contact) > 0 else None
     if contact.load_line.moment is not None:
         return contact.load_line.moment
     return contact.load * contact.load_line.offset
@@ -197,9 +232,11 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
 def solve_all(scene, estimate: bool = True) -> tuple:
     """(Patch on the asked mesh, on a mesh twice and four times as coarse); None where none is wanted or possible."""
     grid = grid_of(scene)
-    out = [solve(scene, grid), None, None]
+    other = grid_of(scene, "upper") if unlike(scene.contact) else None
+    out = [solve(scene, grid, other), None, None]
     for k in (1, 2):
         if estimate and grid.x.size > 8:
             grid = coarser(grid)
-            out[k] = solve(scene, grid)
+            other = coarser(other) if other is not None else None
+            out[k] = solve(scene, grid, other)
     return tuple(out)

@@ -80,10 +80,21 @@ def _sizes(scene) -> tuple:
         chain["pieces_shear"] = "rigid"
     chain["asperities"] = "rigid"
     f = scene.friction
-    load = contact.load if contact is not None else scene.normal.load if scene.normal is not None else None
-    if f is not None and load is not None:
+    load = nominal_load(scene)
+    if f is not None and load > 0:
         chain["bonds"] = f.static * load / f.bond_length if f.bond_length else "rigid until it slips"
     return unknowns, chain
+
+
+def nominal_load(scene) -> float:
+    """The load of a scene [N]; for a prescribed approach that of two uncoated bars in series, an upper estimate."""
+    contact = scene.contact
+    if contact is None:
+        return scene.normal.load if scene.normal is not None else 0.0
+    if contact.load is not None:
+        return contact.load
+    modulus = contact.substrate.young / (1 - contact.substrate.poisson**2)
+    return contact.pairs * contact.approach.distance * modulus * contact.length * contact.width / (2 * contact.height)
 
 
 def block_shear(contact) -> float:
@@ -124,7 +135,7 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
 def _groups(scene, chain) -> dict:
     out = {}
     f, contact = scene.friction, scene.contact
-    load = contact.load if contact is not None else scene.normal.load if scene.normal is not None else 0.0
+    load = nominal_load(scene)
     if scene.kind == "rig":
         from .simulate_rig import drive_of
 

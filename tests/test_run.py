@@ -449,8 +449,8 @@ def test_refuses_verbs_not_yet_built(verb):
 
 @pytest.mark.parametrize("sets", [
     ("contact.asperities.law=linear", "contact.asperities.normal_stiffness=1e13 Pa/m"),
-    ("contact.strips.count=8",), ("contact.step.height=1 um", "contact.step.at=2 mm"),
-    ("contact.holder.rotational_stiffness=1e4 N m/rad",), ("friction.law=tanh", "friction.reference_speed=1 mm/s"),
+    ("contact.strips.count=8",), ("contact.profile.file=before.csv",),
+    ("contact.holder.tangential_stiffness=1e4 N/m",), ("friction.law=tanh", "friction.reference_speed=1 mm/s"),
     ("friction.spread=5 um",), ("structure.bonded.stiffness=4.6e6 N/m",), ("structure.stiffening.cubic=1e12 N/m^3",),
     ("wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"), ("accuracy.method=harmonic",),
 ], ids=lambda sets: sets[0].split("=")[0])  # fmt: skip

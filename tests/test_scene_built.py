@@ -25,7 +25,7 @@ REFUSED = [
     (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2"], "friction.order", "use order = 1; not yet built"),
     (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "leave kinetic out; not yet built"),
     (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 beside"),
-    (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put both shapes on one piece; not yet"),
+    (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece; not yet"),
     (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "on one piece; not yet built"),
     (RIG, ["contact.crown.radius=1 m", LOWER, SHEAR], "contact.tilt.on", "on the upper piece; not yet built"),
     (RIG, [SHEAR, LOWER], "contact.tilt.on", "'lower' beside [contact.shear]: put the shapes on the upper piece"),

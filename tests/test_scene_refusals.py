@@ -279,11 +279,7 @@ def test_refuses_another_shape_of_table(text, says):
 
 
 UNBUILT = [
-    (PATCH, ['contact.upper.height="5 mm"'], "contact.upper"),
-    (PATCH, ['contact.lower.coating="none"'], "contact.lower"),
-    (PATCH.replace('load   = "26 lbf"\n', ""), ["contact.approach.distance=0.2 um"], "contact.approach"),
-    (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder"),
-    (PATCH, ["contact.step.height=1 um", "contact.step.at=2 mm"], "contact.step"),
+    (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
     (PATCH, ["contact.profile.file=before.csv"], "contact.profile"),
     (PATCH, ["contact.asperities.law=exponential", "contact.asperities.decay_length=1 um"], "contact.asperities"),
     (PATCH, ["contact.strips.count=8"], "contact.strips"),

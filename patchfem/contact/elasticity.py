@@ -66,7 +66,9 @@ def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
     order = np.empty((nx * ny, 2), dtype=np.int64)
     order[place] = basis.nodal_dofs.T
     free = order.reshape(nx, ny, 2)[:, :-1].ravel()
-    return Piece(x, depth, stiff[free][:, free].tocsr(), _counter_clockwise(place[mesh.t].T, ny), coat, layers)
+    cells = _counter_clockwise(place[mesh.t].T, ny)
+    column_by_column = np.argsort(cells[:, 0])
+    return Piece(x, depth, stiff[free][:, free].tocsr(), cells[column_by_column], coat[column_by_column], layers)
 
 
 def _counter_clockwise(cells, ny: int) -> np.ndarray:

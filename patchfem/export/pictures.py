@@ -146,25 +146,27 @@ def closer(x, depth, sigma, ratio: float) -> tuple:
 
 
 @_styled
-def bodies(x, depth, mises, sigma) -> str:
+def bodies(x, depths, mises, sigma) -> str:
     """Von Mises stress [Pa] of both pieces, pressed: the whole pair, and closer where sigma (m,) [Pa] is not zero.
 
-    mises (2, nx - 1, ny - 1): of the lower and the upper piece; colours end at all but the sharpest cells.
+    depths, mises: (ny,) rows and (nx - 1, ny - 1) cells of the lower and of the upper piece; colours end at all but the
+    sharpest cells.
     """
-    tall = 3.7
+    tall, depth = 3.7, max(depths, key=lambda rows: rows[-1])
     wide = min(max(tall * (x[-1] - x[0]) / (2 * depth[-1]), 1.5), 4.2)
     rest = WIDTH - wide - 2.3
     figure, axes = _figure(2, tall + 0.7, width_ratios=(wide, rest))
     box = closer(x, depth, sigma, rest / tall)
-    (unit, scale), top = axis_unit(mises, "Pa"), 0.0
+    (unit, scale), top = axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"), 0.0
     for axis, (left, right, height) in zip(axes[::-1], (box, (x[0], x[-1], depth[-1]))):
         name, size = axis_unit((left, right, height), "m")
         i = slice(max(np.searchsorted(x, left, "right") - 1, 0), np.searchsorted(x, right) + 1)
-        j = slice(0, np.searchsorted(depth, height) + 1)
-        cells = mises[:, i.start:i.stop - 1, :j.stop - 1] * scale
-        top = top or float(np.quantile(cells, 0.998))  # the framed part comes first and sets the colours
+        rows = [part[:np.searchsorted(part, height) + 1] for part in depths]
+        cells = [part[i.start:i.stop - 1, :row.size - 1] * scale for part, row in zip(mises, rows)]
+        # the framed part comes first and sets the colours
+        top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
         for k, side in ((0, -1), (1, 1)):
-            mesh = axis.pcolormesh(x[i] * size, side * depth[j] * size, cells[k].T, cmap="viridis", vmin=0, vmax=top,
+            mesh = axis.pcolormesh(x[i] * size, side * rows[k] * size, cells[k].T, cmap="viridis", vmin=0, vmax=top,
                                    rasterized=True)
         axis.axhline(0, color="white", lw=0.6)
         axis.set(xlabel=f"x [{name}]", ylabel=f"y [{name}]", aspect="equal", xlim=(left * size, right * size),

@@ -190,9 +190,10 @@ def _bodies(data: dict) -> tuple | None:
     cause = "at the prescribed approach" if "contact.approach" in effects else "under the load"
     alone = "" if data["summary"]["kind"] == "patch" else " alone, before any slide"
     mises = data["bodies"]["mises"]
-    unit, scale = pictures.axis_unit(mises, "Pa")
+    largest = max(float(np.max(part)) for part in mises)
+    unit, scale = pictures.axis_unit([largest], "Pa")
     return (pictures.bodies(data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
-            f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {mises.max() * scale:.3g} {unit}.")
+            f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} {unit}.")
 
 
 def _loop(data: dict) -> tuple | None:

@@ -66,37 +66,35 @@ def _arrays(root, steps, kind: str, data: dict, count: int, units: dict) -> None
         offsets[name] = (np.arange(count) if len(values) == count else np.zeros(count, np.int64)) * size
 
 
-def bodies(pair: dict, frames: int, lower, upper, stress_lower, stress_upper, mises_lower, mises_upper,
-           interface: dict, ny: int) -> tuple:
+def bodies(lower: dict, upper: dict, interface: dict) -> tuple:
     """Points, quads, lines, point data and cell data of a pair.
 
-    pair: the dict of `mesh.files.pair_mesh`; lower, upper: (f, n, 2) displacements in x, y [m]; stress (f, t, 4) as
-    xx, yy, zz, xy; interface: name -> (f, m). Node j*ny of a body lies on its interface.
+    lower, upper: "points" (n, 2), "quads" (t, 4) numbered from 0, "material" (t,), "rows" nodes per column (node
+    j * rows lies on the interface), "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises"
+    (f, t) [Pa]; interface: name -> (f, m).
     """
-    half = len(pair["points"]) // 2
-    top = np.arange(0, half, ny)
-    points = np.concatenate([pair["points"], pair["points"][top]])
+    low, high = (np.arange(0, len(body["points"]), body["rows"]) for body in (lower, upper))
+    first, last = len(lower["points"]), len(lower["points"]) + len(upper["points"])
+    points = np.concatenate([lower["points"], upper["points"], lower["points"][low]])
     points = np.column_stack([points, np.zeros(len(points))])
-    lines = len(pair["points"]) + np.stack([np.arange(top.size - 1), np.arange(1, top.size)], axis=1)
+    quads = np.concatenate([lower["quads"], upper["quads"] + first])
+    lines = last + np.stack([np.arange(low.size - 1), np.arange(1, low.size)], axis=1)
+    frames = len(lower["displacement"])
     move = np.zeros((frames, len(points), 3), np.float32)
-    move[:, :half, :2], move[:, half:2 * half, :2] = lower, upper
-    move[:, 2 * half:, :2] = lower[:, top]
+    move[:, :first, :2], move[:, first:last, :2] = lower["displacement"], upper["displacement"]
+    move[:, last:, :2] = lower["displacement"][:, low]
     point_data = {"displacement": move}
     for name, values in interface.items():
         full = np.full((frames, len(points)), np.nan, np.float32) if name != "status" else \
             np.full((frames, len(points)), -1, np.int8)
-        for place in (top, top + half, 2 * half + np.arange(top.size)):
+        for place in (low, high + first, last + np.arange(low.size)):
             full[:, place] = values
         point_data[name] = full
-    cells = len(pair["quads"]) + len(lines)
-    body = len(pair["quads"]) // 2
+    cells, body = len(quads) + len(lines), len(lower["quads"])
     stress = np.full((frames, cells, 6), np.nan, np.float32)
     mises = np.full((frames, cells), np.nan, np.float32)
-    for start, s, v in ((0, stress_lower, mises_lower), (body, stress_upper, mises_upper)):
-        stress[:, start:start + body, :4] = s
-        stress[:, start:start + body, 4:] = 0
-        mises[:, start:start + body] = v
-    part = np.concatenate([np.zeros(body), np.ones(body), np.full(len(lines), 2)]).astype(np.int8)[None]
-    material = np.concatenate([(pair["tags"] % 2 == 0), np.full(len(lines), -1)]).astype(np.int8)[None]
-    return points, pair["quads"], lines, point_data, {"stress": stress, "von_mises": mises, "part": part,
-                                                      "material": material}
+    for rows, part in ((slice(0, body), lower), (slice(body, len(quads)), upper)):
+        stress[:, rows, :4], stress[:, rows, 4:], mises[:, rows] = part["stress"], 0, part["mises"]
+    part = np.concatenate([np.zeros(body), np.ones(len(quads) - body), np.full(len(lines), 2)]).astype(np.int8)[None]
+    material = np.concatenate([lower["material"], upper["material"], np.full(len(lines), -1)]).astype(np.int8)[None]
+    return points, quads, lines, point_data, {"stress": stress, "von_mises": mises, "part": part, "material": material}

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
+from .anymesh import PairMesh, Tagged, pieces
+from .decks import read_inp, read_unv
 from .tensor import TensorGrid
 
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
@@ -70,20 +72,73 @@ def write_mesh(grid: TensorGrid, path: Path) -> None:
         raise Missing(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
-def _load(path: Path):
-    """meshio's mesh of a .msh; what meshio prints is kept from stdout, and it may call sys.exit."""
+def read_pieces(path: Path) -> PairMesh:
+    """Both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv; the interfaces must match.
+
+    PatchfemError names what is missing or wrong, `mesh.anymesh.pieces` lists it.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise PatchfemError(f"{path}: no such mesh file")
+    if path.suffix in (".inp", ".unv"):
+        try:
+            raw = (read_inp if path.suffix == ".inp" else read_unv)(path.read_text("utf-8", "replace"))
+        except PatchfemError as error:
+            raise PatchfemError(f"{path}: {error}") from None
+        except (ValueError, IndexError, StopIteration, OverflowError) as error:
+            fault = f"{type(error).__name__}: {error}"
+            raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})") from None
+    elif path.suffix in (".msh", ".vtu"):
+        raw = _tagged(path, _load(path, (".msh", ".vtu")))
+    else:
+        raise PatchfemError(f"{path}: a mesh is read from .msh, .vtu, .inp or .unv")
+    return pieces(raw, path)
+
+
+def _tagged(path: Path, mesh) -> Tagged:
+    """Triangles, quads and edge nodes of a meshio mesh by tag: physical names in .msh, the array `tag` in .vtu."""
+    if path.suffix == ".msh":
+        names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
+        codes, how = mesh.cell_data.get("gmsh:physical"), "names of physical groups"
+    else:
+        names = {(2, v): k for k, v in CELL_TAGS.items()} | {(1, v): k for k, v in EDGE_TAGS.items()}
+        codes = mesh.cell_data.get("tag", mesh.cell_data.get("gmsh:physical"))
+        how = "the cell array `tag`: " + ", ".join(f"{v} {k}" for k, v in (CELL_TAGS | EDGE_TAGS).items())
+    cells, labels, nodes = {"triangle": [], "quad": []}, {"triangle": [], "quad": []}, {}
+    for block, code in zip(mesh.cells, codes or [None] * len(mesh.cells)):
+        if block.type == "vertex":
+            continue
+        if block.type != "line" and block.type not in cells:
+            raise PatchfemError(f"{path}: {block.type} cells; only linear triangles, quads and lines can be used")
+        code = np.zeros(len(block.data), int) if code is None else np.ravel(code)
+        for one in np.unique(code):
+            mine = code == one
+            name = names.get((1 if block.type == "line" else 2, int(one)), f"tag {int(one)}" if one else "")
+            if block.type == "line":
+                nodes[name] = np.append(nodes.get(name, np.empty(0, np.int64)), np.ravel(block.data[mine]))
+            else:
+                cells[block.type].append(block.data[mine])
+                labels[block.type].append(np.full(mine.sum(), name))
+    parts = [np.concatenate([np.empty((0, k), np.int64), *cells[kind]]) for kind, k in (("triangle", 3), ("quad", 4))]
+    label = np.concatenate([np.empty(0, "U1"), *labels["triangle"], *labels["quad"]])
+    return Tagged(np.asarray(mesh.points, float), *(part.astype(np.int64) for part in parts), label, nodes, how)
+
+
+def _load(path: Path, known: tuple = (".msh",)):
+    """meshio's mesh of a file; what meshio prints is kept from stdout, and it may call sys.exit."""
     import meshio
 
     if not path.is_file():
         raise PatchfemError(f"{path}: no such mesh file")
-    if path.suffix != ".msh":
+    if path.suffix not in known:
         raise PatchfemError(f"{path}: only .msh meshes are read; other formats are not yet built")
-    _plausible(path)
+    if path.suffix == ".msh":
+        _plausible(path)
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)
     except (Exception, SystemExit) as error:
-        raise PatchfemError(f"{path}: not a readable .msh file ({type(error).__name__}: {error})") from None
+        raise PatchfemError(f"{path}: not a readable {path.suffix} file ({type(error).__name__}: {error})") from None
 
 
 def _plausible(path: Path) -> None:

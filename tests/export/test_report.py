@@ -47,7 +47,7 @@ def patch(load=1.0, frames=1, effects=("contact",)) -> dict:
     if frames > 1:
         fields["shear_stress"] = 0.3 * sigma * np.sin(np.arange(frames))[:, None]
     mises = np.tile((sigma[1:] + sigma[:-1])[:, None] / 2 * np.exp(-depth[1:] / 1e-3), (2, 1, 1))
-    return data | {"x": x, "fields": fields, "bodies": {"depth": depth, "mises": mises}}
+    return data | {"x": x, "fields": fields, "bodies": {"depth": (depth, depth), "mises": mises}}
 
 
 def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "structure")) -> dict:

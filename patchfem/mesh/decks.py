@@ -1,0 +1,187 @@
+"""Tagged meshes from text: Abaqus and CalculiX decks (.inp) and universal files (.unv), read line by line.
+
+Names are compared without case, as Abaqus writes them in capitals.
+"""
+
+import re
+
+import numpy as np
+
+from ..core import PatchfemError
+from .anymesh import CELLS, EDGES, Tagged
+
+INP = ("names of *ELSET for the cells; of *NSET, or *ELSET of line elements, for interface and far")
+UNV = ("names of groups of elements for the cells; of groups of nodes or of line elements for interface and far")
+FLAT = re.compile(r"(?:CPE|CPS|CPEG|CAX|S|STRI|M3D|R3D|SFM3D)([34])(?:R|H|I|RH|IH|RS|RSW|R5)?$")
+LINE = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
+UNV_SIZES = {11: 2, 21: 2, 41: 3, 51: 3, 61: 3, 81: 3, 91: 3, 44: 4, 54: 4, 64: 4, 84: 4, 94: 4}
+UNV_BEAMS = (11, 21, 22, 23, 24)  # these carry one more record
+UNV_GROUPS = {2429: 2, 2430: 2, 2432: 2, 2435: 4, 2452: 4, 2467: 4, 2477: 4}
+
+
+def read_inp(text: str) -> Tagged:
+    """A flat deck: *NODE, *ELEMENT, *NSET, *ELSET (GENERATE too). PatchfemError or ValueError for what it cannot be."""
+    nodes, elements, sets = {}, {}, {"NSET": {}, "ELSET": {}}
+    for keyword, given, lines in _inp_blocks(text):
+        if keyword in ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
+            raise PatchfemError(f"*{keyword} is not yet built; write a flat deck")
+        if keyword == "NODE":
+            new = {int(line[0]): [float(v) for v in line[1:] if v] for line in lines}
+            if new.keys() & nodes.keys():
+                raise PatchfemError("a node number is given twice (several parts are not yet built: write a flat deck)")
+            nodes |= new
+            _gather(sets["NSET"], given.get("NSET"), list(new))
+        elif keyword == "ELEMENT":
+            new = _inp_elements(given.get("TYPE", "").upper(), lines)
+            if new.keys() & elements.keys():
+                raise PatchfemError("an element number is given twice")
+            elements |= new
+            _gather(sets["ELSET"], given.get("ELSET"), list(new))
+        elif keyword in sets:
+            _gather(sets[keyword], given.get(keyword, ""), _inp_members(given, lines, sets[keyword], nodes, elements))
+    return _tagged(nodes, elements, sets["NSET"], sets["ELSET"], INP)
+
+
+def _inp_blocks(text: str):
+    keyword, given, lines = "", {}, []
+    for line in text.splitlines():
+        if not line.strip() or line.startswith("**"):
+            continue
+        words = [word.strip() for word in line.split(",")]
+        if not line.lstrip().startswith("*"):
+            lines.append(words)
+            continue
+        yield keyword, given, lines
+        keyword, lines = words[0].lstrip("*").strip().upper(), []
+        given = {key.strip().upper(): value.strip().strip('"') for key, _, value in
+                 (word.partition("=") for word in words[1:])}
+    yield keyword, given, lines
+
+
+def _inp_elements(kind: str, lines) -> dict:
+    flat = FLAT.match(kind)
+    size = int(flat[1]) if flat else 2 if LINE.match(kind) else 0
+    if not size:
+        raise PatchfemError(f"{kind or 'untyped'} elements; only linear triangles, quads and line elements can be used")
+    numbers = np.array([int(word) for line in lines for word in line if word], np.int64)
+    if numbers.size % (size + 1):
+        raise PatchfemError(f"{kind} elements do not all have {size} nodes")
+    return {row[0]: row[1:] for row in numbers.reshape(-1, size + 1).tolist()}
+
+
+def _inp_members(given: dict, lines, known: dict, nodes: dict, elements: dict) -> list:
+    if "GENERATE" in given:
+        there, out = nodes if "NSET" in given else elements, []
+        for line in lines:
+            first, last, step = ([int(word) for word in line if word] + [1])[:3]
+            if step < 1 or (last - first) // step >= len(there):
+                raise PatchfemError(f"GENERATE from {first} to {last} by {step}: more than the deck has")
+            out += range(first, last + 1, step)
+        return out
+    out = []
+    for word in (word for line in lines for word in line if word):
+        if word.isdigit():
+            out.append(int(word))
+        elif word.lower() in known:
+            out += known[word.lower()]
+            if len(out) > 4 * (len(nodes) + len(elements)):
+                raise PatchfemError("a set names more members than the deck has")
+        else:
+            raise PatchfemError(f"a set names the unknown set {word}")
+    return out
+
+
+def read_unv(text: str) -> Tagged:
+    """Nodes (2411, 781, 15), elements (2412, 780), groups (2467 and its kin), length unit (164)."""
+    nodes, elements, sets, unit = {}, {}, ({}, {}), 1.0
+    for number, lines in _unv_datasets(text):
+        if number in (2411, 781):
+            for head, place in zip(lines[::2], lines[1::2], strict=True):
+                nodes[int(head.split()[0])] = [float(v.replace("D", "E").replace("d", "e")) for v in place.split()]
+        elif number == 15:
+            for line in lines:
+                nodes[int(line.split()[0])] = [float(v.replace("D", "E")) for v in line.split()[4:7]]
+        elif number in (2412, 780):
+            elements |= _unv_elements(lines)
+        elif number in UNV_GROUPS:
+            _unv_groups(lines, UNV_GROUPS[number], *sets)
+        elif number == 164:
+            unit = float(lines[1].split()[0].replace("D", "E"))
+            if not unit > 0:
+                raise PatchfemError("the length unit of dataset 164 is not positive")
+    nodes = {key: [v / unit for v in place] for key, place in nodes.items()}
+    return _tagged(nodes, elements, *sets, UNV)
+
+
+def _unv_datasets(text: str):
+    lines = iter(text.splitlines())
+    for line in lines:
+        if line.strip() != "-1":
+            continue
+        number, held = next(lines, "").strip(), []
+        for inner in lines:
+            if inner.strip() == "-1":
+                break
+            held.append(inner)
+        else:
+            raise PatchfemError(f"dataset {number[:20]} does not end")
+        if number.isdigit():
+            yield int(number), held
+
+
+def _unv_elements(lines) -> dict:
+    out, lines = {}, iter(lines)
+    for head in lines:
+        words = [int(word) for word in head.split()]
+        size = UNV_SIZES.get(words[1], 0)
+        if size != words[-1]:
+            raise PatchfemError(f"elements of kind {words[1]} with {words[-1]} nodes; only linear triangles, quads and "
+                                "line elements can be used")
+        if words[1] in UNV_BEAMS:
+            next(lines)
+        out[words[0]] = [int(word) for word in next(lines).split()]
+    return out
+
+
+def _unv_groups(lines, width: int, node_sets: dict, element_sets: dict) -> None:
+    lines = iter(lines)
+    for head in lines:
+        count, name = int(head.split()[-1]), next(lines).strip()
+        values = []
+        while len(values) < width * count:
+            values += [int(word) for word in next(lines).split()]
+        for kind, where in ((7, node_sets), (8, element_sets)):
+            _gather(where, name, [tag for code, tag in zip(values[::width], values[1::width]) if code == kind])
+
+
+def _gather(sets: dict, name: str | None, members: list) -> None:
+    if name and members:
+        sets[name.lower()] = sets.get(name.lower(), []) + members
+
+
+def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, how: str) -> Tagged:
+    """Numbers of the file turned into places; -1 for a number that the file does not define."""
+    place = {number: k for k, number in enumerate(nodes)}
+    if len({len(where) for where in nodes.values()}) > 1:
+        raise PatchfemError("nodes with unlike numbers of coordinates")
+    name = {}
+    for tag in CELLS:
+        for number in element_sets.get(tag, ()):
+            if name.setdefault(number, tag) != tag:
+                raise PatchfemError(f"element {number} is tagged {name[number]} and {tag}")
+    cells, names, edges = {3: [], 4: []}, {3: [], 4: []}, {}
+    for number, corners in elements.items():
+        if len(corners) > 2:
+            cells[len(corners)].append([place.get(n, -1) for n in corners])
+            names[len(corners)].append(name.get(number, ""))
+    for tag in EDGES:
+        numbers = list(node_sets.get(tag, ()))
+        for number in element_sets.get(tag, ()):
+            corners = elements.get(number, ())
+            if len(corners) != 2:
+                raise PatchfemError(f"{tag} holds element {number}, which is no line element")
+            numbers += corners
+        edges[tag] = np.array([place.get(n, -1) for n in numbers], np.int64)
+    points = np.array(list(nodes.values()), float).reshape(len(nodes), -1)
+    return Tagged(points, np.array(cells[3], np.int64).reshape(-1, 3), np.array(cells[4], np.int64).reshape(-1, 4),
+                  np.array(names[3] + names[4] or [""]), edges, how)

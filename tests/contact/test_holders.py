@@ -1,0 +1,106 @@
+"""Fixtures and bodies of a patch through its scene: springs, prescribed approach, unlike pieces, a step."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem import scene, simulate_patch
+from patchfem.contact.gaps import step
+
+TEXT = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+element_size = "0.2 mm"
+substrate = "Ti-8Al-1Mo-1V"
+{}
+[contact.coating]
+material = "WC-Co"
+thickness = "6 mil"
+{}
+"""
+LOAD = 'load = "26 lbf"'
+
+
+def solved(keys=LOAD, tables=""):
+    found = scene.loads(TEXT.format(keys, tables))
+    patch = simulate_patch.solve_all(found, False)[0]
+    return patch, simulate_patch.values(patch)
+
+
+def test_exact_a_soft_holder_is_a_free_piece_and_a_stiff_one_a_clamp():
+    line, tilt = '[contact.load_line]\noffset = "0.5 mm"\n', '[contact.tilt]\nangle = "0.1 mrad"\n'
+    spring = '[contact.holder]\nrotational_stiffness = "{} N m/rad"\n'
+    free, clamped = solved(tables=line)[1], solved(tables=tilt)[1]
+    soft, stiff = solved(tables=line + spring.format("1e-6"))[1], solved(tables=tilt + spring.format("1e13"))[1]
+    for name in ("contact_fraction", "rotation", "moment", "approach", "pressure_peak"):
+        assert soft[name] == pytest.approx(free[name], rel=1e-8)
+        assert stiff[name] == pytest.approx(clamped[name], rel=1e-6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0, 8), st.floats(-2e-4, 2e-4), st.floats(-5e-3, 5e-3))
+def test_always_the_holder_carries_what_the_pressure_does_not(power, angle, offset):
+    """Moment about the middle: sum f x = N offset + K (rotation - angle)."""
+    stiffness = 10.0**power
+    patch, found = solved(tables=f'[contact.tilt]\nangle = "{angle} rad"\n[contact.load_line]\noffset = "{offset} m"\n'
+                                 f'[contact.holder]\nrotational_stiffness = "{stiffness} N m/rad"\n')
+    wanted = found["normal_load"] * offset + stiffness * (found["rotation"] - angle)
+    assert found["moment"] == pytest.approx(wanted, abs=1e-9 * (found["normal_load"] * 6e-3 + stiffness * 3e-4))
+    assert max(patch.pressure.residuals.values()) < 1e-9
+
+
+def test_always_a_stiffer_holder_keeps_more_of_the_tilt():
+    tilt = '[contact.tilt]\nangle = "0.1 mrad"\n[contact.holder]\nrotational_stiffness = "{} N m/rad"\n'
+    found = [solved(tables=tilt.format(k))[1] for k in (1, 1e3, 1e4, 1e5, 1e6)]
+    assert np.all(np.diff([f["rotation"] for f in found]) > 0)
+    assert np.all(np.diff([f["contact_fraction"] for f in found]) <= 0)
+    assert found[0]["contact_fraction"] == 1 and found[-1]["contact_fraction"] < 0.25
+
+
+@pytest.mark.parametrize("shape", ["", '[contact.crown]\nradius = "5 m"\n', '[contact.tilt]\nangle = "4 urad"\n'])
+def test_exact_approach_gives_back_the_load_that_made_it(shape):
+    by_load = solved(tables=shape)[1]
+    by_approach = solved("", shape + f'[contact.approach]\ndistance = "{by_load["approach"]!r} m"\n')[1]
+    for name, value in by_load.items():
+        assert by_approach[name] == pytest.approx(value, rel=1e-8, abs=1e-12 * abs(by_load["normal_load"]))
+
+
+def test_exact_no_contact_before_the_first_touch():
+    patch, found = solved("", '[contact.crown]\nradius = "5 m"\n[contact.approach]\ndistance = "0 m"\n')
+    assert patch.pressure.outcome == "no_contact" and found["normal_load"] == 0
+
+
+UNLIKE = '[contact.{}]\nheight = "9 mm"\nsubstrate = "steel"\ncoating = "none"\n'
+
+
+def test_exact_unlike_pieces_add_their_compliances_and_may_be_swapped():
+    tilt = '[contact.tilt]\nangle = "0.1 mrad"\n'
+    (a, one), (_, two) = solved(tables=tilt + UNLIKE.format("upper")), solved(tables=tilt + UNLIKE.format("lower"))
+    for name, value in one.items():
+        assert two[name] == pytest.approx(value, rel=1e-9, abs=1e-15)
+    assert a.upper_grid.height == 9e-3 and a.grid.height == 6.35e-3 and a.upper_grid.coating_rows == 0
+    like = solved(tables=tilt)[0]
+    other = solved(tables=tilt + UNLIKE.format("upper") + UNLIKE.format("lower"))[0]
+    assert a.pieces.normal == pytest.approx((like.pieces.normal + other.pieces.normal) / 2, rel=1e-9)
+
+
+def test_exact_naming_what_a_piece_is_anyway_changes_nothing():
+    patch, found = solved(tables='[contact.upper]\nheight = "6.35 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n')
+    assert patch.upper is patch.piece and found == solved()[1]
+
+
+def test_exact_a_step_lifts_one_side():
+    patch, found = solved(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
+    x = patch.grid.x
+    assert patch.gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
+    assert patch.pressure.sigma_n[x > 2e-3].max() == 0 and found["pressure_centre"] < 0
+    assert step(np.array([-1.0, 0.0, 1.0]), 2.0, 0.0).tolist() == [0.0, 1.0, 2.0]
+
+
+def test_refuses_an_approach_beside_a_line_or_a_spring():
+    for tables in ('[contact.load_line]\noffset = "1 mm"\n', '[contact.holder]\nrotational_stiffness = "1 N m/rad"\n'):
+        with pytest.raises(scene.SceneError, match=r"beside .contact.approach.*not yet built"):
+            scene.loads(TEXT.format("", tables + '[contact.approach]\ndistance = "1 um"\n'))
