@@ -87,9 +87,10 @@ def _print_plan(answer: dict, probe: bool) -> None:
 def run(scene: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None, set_: Sets = (),
         json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
         resume: Annotated[bool, Parameter(negative=())] = False,
+        fresh: Annotated[bool, Parameter(negative=())] = False,
         quiet: Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())] = False,
         verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
-    """Run SCENE and write its results folder, by default out/<scene name>."""
+    """Run SCENE and write its results folder, by default out/<scene name>; --fresh ignores kept operators."""
     if resume:
         raise Refused("run: --resume is not yet built; run the scene again")
     found = _scene(scene, set_)
@@ -102,7 +103,7 @@ def run(scene: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--
         talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
     target = out if out is not None else Path("out") / found.path.stem
     with _progress(quiet or json_) as progress:
-        answer = run_into(what, target, talk, progress)
+        answer = run_into(what, target, talk, progress, fresh)
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:

@@ -29,11 +29,12 @@ class Result:
     extra: dict
 
 
-def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: bool = True) -> Result:
+def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: bool = True,
+        fresh: bool = False) -> Result:
     """Run a plan. say: called with one line when the hub compiles; progress: with the done share of the main pass.
 
     per_point forces the path of every interface point where one lumped point would do; estimate=False skips the
-    re-runs and leaves errors None. NotConverged and Missing as named by the stages.
+    re-runs and leaves errors None; fresh condenses the pieces anew. NotConverged and Missing as named by the stages.
     """
     begin, scene = perf_counter(), what.scene
     seconds, warnings = {}, list(scene.remarks)
@@ -41,7 +42,7 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
     if scene.contact is not None:
         from .simulate_patch import solve_all
 
-        patch, *coarse = solve_all(scene, estimate)
+        patch, *coarse = solve_all(scene, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         warnings += _strained(scene, patch)
         if patch.upper is not patch.piece:

@@ -53,11 +53,11 @@ def effects_of(result: Result) -> list:
     return out
 
 
-def run_into(what, target: Path, say=None, progress=None) -> dict:
+def run_into(what, target: Path, say=None, progress=None, fresh: bool = False) -> dict:
     """Claim the results folder `target`, run the plan, fill the folder; the summary. An older folder of results is
     replaced only when the new one is whole, and a folder with other files is refused before anything runs."""
     with Folder(target) as folder:
-        result = run(what, say, progress)
+        result = run(what, say, progress, fresh=fresh)
         return write(result, folder.path)
 
 

@@ -5,6 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
+from .contact import cache
 from .contact.elasticity import Layers, Piece, assemble, interface_compliance
 from .contact.gaps import crown, step, tilt
 from .contact.slip import normal_stiffness, tangential_stiffness
@@ -13,6 +14,7 @@ from .core import Compliance, Interface, Measure, Outcome, PatchfemError, Pressu
 from .mesh.tensor import TensorGrid, coarser, graded_grid
 
 AUTOMATIC_CELLS = 200
+LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,7 +84,19 @@ SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: 
           "step": lambda x, part: step(x, part.height, part.at)}
 
 
-def solve(scene, grid: TensorGrid, upper_grid: TensorGrid | None = None) -> Patch:
+def compliance_of(piece: Piece, coating_rows: int, fresh: bool) -> tuple:
+    """(nn, tt, nt) of one piece, from the cache of operators unless `fresh`; small ones are not worth a file."""
+    small = piece.x.size < LEAST_CACHED
+    key = "" if small else cache.key_of(piece.x, piece.depth, coating_rows, piece.layers)
+    found = None if small or fresh else cache.fetch(key, piece.x.size)
+    if found is None:
+        found = interface_compliance(piece)
+        if not small:
+            cache.keep(key, found)
+    return found
+
+
+def solve(scene, grid: TensorGrid, upper_grid: TensorGrid | None = None, fresh: bool = False) -> Patch:
     """Assemble, condense and press the pieces of a scene on `grid` (and `upper_grid` where the upper piece differs)."""
     contact, seconds = scene.contact, {}
     width = contact.width * contact.pairs
@@ -92,8 +106,8 @@ def solve(scene, grid: TensorGrid, upper_grid: TensorGrid | None = None) -> Patc
     upper = piece if upper_grid is None else assemble(upper_grid.x, upper_grid.depth, upper_grid.coating_rows,
                                                       layers_of(contact, "upper"))
     seconds["assemble"] = perf_counter() - start
-    low = interface_compliance(piece)
-    high = low if upper is piece else interface_compliance(upper)
+    low = compliance_of(piece, grid.coating_rows, fresh)
+    high = low if upper is piece else compliance_of(upper, upper_grid.coating_rows, fresh)
     # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
     pieces = Compliance(interface, frozen_array((low[0] + high[0]) / width), frozen_array((low[1] + high[1]) / width))
     seconds["condense"] = perf_counter() - start - seconds["assemble"]
@@ -229,14 +243,15 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
     return out
 
 
-def solve_all(scene, estimate: bool = True) -> tuple:
-    """(Patch on the asked mesh, on a mesh twice and four times as coarse); None where none is wanted or possible."""
+def solve_all(scene, estimate: bool = True, fresh: bool = False) -> tuple:
+    """(Patch on the asked mesh, on a mesh twice and four times as coarse); None where none is wanted or possible.
+    fresh: condense anew, whatever is kept on disk."""
     grid = grid_of(scene)
     other = grid_of(scene, "upper") if unlike(scene.contact) else None
-    out = [solve(scene, grid, other), None, None]
+    out = [solve(scene, grid, other, fresh), None, None]
     for k in (1, 2):
         if estimate and grid.x.size > 8:
             grid = coarser(grid)
             other = coarser(other) if other is not None else None
-            out[k] = solve(scene, grid, other)
+            out[k] = solve(scene, grid, other, fresh)
     return tuple(out)
