@@ -62,3 +62,11 @@ def test_always_the_printed_law_holds_the_block_tighter():
     name = "relative_displacement_amplitude"
     assert found["report"][name][0] == pytest.approx(11.69e-6, abs=found["report"][name][1])
     assert found["stretch"][name][0] == pytest.approx(14.69e-6, abs=found["stretch"][name][1])
+
+
+def test_always_the_fixture_decides_the_contact_fraction():
+    fixtures = study("misalignment/fixtures.py")
+    for spring, half in ((None, 2.95e-5), (1e4, 7.55e-5), (1e3, 4.89e-4)):
+        assert fixtures.tilt_for(0.5, spring, 14) == pytest.approx(half, rel=0.03)
+    assert fixtures.case(1e-3, 1e2)["contact_fraction"] == 1
+    assert fixtures.case(1e-3, None)["contact_fraction"] < 0.03
