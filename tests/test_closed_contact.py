@@ -19,7 +19,7 @@ TITANIUM, CARBIDE, THICKNESS = (121e9, 0.32), (250e9, 0.24), 152.4e-6
 def _over(lo, hi, integrand, kinks=()):
     """Integral over lo..hi of a function that may be infinite like 1/sqrt at its ends; `kinks` inside split it."""
     middle, half = (lo + hi) / 2, (hi - lo) / 2
-    size = abs(integrand(middle)) * half
+    size = abs(integrand(middle + 0.3 * half)) * half
     points = sorted({-np.pi / 2, np.pi / 2, *(np.arcsin((k - middle) / half) for k in kinks if lo < k < hi)})
     return sum(quad(lambda t: integrand(middle + half * np.sin(t)) * half * np.cos(t), a, b, limit=400,
                     epsabs=1e-13 * size, epsrel=1e-10)[0] for a, b in pairwise(points))
@@ -294,11 +294,11 @@ def test_exact_kern_and_wedge_agree_on_the_load_line():
     assert exact.kern_fraction(PAD["length"] / 6, PAD["length"]) == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1.2e-5, 1.26e-5, 1e-4, -1e-3, 3e-3, 1.0])
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1.2e-5, 1.26e-5, 1e-4, -1e-3, 3e-3, 3e-2])
 def test_exact_skin_by_quadrature(tilt):
     length = PAD["length"]
     edge = -np.sign(tilt) * length / 2
-    points = edge - np.sign(edge or 1) * np.geomspace(1e-9, 1, 40) * length
+    points = edge - np.sign(edge or 1) * np.geomspace(1e-5, 1, 40) * length
 
     def total(weight):
         return _over(-length / 2, length / 2, lambda x: np.exp(-tilt * (x - edge) / DECAY) * weight(x), points)

@@ -140,6 +140,8 @@ def _unv_elements(lines) -> dict:
         if words[1] in UNV_BEAMS:
             next(lines)
         out[words[0]] = [int(word) for word in next(lines).split()]
+        if len(out[words[0]]) != size:
+            raise PatchfemError(f"element {words[0]} has {len(out[words[0]])} nodes, its kind {size}")
     return out
 
 
@@ -162,8 +164,9 @@ def _gather(sets: dict, name: str | None, members: list) -> None:
 def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, how: str) -> Tagged:
     """Numbers of the file turned into places; -1 for a number that the file does not define."""
     place = {number: k for k, number in enumerate(nodes)}
-    if len({len(where) for where in nodes.values()}) > 1:
-        raise PatchfemError("nodes with unlike numbers of coordinates")
+    sizes = {len(where) for where in nodes.values()}
+    if sizes - {2} and sizes - {3}:
+        raise PatchfemError("nodes need two or three coordinates, all of them alike")
     name = {}
     for tag in CELLS:
         for number in element_sets.get(tag, ()):
@@ -182,6 +185,6 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
                 raise PatchfemError(f"{tag} holds element {number}, which is no line element")
             numbers += corners
         edges[tag] = np.array([place.get(n, -1) for n in numbers], np.int64)
-    points = np.array(list(nodes.values()), float).reshape(len(nodes), -1)
+    points = np.array(list(nodes.values()), float) if nodes else np.empty((0, 2))
     return Tagged(points, np.array(cells[3], np.int64).reshape(-1, 3), np.array(cells[4], np.int64).reshape(-1, 4),
-                  np.array(names[3] + names[4] or [""]), edges, how)
+                  np.array(names[3] + names[4], str), edges, how)

@@ -1,0 +1,229 @@
+"""The periodic half-plane solver against Westergaard, Hertz, a dense solve, and the finite-element pair against it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, pair_of
+
+from patchfem import closed_forms as exact
+from patchfem.contact.gaps import crown
+from patchfem.contact.halfspace import press_periodic, residuals, wave_numbers
+from patchfem.contact.unilateral import press, solve_forces
+from patchfem.core import NotConverged, PatchfemError
+from patchfem.mesh.tensor import TensorGrid, graded_rows
+
+WAVE, HIGH = 80e-6, 1.5e-6
+MODULUS = exact.combined_modulus(*CARBIDE)
+FULL = exact.westergaard_full_pressure(WAVE, HIGH, MODULUS)
+
+
+def half_planes(points, length, modulus=MODULUS):
+    """C(k) of two bodies of one material each, nothing for k = 0."""
+    k = wave_numbers(points, length)
+    return np.concatenate([[0.0], 2 / (modulus * k[1:])])
+
+
+def coated(points, length):
+    """C(k) of the coated pair, half planes below the coatings."""
+    k = wave_numbers(points, length)
+    return np.concatenate([[0.0], 2 * exact.layered_compliance(k[1:], CARBIDE, TITANIUM, COATING)])
+
+
+def places(points, length):
+    return (np.arange(points) - points // 2) * length / points
+
+
+@cache
+def waves(points, share):
+    x = places(points, WAVE)
+    gap = 2 * HIGH * np.sin(np.pi * x / WAVE)**2
+    return x, press_periodic(half_planes(points, WAVE), gap, WAVE, share * FULL * WAVE)
+
+
+# ---- the wavy surface
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9, 0.99])
+def test_exact_westergaard_at_64_points_per_half_wave(share):
+    """p(0) to 1e-4, edge to a cell, mean gap closed to 1e-4 at 64 points; pressure everywhere to 1e-2 at 1024."""
+    args = share * FULL, WAVE, HIGH, MODULUS
+    x, state = waves(128, share)
+    assert state.pressure[64] == pytest.approx(exact.westergaard_pressure(0.0, *args), rel=1e-4)
+    assert np.abs(x[state.pressure > 0]).max() == pytest.approx(exact.westergaard_half_width(*args), abs=WAVE / 128)
+    assert state.closing == pytest.approx(exact.westergaard_approach(*args), rel=1e-4)
+    x, state = waves(2048, share)
+    p = exact.westergaard_pressure(x, *args)
+    assert np.abs(state.pressure - p)[np.abs(p) > 0.2 * p.max()].max() <= 1e-3 * p.max()
+    assert state.closing == pytest.approx(exact.westergaard_approach(*args), rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [1e-4, 0.01, 0.05])
+def test_exact_westergaard_at_light_loads(share):
+    """Few points touch: 4096 per wave bring 26 ... 588 of them into contact."""
+    args = share * FULL, WAVE, HIGH, MODULUS
+    x, state = waves(4096, share)
+    assert state.pressure.max() == pytest.approx(exact.westergaard_pressure(0.0, *args), rel=5e-4)
+    assert np.abs(x[state.pressure > 0]).max() == pytest.approx(exact.westergaard_half_width(*args), abs=WAVE / 4096)
+    assert state.closing == pytest.approx(exact.westergaard_approach(*args), rel=2e-4)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.001, 1.2, 3.0])
+def test_exact_full_contact_is_one_wave(share):
+    x, state = waves(64, share)
+    p = exact.westergaard_pressure(x, share * FULL, WAVE, HIGH, MODULUS)
+    assert np.abs(state.pressure - p).max() <= 1e-11 * p.max() and state.gap.max() <= 1e-11 * HIGH
+    assert state.closing == pytest.approx(HIGH, rel=1e-12) and state.iterations <= 3
+
+
+def test_order_mean_gap_closed_is_two():
+    """At half the closing load the edge stays midway between points of every grid; p(0) is better than that."""
+    counts = np.array([64, 128, 256, 512, 1024])
+    closing = exact.westergaard_approach(FULL / 2, WAVE, HIGH, MODULUS)
+    top = exact.westergaard_pressure(0.0, FULL / 2, WAVE, HIGH, MODULUS)
+    errors = np.array([abs(waves(int(n), 0.5)[1].closing / closing - 1) for n in counts])
+    tops = np.array([abs(waves(int(n), 0.5)[1].pressure.max() / top - 1) for n in counts])
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    assert errors[-1] <= 2e-7 and -np.polyfit(np.log(counts), np.log(tops), 1)[0] >= 2.0
+
+
+# ---- crowns
+
+@pytest.mark.parametrize("period", [8, 16, 64])
+def test_exact_hertz_on_a_wide_period(period):
+    """The images of a period L raise the peak by (pi a/L)^2/12; the rest is Hertz."""
+    half, load = 0.1e-3, 9107.0
+    radius = np.pi * MODULUS * half**2 / (4 * load)
+    length, points = period * half, 256 * period
+    x = places(points, length)
+    state = press_periodic(half_planes(points, length), crown(x, radius), length, load)
+    hertz = exact.hertz_pressure(x, load, radius, MODULUS)
+    images = (np.pi / period)**2 / 12
+    assert state.pressure.max() / hertz.max() - 1 == pytest.approx(images, rel=0.02, abs=2e-6)
+    inside = np.abs(x) < 0.9 * half
+    assert np.abs(state.pressure - hertz)[inside].max() <= (2 * images + 1e-3) * hertz.max()
+    outside = np.abs(x) > (1 + 2 / 128) * half
+    assert np.all(state.pressure[outside] == 0) and np.all(state.gap[outside] > 0)
+
+
+def crowned(half, fine, growth):
+    """Coated piece with columns of `fine` over |x| <= half, growing outwards; at least 8 rows in the coating."""
+    outer = half + np.cumsum(graded_rows(fine * growth, LENGTH / 2 - half, growth))
+    right = np.concatenate([np.arange(1, round(half / fine) + 1) * fine, outer])
+    rows = graded_rows(min(fine, COATING / 8), COATING, growth, 8)
+    under = graded_rows(rows[-1] * growth, HEIGHT - COATING, growth)
+    depth = np.concatenate([[0.0], np.cumsum(rows)[:-1], [COATING], COATING + np.cumsum(under)[:-1], [HEIGHT]])
+    return TensorGrid(np.concatenate([-right[::-1], [0.0], right]), depth, rows.size)
+
+
+@pytest.mark.parametrize("radius, load, low, high, within", [
+    (0.01, 1e4, 0.98, 0.995, 1e-3),  # contact of a fifth of the coating: nearly all carbide
+    (0.01, 2e5, 0.83, 0.87, 2e-3),  # as wide as the coating is thick
+    (0.1, 1e5, 0.73, 0.76, 2e-3)])  # three times as wide
+def test_exact_coated_finite_elements_agree_with_coated_half_planes(radius, load, low, high, within):
+    """The finite block and the transform share no line of code; `low` to `high`: peak over Hertz on carbide alone."""
+    wide = exact.hertz_half_width(load, radius, exact.combined_modulus(*TITANIUM))
+    fine = exact.hertz_half_width(load, radius, MODULUS) / 16
+    points = 8 * round(LENGTH / fine / 2)
+    x = places(points, points * fine / 4)
+    truth = press_periodic(coated(points, points * fine / 4), crown(x, radius), points * fine / 4, load)
+    peak = truth.pressure.max()
+    assert low <= peak / exact.hertz_peak(load, radius, MODULUS) <= high
+    grid = crowned(16 * fine * np.ceil(1.5 * wide / fine / 16), fine, 1.1)
+    state = press(pair_of(grid, COATED, 1.0), crown(grid.x, radius), load)
+    half = np.abs(x[truth.pressure > 0]).max()
+    same = np.interp(grid.x, x, truth.pressure)
+    inside = np.abs(grid.x) < 0.9 * half
+    assert state.sigma_n.max() == pytest.approx(peak, rel=within)
+    assert np.abs(state.sigma_n - same)[inside].max() <= 4e-3 * peak
+    assert np.abs(grid.x[state.sigma_n > 0]).max() == pytest.approx(half, abs=1.01 * fine)
+    near = (np.abs(grid.x) > 1.1 * half) & (np.abs(grid.x) < 1.4 * half)
+    opened = np.interp(grid.x[near], x, truth.gap)
+    assert np.abs(state.gap[near] - opened).max() <= 1e-2 * opened.max()
+
+
+# ---- any gap
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(4, 120), st.integers(0, 2**32 - 1), st.floats(-3, 6), st.floats(-9, -5), st.booleans())
+def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, smooth):
+    """The same circulant operator as a full matrix, solved by the primal-dual active set."""
+    rng = np.random.default_rng(seed)
+    gap = 10**height * rng.normal(size=points)
+    gap = np.cumsum(gap) if smooth else gap
+    length, load = 1e-3, 10**load
+    compliance = coated(points, length)
+    compliance[0] = compliance[1]
+    state = press_periodic(compliance, gap, length, load)
+    column = np.fft.irfft(compliance, points) * points / length
+    dense = column[(np.arange(points)[:, None] - np.arange(points)) % points]
+    force, motion, _ = solve_forces(dense, places(points, length), gap, np.array([load]))
+    step = length / points
+    assert np.abs(state.pressure * step - force).max() <= 1e-6 * force.max()
+    assert state.closing == pytest.approx(motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(4, 400), st.integers(0, 2**32 - 1), st.floats(-3, 6), st.floats(-9, -5))
+def test_always_the_conditions_of_contact_hold(points, seed, load, height):
+    """Never pulls, never overlaps, carries the load; twice load and gap give twice the pressure; shifts shift."""
+    gap = 10**height * np.random.default_rng(seed).normal(size=points)
+    compliance, load = coated(points, 1e-3), 10**load
+    state = press_periodic(compliance, gap, 1e-3, load)
+    assert state.pressure.min() >= 0 and state.gap.min() >= 0 and np.all(state.pressure * state.gap == 0)
+    assert state.pressure.mean() * 1e-3 == pytest.approx(load, rel=1e-12)
+    assert max(state.residuals.values()) <= 1e-9
+    assert state.closing == pytest.approx(gap.mean() - state.gap.mean(), abs=1e-8 * np.ptp(gap))
+    twice = press_periodic(compliance, 2 * gap, 1e-3, 2 * load)
+    assert np.allclose(twice.pressure, 2 * state.pressure, rtol=0, atol=1e-6 * state.pressure.max())
+    moved = press_periodic(compliance, np.roll(gap, 3), 1e-3, load)
+    assert np.allclose(moved.pressure, np.roll(state.pressure, 3), rtol=0, atol=1e-6 * state.pressure.max())
+
+
+def test_exact_compliance_of_k_0_only_adds_to_the_closing():
+    x = places(64, WAVE)
+    gap = HIGH * (1 - np.cos(2 * np.pi * x / WAVE))
+    compliance = half_planes(64, WAVE)
+    without = press_periodic(compliance, gap, WAVE, 0.3 * FULL * WAVE)
+    block = compliance.copy()
+    block[0] = 1e-14
+    with_block = press_periodic(block, gap, WAVE, 0.3 * FULL * WAVE)
+    assert np.array_equal(without.pressure, with_block.pressure)
+    assert with_block.closing - without.closing == pytest.approx(1e-14 * 0.3 * FULL, rel=1e-9)
+    assert max(residuals(block, gap, with_block.pressure, with_block.closing, 0.3 * FULL).values()) <= 1e-9
+
+
+def test_exact_flat_faces_share_the_load_evenly():
+    state = press_periodic(coated(32, 1e-3), np.full(32, 4e-6), 1e-3, 700.0)
+    assert np.allclose(state.pressure, 7e5, rtol=1e-14) and state.closing == pytest.approx(4e-6, rel=1e-14)
+
+
+# ---- wrong answers are seen, wrong questions refused
+
+def test_refuses_an_answer_that_is_not_one():
+    x, state = waves(128, 0.5)
+    gap, compliance = 2 * HIGH * np.sin(np.pi * x / WAVE)**2, half_planes(128, WAVE)
+    args = compliance, gap, state.pressure, state.closing, FULL / 2
+    assert max(residuals(*args).values()) <= 1e-9
+    for place, wrong in ((2, state.pressure * 1.001), (2, state.pressure - 1e-3 * FULL), (3, state.closing * 1.001)):
+        assert max(residuals(*args[:place], wrong, *args[place + 1:]).values()) > 1e-5
+
+
+def test_refuses_too_few_iterations():
+    x = places(256, WAVE)
+    with pytest.raises(NotConverged, match="after 5 iterations"):
+        press_periodic(half_planes(256, WAVE), HIGH * np.sin(np.pi * x / WAVE)**2, WAVE, 0.1 * FULL * WAVE, limit=5)
+
+
+@pytest.mark.parametrize("change, word", [
+    ({"gap": np.zeros(10)}, "6 waves"), ({"gap": np.full(8, np.nan)}, "finite heights"), ({"gap": np.zeros(3)}, "4"),
+    ({"load": 0.0}, "positive"), ({"load": np.nan}, "positive"), ({"length": -1.0}, "positive"),
+    ({"compliance_k": np.array([np.inf, 1, 1, 1, 1])}, "give 0"), ({"compliance_k": np.zeros(5)}, "every wave"),
+    ({"compliance_k": np.ones(4)}, "the compliance has 4")])
+def test_refuses_a_question_without_meaning(change, word):
+    good = {"compliance_k": np.ones(5), "gap": np.zeros(8), "length": 1.0, "load": 1.0}
+    with pytest.raises(PatchfemError, match=word):
+        press_periodic(**good | change)

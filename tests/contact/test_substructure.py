@@ -1,0 +1,232 @@
+"""A piece of any mesh condensed by its factors: the sweep and the dense inverse, Hertz, layers, fields in balance."""
+
+from __future__ import annotations
+
+import time
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, bare
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import Delaunay
+from test_elasticity import layered_harmonic
+
+from patchfem.contact import elasticity
+from patchfem.contact.elasticity import Layers, lame
+from patchfem.contact.gaps import crown
+from patchfem.contact.substructure import assemble, cell_stress, condense, displacement, joined
+from patchfem.contact.unilateral import press
+from patchfem.core import Compliance, Interface
+from patchfem.mesh.anymesh import PieceMesh, halved
+from patchfem.mesh.tensor import graded_grid
+
+materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
+planes = st.sampled_from(["strain", "stress"])
+NO_TRIANGLES, NO_QUADS = np.empty((0, 3), np.int64), np.empty((0, 4), np.int64)
+
+
+def of_grid(grid, split=0.0, seed=None):
+    """The tensor grid as an unstructured piece, a share of its quads cut in two; nodes renumbered by `seed`."""
+    nx, ny = grid.x.size, grid.depth.size
+    points = np.stack([np.repeat(grid.x, ny), np.tile(grid.depth, nx)], axis=1)
+    node = np.arange(nx * ny)
+    if seed is not None:
+        node = np.random.default_rng(seed).permutation(nx * ny)
+    place = np.empty_like(points)
+    place[node] = points
+    node = node.reshape(nx, ny)
+    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
+    coat = grid.cell_is_coating().ravel()
+    cut = np.random.default_rng(1).random(len(quads)) < split
+    triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return PieceMesh(place, triangles, quads[~cut], np.concatenate([np.repeat(coat[cut], 2), coat[~cut]]),
+                     node[:, 0], node[:, -1])
+
+
+def cloud(half_length, height, size, coating=0.0):
+    """Triangles of Delaunay on rows of points whose spacing is size(x, depth); rows on the coating's lower face."""
+    levels, depth = [0.0], 0.0
+    while depth < height:
+        step = size(0.0, depth)
+        below = coating if depth < coating * (1 - 1e-9) else height
+        rest = max(1, round((below - depth) / step))
+        depth = below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
+        levels.append(depth)
+    rows, fine = [], np.linspace(-half_length, half_length, 20001)
+    for k, y in enumerate(levels):
+        number = np.concatenate([[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))])
+        count = max(4, round(number[-1] / 2) * 2)
+        want = np.linspace(0, number[-1], count + 1)
+        if k % 2:
+            want = np.concatenate([[0.0], (want[1:] + want[:-1]) / 2, want[-1:]])
+        x = np.interp(want, number, fine)
+        rows.append(np.stack([(x - x[::-1]) / 2, np.full(x.size, y)], axis=1))
+    points = np.concatenate(rows)
+    cells = Delaunay(points).simplices
+    a, b, c = points[cells].transpose(1, 0, 2)
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)[np.abs(area) > 1e-9 * np.abs(area).max() * 1e-6]
+    middle = points[cells][:, :, 1].mean(axis=1)
+    order = np.argsort(rows[0][:, 0])
+    return PieceMesh(points, cells, NO_QUADS, middle < coating, order, np.flatnonzero(points[:, 1] == height))
+
+
+@pytest.mark.parametrize("cells, plane", [(3, "strain"), (40, "strain"), (40, "stress"), (200, "strain")])
+def test_exact_a_tensor_grid_read_as_any_mesh_is_the_sweep(cells, plane):
+    grid = graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING)
+    layers = Layers(CARBIDE, TITANIUM, plane)
+    wanted = elasticity.interface_compliance(elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers))
+    found = condense(assemble(of_grid(grid, seed=cells), layers))
+    for mine, theirs in zip(found, wanted):
+        assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
+        assert not mine.flags.writeable
+
+
+@pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
+def test_exact_compliance_is_the_interface_block_of_the_dense_inverse(split):
+    mesh = of_grid(graded_grid(4e-3, 2e-3, 2e-4, COATING), split, seed=7)
+    piece = assemble(mesh, COATED)
+    m = 2 * mesh.interface.size
+    wanted = np.linalg.inv(piece.matrix.toarray())[-m:, -m:]
+    nn, tt, nt = condense(piece)
+    for mine, theirs in ((nn, wanted[1::2, 1::2]), (tt, wanted[::2, ::2]), (nt, wanted[1::2, ::2])):
+        assert np.abs(mine - theirs).max() <= 1e-10 * np.abs(wanted).max()
+    assert np.array_equal(nn, nn.T) and np.array_equal(tt, tt.T)
+    assert np.linalg.eigvalsh(np.block([[nn, nt], [nt.T, tt]])).min() > 0
+
+
+@settings(max_examples=15, deadline=None)
+@given(coating=materials, substrate=materials, plane=planes, split=st.sampled_from([0.0, 0.4, 1.0]))
+def test_always_numbering_does_not_matter_and_triangles_are_stiffer_than_halved_ones(coating, substrate, plane, split):
+    grid = graded_grid(4e-3, 2e-3, 1e-3, COATING)
+    layers = Layers(coating, substrate, plane)
+    base = condense(assemble(of_grid(grid, split), layers))
+    for mine, theirs in zip(condense(assemble(of_grid(grid, split, seed=3), layers)), base):
+        assert np.abs(mine - theirs).max() <= 1e-9 * base[0].max()
+    fine = condense(assemble(halved(of_grid(grid, split)), layers))
+    kept = [part[::2, ::2] for part in fine]
+    more = np.block([[kept[0] - base[0], kept[2] - base[2]], [(kept[2] - base[2]).T, kept[1] - base[1]]])
+    assert np.linalg.eigvalsh(more).min() >= -1e-9 * base[0].max()  # nested spaces: refining only softens
+
+
+@given(material=materials, plane=planes, slopes=st.lists(st.floats(-1, 1), min_size=4, max_size=4))
+@settings(max_examples=40, deadline=None)
+def test_exact_stress_of_a_linear_field_on_crooked_cells_obeys_hooke(material, plane, slopes):
+    mesh = of_grid(graded_grid(4e-3, 2e-3, 5e-4, COATING), 0.5)
+    rng = np.random.default_rng(2)
+    inner = (np.abs(mesh.points[:, 0]) < 1.99e-3) & (mesh.points[:, 1] > 0) & (mesh.points[:, 1] < 1.99e-3)
+    mesh.points[inner] += rng.uniform(-4e-6, 4e-6, (inner.sum(), 2))
+    piece = assemble(mesh, bare(material, plane))
+    slope = np.reshape(slopes, (2, 2)) * 1e-3
+    stress, mises = cell_stress(piece, (mesh.points @ slope.T)[None])
+    lam, mu = lame(*material, plane)
+    (ux, uy), (vx, vy) = slope
+    szz = material[1] * (2 * lam + 2 * mu) * (ux + vy) if plane == "strain" else 0.0
+    wanted = [lam * (ux + vy) + 2 * mu * ux, lam * (ux + vy) + 2 * mu * vy, szz, mu * (uy + vx)]
+    scale = 1e-10 * (lam + mu) * 1e-3
+    assert stress.shape == (1, mesh.is_coating.size, 4) and np.abs(stress - wanted).max() <= scale
+    full = np.array([[wanted[0], wanted[3], 0], [wanted[3], wanted[1], 0], [0, 0, wanted[2]]])
+    deviator = full - np.trace(full) / 3 * np.eye(3)
+    assert np.abs(mises - np.sqrt(1.5 * (deviator**2).sum())).max() <= scale
+
+
+@pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
+def test_exact_fields_are_those_of_the_compliance_and_of_the_tensor_grid(split):
+    grid = graded_grid(4e-3, 2e-3, 2e-4, COATING)
+    mesh = of_grid(grid, split, seed=5)
+    piece = assemble(mesh, COATED)
+    nn, tt, nt = condense(piece)
+    shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
+    u = displacement(piece, shear, normal)
+    assert np.abs(u[:, mesh.interface, 1] - (normal @ nn.T + shear @ nt.T)).max() <= 1e-10 * np.abs(u).max()
+    assert np.abs(u[:, mesh.interface, 0] - (normal @ nt + shear @ tt.T)).max() <= 1e-10 * np.abs(u).max()
+    assert np.all(u[:, mesh.far] == 0)
+    stress, _ = cell_stress(piece, u)
+    volume = mesh.areas()
+    # the virtual work of a uniform sinking and sliding of depth: the mean stress carries the load
+    lift = (grid.height - mesh.points[:, 1]) / grid.height
+    for part, load in ((1, normal), (3, shear)):
+        assert stress[:, :, part] @ volume == pytest.approx(-grid.height * load.sum(axis=1), rel=1e-9)
+    assert lift[mesh.interface] == pytest.approx(1)
+    if split == 0:
+        own = elasticity.assemble(grid.x, grid.depth, grid.coating_rows, COATED)
+        theirs = elasticity.cell_stress(own, elasticity.displacement(own, shear, normal))[1]
+        mine = cell_stress(piece, u)[1]
+        assert np.abs(mine - theirs).max() <= 1e-9 * theirs.max()
+
+
+def test_exact_mirrored_pieces_decouple_and_unlike_ones_add():
+    grid = graded_grid(4e-3, 2e-3, 4e-4, COATING)
+    one, other = (condense(assemble(of_grid(grid, split), COATED)) for split in (0.0, 1.0))
+    nn, tt, nt = joined(one, one)
+    assert np.array_equal(nn, 2 * one[0]) and np.array_equal(tt, 2 * one[1]) and np.all(nt == 0)
+    nn, tt, nt = joined(one, other)
+    assert np.array_equal(nn, one[0] + other[0]) and np.array_equal(nt, one[2] - other[2])
+
+
+@cache
+def hertz(per_half_width):
+    """A crowned block of triangles on its mirror image; a = 0.1 mm at 9107 N/m."""
+    a, load = 0.1e-3, 9107.0
+    fine = a / per_half_width
+    mesh = cloud(6e-3, 6e-3, lambda x, y: fine + 0.1 * np.hypot(np.maximum(np.abs(x) - 1.3 * a, 0),
+                                                                max(y - 4 * fine, 0)))
+    nn, tt, _ = condense(assemble(mesh, bare(TITANIUM)))
+    pair = Compliance(Interface(mesh.x, mesh.tributary(), 1.0), 2 * nn, 2 * tt)
+    modulus = TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
+    state = press(pair, crown(mesh.x, np.pi * modulus * a**2 / (4 * load)), load)
+    return mesh, state, a, 2 * load / (np.pi * a)
+
+
+def test_exact_hertz_on_triangles_within_one_percent():
+    mesh, state, a, peak = hertz(24)
+    assert len(mesh.triangles) > 5000
+    inside = np.abs(mesh.x) < 0.8 * a
+    slope, top = np.polyfit(mesh.x[inside] ** 2, state.sigma_n[inside] ** 2, 1)
+    assert state.sigma_n.max() == pytest.approx(peak, rel=1e-2)
+    assert np.sqrt(-top / slope) == pytest.approx(a, rel=1e-2)
+    shape = peak * np.sqrt(1 - (mesh.x[inside] / a) ** 2)
+    assert np.abs(state.sigma_n[inside] - shape).max() <= 1e-2 * peak
+    assert state.sigma_n @ mesh.tributary() == pytest.approx(9107.0, rel=1e-9)
+
+
+def harmonic_error(wave, cells):
+    """One half wave of pressure on the coated piece of triangles, from its energy, against the layered half space."""
+    fine = wave / 2 / cells
+    mesh = cloud(wave / 4, 2 * wave, lambda x, y: 0 * x + min(fine + 0.05 * y, wave / 16), COATING)
+    piece = assemble(mesh, COATED)
+    x, k = mesh.x, 2 * np.pi / wave
+    gauss, weight = np.polynomial.legendre.leggauss(5)
+    force = np.zeros(x.size)
+    for left in range(x.size - 1):
+        h = x[left + 1] - x[left]
+        pressure = -np.sin(k * (x[left] + h * (gauss + 1) / 2)) * weight * h / 2
+        force[left] += pressure @ (1 - gauss) / 2
+        force[left + 1] += pressure @ (1 + gauss) / 2
+    load = np.zeros((piece.order.size, 2))
+    load[-x.size:, 1] = force
+    free = np.ones(load.shape, bool)
+    free[np.abs(mesh.points[piece.order, 0]) > wave / 4 * (1 - 1e-9), 0] = False  # symmetric there
+    free = np.flatnonzero(free.ravel())
+    load = load.ravel()[free]
+    energy = load @ spsolve(piece.matrix[free][:, free], load)
+    return energy / (wave / 4) / layered_harmonic(k, CARBIDE, TITANIUM, COATING) - 1
+
+
+@pytest.mark.parametrize("wave", [0.08e-3, 0.5e-3, 2e-3])
+def test_exact_layers_of_triangles_within_one_percent_and_never_too_soft(wave):
+    assert -1e-2 <= harmonic_error(wave, 96) < 0
+
+
+def test_always_twenty_thousand_unknowns_condense_within_a_second():
+    mesh = of_grid(graded_grid(LENGTH, HEIGHT, LENGTH / 200, COATING, 1.05), 0.5, seed=1)
+    assert 2 * (len(mesh.points) - mesh.far.size) > 18000 and mesh.interface.size == 201
+    seconds = []
+    for _ in range(3):
+        begin = time.perf_counter()
+        condense(assemble(mesh, COATED))
+        seconds.append(time.perf_counter() - begin)
+    assert min(seconds) < 1.0

@@ -1,0 +1,399 @@
+"""Any tagged mesh of two pieces: triangles, quads or both, in four formats, and every unusable one refused by name."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from patchfem.core import PatchfemError
+from patchfem.mesh.anymesh import halved
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_pieces, write_mesh
+from patchfem.mesh.tensor import graded_grid
+
+GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
+KINDS = ("quads", "triangles", "mixed")
+NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
+
+
+def drawn(kind="mixed", grid=GRID):
+    """Points, triangles, quads, edges and their tags of a pair; 'mixed' splits every other quad."""
+    pair = pair_mesh(grid)
+    split = {"quads": np.zeros, "triangles": np.ones}.get(kind, lambda n, t: np.arange(n) % 2 == 0)
+    split = split(len(pair["quads"]), bool)
+    cut = pair["quads"][split]
+    return SimpleNamespace(
+        points=pair["points"].copy(), triangles=np.concatenate([cut[:, [0, 1, 2]], cut[:, [0, 2, 3]]]),
+        quads=pair["quads"][~split], triangle_tags=np.tile(pair["tags"][split], 2), quad_tags=pair["tags"][~split],
+        edges=pair["edges"], edge_tags=pair["edge_tags"])
+
+
+def blocks(m):
+    """(kind, cells, tags) of what a mesh has."""
+    every = [("triangle", m.triangles, m.triangle_tags), ("quad", m.quads, m.quad_tags), ("line", m.edges, m.edge_tags)]
+    return [block for block in every if len(block[1])]
+
+
+def write_msh22(m, path, binary=True):
+    """Gmsh 2.2 through meshio."""
+    mesh = meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)])
+    tags = [np.asarray(t, np.int32) for _, _, t in blocks(m)]
+    mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
+    mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
+    meshio.write(path, mesh, file_format="gmsh22", binary=binary)
+
+
+def write_msh41(m, path):
+    """Gmsh 4.1 in text, one entity per tag, as Gmsh itself writes it."""
+    parts = [(k, c[t == tag], int(tag)) for k, c, t in blocks(m) for tag in np.unique(t)]
+    dims = {"line": 1, "triangle": 2, "quad": 2}
+    curves, areas = (list(dict.fromkeys(p[2] for p in parts if dims[p[0]] == d)) for d in (1, 2))
+    text = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(NAMES))]
+    text += [f'{1 if tag > 10 else 2} {tag} "{name}"' for tag, name in NAMES.items()]
+    text += ["$EndPhysicalNames", "$Entities", f"0 {len(curves)} {len(areas)} 0"]
+    text += [f"{tag} 0 0 0 1 1 0 1 {tag} 0" for tag in curves + areas]
+    count, number, total = len(m.points), 0, sum(len(c) for _, c, _ in parts)
+    text += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 {areas[0]} 0 {count}"]
+    text += [str(k + 1) for k in range(count)] + [f"{x!r} {y!r} 0" for x, y in m.points.tolist()]
+    text += ["$EndNodes", "$Elements", f"{len(parts)} {total} 1 {total}"]
+    for kind, cells, tag in parts:
+        text.append(f"{dims[kind]} {tag} {dict(line=1, triangle=2, quad=3)[kind]} {len(cells)}")
+        for cell in cells + 1:
+            number += 1
+            text.append(" ".join(map(str, [number, *cell])))
+    path.write_text("\n".join([*text, "$EndElements", ""]))
+
+
+def write_vtu(m, path):
+    """VTK with the cell array `tag`."""
+    mesh = meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)])
+    mesh.cell_data = {"tag": [np.asarray(t) for _, _, t in blocks(m)]}
+    meshio.write(path, mesh, file_format="vtu")
+
+
+def write_inp(m, path, lines=True, capitals=True):
+    """A deck; the edges as sets of line elements or as sets of nodes."""
+    text = ["*HEADING", "two pieces", "** a comment", "*NODE, NSET=ALL"]
+    text += [f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())]  # numbers with gaps
+    number = 0
+    for kind, cells, tags in blocks(m):
+        for tag in np.unique(tags):
+            name = NAMES[int(tag)].upper() if capitals else NAMES[int(tag)]
+            if kind == "line" and not lines:
+                nodes = [str(3 * n + 5) for n in np.unique(cells[tags == tag])]
+                text += [f"*NSET, NSET={name}", *(", ".join(nodes[k:k + 8]) + "," for k in range(0, len(nodes), 8))]
+                continue
+            first = number + 1
+            text.append(f"*Element, type={dict(line='T2D2', triangle='CPE3', quad='CPE4R')[kind]}")
+            for cell in cells[tags == tag]:
+                number += 1
+                text.append(", ".join(map(str, [number, *(3 * cell + 5)])))
+            text += [f"*ELSET, ELSET={name}, GENERATE", f"{first}, {number}, 1"]
+    path.write_text("\n".join([*text, "*STEP", "*STATIC", "*END STEP", ""]))
+
+
+def write_unv(m, path, unit=1.0):
+    """A universal file in metres, or in 1/unit of a metre where dataset 164 says so."""
+    text = ["    -1", "   164", f"         1  SI  {2:10d}", f"  {unit:.16E}  1.0  1.0".replace("E", "D"), "  2.73D+2"]
+    text += ["    -1", "    -1", "  2411"]
+    for k, (x, y) in enumerate(m.points.tolist()):
+        text += [f"{k + 1:10d}{1:10d}{1:10d}{11:10d}", f"  {x * unit:.16E}  {y * unit:.16E}  0.0".replace("E", "D")]
+    text += ["    -1", "    -1", "  2412"]
+    number, groups = 0, {}
+    for kind, cells, tags in blocks(m):
+        code = dict(line=11, triangle=41, quad=44)[kind]
+        for cell, tag in zip(cells, tags):
+            number += 1
+            groups.setdefault(NAMES[int(tag)], []).append(number)
+            text.append("".join(f"{v:10d}" for v in (number, code, 2, 1, 7, len(cell))))
+            text += ["         0         1         1"] * (kind == "line")
+            text.append("".join(f"{n + 1:10d}" for n in cell))
+    text += ["    -1"] * 2 + ["  2467"]
+    for k, (name, members) in enumerate(groups.items()):
+        text += ["".join(f"{v:10d}" for v in (k + 1, 0, 0, 0, 0, 0, 0, len(members))), name]
+        text += ["".join(f"{8:10d}{n:10d}{0:10d}{0:10d}" for n in members[j:j + 2]) for j in range(0, len(members), 2)]
+    path.write_text("\n".join([*text, "    -1", ""]))
+
+
+FORMATS = {
+    "gmsh 2.2 binary": (".msh", write_msh22), "gmsh 2.2 text": (".msh", lambda m, p: write_msh22(m, p, False)),
+    "gmsh 4.1": (".msh", write_msh41), "vtu": (".vtu", write_vtu), "inp lines": (".inp", write_inp),
+    "inp nodes": (".inp", lambda m, p: write_inp(m, p, False, False)), "unv": (".unv", write_unv),
+    "unv in mm": (".unv", lambda m, p: write_unv(m, p, 1e3)),
+}
+
+
+def stored(m, folder, form="gmsh 2.2 binary"):
+    """The pair after a trip through a file."""
+    path = folder / f"pair{FORMATS[form][0]}"
+    FORMATS[form][1](m, path)
+    return read_pieces(path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("form", FORMATS)
+def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
+    pair = stored(drawn(kind), tmp_path, form)
+    for piece in (pair.lower, pair.upper):
+        assert np.abs(piece.x - GRID.x).max() <= 1e-12 * GRID.length
+        assert (piece.length, piece.height, piece.coating) == pytest.approx((GRID.length, GRID.height, GRID.coating))
+        assert piece.tributary() == pytest.approx(GRID.tributary(), rel=1e-9)
+        assert np.all(piece.points[piece.interface, 1] == 0) and piece.points[:, 1].min() == 0
+        assert np.abs(piece.points[piece.far, 1] - GRID.height).max() <= 1e-12
+        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(GRID.length * GRID.height, rel=1e-12)
+        assert len(piece.points) == GRID.x.size * GRID.depth.size and not piece.points.flags.writeable
+        split = {"quads": 0, "triangles": 1, "mixed": 0.5}[kind]
+        assert (len(piece.triangles), len(piece.quads)) == pytest.approx(
+            np.array([2 * split, 1 - split]) * GRID.cell_is_coating().size, abs=1)
+
+
+@pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
+def test_exact_a_written_grid_is_read_as_any_mesh(name, tmp_path):
+    write_mesh(GRID, tmp_path / name)
+    pair = read_pieces(tmp_path / name)
+    assert np.array_equal(pair.lower.points, pair.upper.points)
+    assert pair.lower.is_coating.sum() == GRID.cell_is_coating().sum()
+
+
+@settings(max_examples=30, deadline=None)
+@given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0), kind=st.sampled_from(KINDS))
+def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(order, shift, kind, tmp_path_factory):
+    m = drawn(kind)
+    new = list(range(len(m.points)))
+    order.shuffle(new)
+    new = np.array(new)
+    points = np.empty_like(m.points)
+    points[new] = m.points + np.array([shift, 0.0])
+    m.points, m.triangles, m.quads, m.edges = points, new[m.triangles], new[m.quads], new[m.edges][:, ::-1]
+    for cells in (m.triangles, m.quads):
+        for k in range(len(cells)):
+            cells[k] = np.roll(cells[k][::order.choice((-1, 1))], order.randrange(4))
+    pair = stored(m, tmp_path_factory.mktemp("any"))
+    for piece in (pair.lower, pair.upper):
+        assert np.abs(piece.x - GRID.x).max() <= 1e-14
+        assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(GRID.length * GRID.height, rel=1e-9)
+
+
+def test_exact_unlike_pieces_of_matching_interfaces_are_read(tmp_path):
+    m, tall = drawn("quads"), drawn("triangles", graded_grid(2e-3, 3e-3, 2.5e-4))
+    low, high = m.quad_tags > 2, tall.triangle_tags <= 2
+    keep, bring = np.isin(m.edge_tags, (12, 14)), np.isin(tall.edge_tags, (11, 13))
+    count = len(m.points)
+    both = SimpleNamespace(
+        points=np.concatenate([m.points, tall.points]), quads=m.quads[low], quad_tags=m.quad_tags[low],
+        triangles=tall.triangles[high] + count, triangle_tags=tall.triangle_tags[high],
+        edges=np.concatenate([m.edges[keep], tall.edges[bring] + count]),
+        edge_tags=np.concatenate([m.edge_tags[keep], tall.edge_tags[bring]]))
+    pair = stored(both, tmp_path)
+    assert (pair.lower.height, pair.upper.height) == pytest.approx((1e-3, 3e-3))
+    assert pair.lower.coating == pytest.approx(1e-4) and pair.upper.coating == 0
+    assert len(pair.lower.triangles) == len(pair.upper.quads) == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_halved_piece_fills_the_same_place_with_four_times_the_cells(kind, tmp_path):
+    piece = stored(drawn(kind), tmp_path).upper
+    fine = halved(piece)
+    assert fine.is_coating.size == 4 * piece.is_coating.size
+    assert fine.areas().min() > 0
+    assert fine.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)
+    assert np.all(np.diff(fine.x) > 0) and np.array_equal(fine.x[::2], piece.x)
+    assert fine.coating == pytest.approx(piece.coating)
+    assert fine.far.size == 2 * piece.far.size - 1 and np.all(fine.points[fine.far, 1] == piece.height)
+    assert np.unique(fine.points.round(12), axis=0).shape == fine.points.shape
+
+
+def move(m, at, by):
+    m.points[at] += by
+
+
+def interface_node(m, side="upper", k=3):
+    nodes = np.unique(m.edges[m.edge_tags == EDGE_TAGS[f"{side}_interface"]])
+    return nodes[np.argsort(m.points[nodes, 0])][k]
+
+
+def double(m, node, cell):
+    """A second node at the same place, used by one cell only."""
+    m.points = np.append(m.points, m.points[node:node + 1], axis=0)
+    m.quads[cell][m.quads[cell] == node] = len(m.points) - 1
+
+
+def twin(m, node):
+    """The interface edge on one side of a node ends in a second node at the same place, and so do its cells."""
+    m.points = np.append(m.points, m.points[node:node + 1], axis=0)
+    for cells in (m.quads, m.edges):
+        beyond = m.points[cells][:, :, 0].mean(axis=1) > m.points[node, 0]
+        cells[beyond[:, None] & (cells == node)] = len(m.points) - 1
+
+
+def loosen(m):
+    """The upper coating gets nodes of its own, as a drawing whose faces were not glued gives them."""
+    mine, top = m.quad_tags == CELL_TAGS["upper_coating"], m.edge_tags == EDGE_TAGS["upper_interface"]
+    own = np.unique(m.quads[mine])
+    m.quads[mine] = np.searchsorted(own, m.quads[mine]) + len(m.points)
+    m.edges[top] = np.searchsorted(own, m.edges[top]) + len(m.points)
+    m.points = np.concatenate([m.points, m.points[own]])
+
+
+def hang(m):
+    """One quad cut in two by a node in the middle of an edge that its neighbour does not have."""
+    k = int(np.flatnonzero(m.quad_tags == CELL_TAGS["upper_substrate"])[-2])
+    a, b, c, d = m.quads[k]
+    m.points = np.append(m.points, [(m.points[a] + m.points[b]) / 2], axis=0)
+    new = len(m.points) - 1
+    m.triangles = np.array([[a, new, d], [new, b, c], [new, c, d]])
+    m.triangle_tags = np.full(3, m.quad_tags[k])
+    m.quads, m.quad_tags = np.delete(m.quads, k, 0), np.delete(m.quad_tags, k)
+
+
+def drop_edge(m, name, count=0):
+    mine = np.flatnonzero(m.edge_tags == EDGE_TAGS[name])
+    mine = mine[count:mine.size - count]
+    m.edges, m.edge_tags = np.delete(m.edges, mine, 0), np.delete(m.edge_tags, mine)
+
+
+def share(m):
+    half = len(m.points) // 2
+    for cells in (m.quads, m.edges):
+        for k in np.flatnonzero(m.points[:half, 1] == 0):
+            cells[cells == k + half] = k
+
+
+SPOILT = {
+    "off the line": (lambda m: move(m, interface_node(m), (0, 2e-5)), "upper_interface is not the straight line y = 0"),
+    "shifted": (lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)), "do not match .* not yet built"),
+    "one node aside": (lambda m: move(m, interface_node(m), (1e-7, 0)), "do not match .* 1e-07 m apart"),
+    "double node": (lambda m: double(m, m.quads[20, 0], 20), "lie on one another, the first at .*merge"),
+    "double interface node": (lambda m: twin(m, interface_node(m)), "upper_interface has two nodes at x = .*; merge"),
+    "loose coating": (loosen, "9 pairs of nodes of the upper piece lie on one another"),
+    "hanging node": (hang, "do not meet edge to edge: a node hangs"),
+    "shared nodes": (share, "the two pieces share 9 nodes"),
+    "across": (lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]), "piece reaches 0.001 m across y = 0"),
+    "no far face": (lambda m: drop_edge(m, "upper_far"), r"nothing is tagged upper_far \("),
+    "no interface": (lambda m: drop_edge(m, "lower_interface"), r"nothing is tagged lower_interface \("),
+    "hole in the interface": (lambda m: drop_edge(m, "lower_interface", 2), "lower_interface has a hole .* not yet"),
+    "far at the interface": (lambda m: m.edges.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], interface_node(
+        m, "lower")), "lower_far must hold two nodes or more"),
+    "foreign far": (lambda m: m.edge_tags.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], EDGE_TAGS["upper_far"]),
+                    "nothing is tagged lower_far"),
+    "foreign node": (lambda m: m.edges.__setitem__((np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0),
+                                                   interface_node(m)), "lower_far holds 1 nodes that no cell"),
+    "doubled cell": (lambda m: m.quads.__setitem__(3, m.quads[4]), "lie on one another|has a hole|far holds"),
+    "twisted": (lambda m: m.quads.__setitem__((5, [1, 2]), m.quads[5, [2, 1]]), "1 cells are twisted"),
+    "no area": (lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]), "1 cells are twisted or have no area"),
+    "not finite": (lambda m: move(m, 7, (np.nan, 0)), "not finite"),
+    "missing piece": (lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3), "nothing is tagged upper_substrate"),
+}
+
+
+@pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines"])
+@pytest.mark.parametrize("name", SPOILT)
+def test_refuses_a_spoilt_mesh_by_name(name, form, tmp_path):
+    spoil, message = SPOILT[name]
+    m = drawn("quads")
+    spoil(m)
+    begin = time.perf_counter()
+    with pytest.raises(PatchfemError, match=message) as caught:
+        stored(m, tmp_path, form)
+    assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
+    assert time.perf_counter() - begin < 2
+
+
+def test_refuses_parts_joined_at_one_node_only(tmp_path):
+    m = drawn("quads")
+    last = m.quads[np.flatnonzero(m.quad_tags == CELL_TAGS["upper_substrate"])[-1]]
+    m.points = np.concatenate([m.points, m.points[last[2]] + [[1e-3, 0], [1e-3, 1e-3], [0, 1e-3]]])
+    count = len(m.points)
+    m.quads = np.append(m.quads, [[last[2], count - 3, count - 2, count - 1]], axis=0)
+    m.quad_tags = np.append(m.quad_tags, CELL_TAGS["upper_substrate"])
+    with pytest.raises(PatchfemError, match="the upper piece falls into 2 parts"):
+        stored(m, tmp_path)
+
+
+def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
+    m = drawn("quads")
+    path = tmp_path / "pair.vtu"
+    mesh = meshio.Mesh(np.column_stack([m.points, m.points[:, 0]]), [(k, c) for k, c, _ in blocks(m)],
+                       cell_data={"tag": [t for _, _, t in blocks(m)]})
+    meshio.write(path, mesh)
+    with pytest.raises(PatchfemError, match=r"not plane: z runs over 0\.002 m"):
+        read_pieces(path)
+    mesh.cell_data = {"tag": [t + 100 for _, _, t in blocks(m)]}
+    meshio.write(path, mesh)
+    with pytest.raises(PatchfemError, match=r"nothing is tagged .*cell array `tag`: 1 upper_substrate"):
+        read_pieces(path)
+    meshio.write(path, meshio.Mesh(m.points @ np.eye(2, 3), [("triangle6", m.quads[:, [0, 1, 2, 3, 0, 1]])]))
+    with pytest.raises(PatchfemError, match="triangle6 cells; only linear"):
+        read_pieces(path)
+    path = tmp_path / "pair.inp"
+    write_inp(m, path)
+    path.write_text(path.read_text().replace("ELSET=UPPER_COATING", "ELSET=GLUE"))
+    with pytest.raises(PatchfemError, match=r"cells with the unknown no tag;"):
+        read_pieces(path)
+
+
+@pytest.mark.parametrize("text, message", [
+    ("*NODE\n1,0,0\n1,1,0\n*NODE\n1,2,2\n", "given twice"),
+    ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only linear"),
+    ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
+    ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "more than the deck has"),
+    ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),
+    ("*INCLUDE, INPUT=other.inp\n", "INCLUDE is not yet built"),
+    ("*NODE\n1,zero,0\n", "not a readable .inp"),
+    ("", "nothing is tagged .*ELSET"),
+    ("\x00\ufffd*", "nothing is tagged"),
+])
+def test_refuses_decks_it_cannot_use(text, message, tmp_path):
+    (tmp_path / "pair.inp").write_text(text, encoding="utf-8")
+    with pytest.raises(PatchfemError, match=message):
+        read_pieces(tmp_path / "pair.inp")
+
+
+def test_refuses_endings_and_files_it_does_not_know(tmp_path):
+    with pytest.raises(PatchfemError, match="no such mesh file"):
+        read_pieces(tmp_path / "none.unv")
+    (tmp_path / "pair.stl").write_text("solid")
+    with pytest.raises(PatchfemError, match=r"from \.msh, \.vtu, \.inp or \.unv"):
+        read_pieces(tmp_path / "pair.stl")
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_refuses_truncations_in_bounded_time(form, tmp_path):
+    ending, write = FORMATS[form]
+    path = tmp_path / f"pair{ending}"
+    write(drawn("mixed"), path)
+    whole = path.read_bytes()
+    for cut in range(0, int(0.9 * len(whole)), max(1, len(whole) // 40)):
+        path.write_bytes(whole[:cut])
+        begin = time.perf_counter()
+        with pytest.raises(PatchfemError, match="pair"):
+            read_pieces(path)
+        assert time.perf_counter() - begin < 2
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4))
+def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
+    ending, write = FORMATS[form]
+    path = tmp_path / f"pair{ending}"
+    write(drawn("mixed"), path)
+    raw = bytearray(path.read_bytes())
+    for place, byte in changes:
+        raw[int(place * len(raw))] = byte
+    path.write_bytes(raw)
+    begin = time.perf_counter()
+    try:
+        pair = read_pieces(path)
+    except PatchfemError:
+        pass
+    else:
+        for piece in (pair.lower, pair.upper):
+            assert piece.areas().min() > 0 and np.isfinite(piece.points).all() and piece.points.min(axis=0)[1] >= 0
+    assert time.perf_counter() - begin < 2
