@@ -157,11 +157,13 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     if found.contact is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
-    from .simulate_patch import grid_of, unlike
+    from .simulate_patch import bodies_of, unlike
 
     if unlike(found.contact):
         raise Refused(f"{scene}: contact.upper, contact.lower: a mesh of unlike pieces is not yet built")
-    grid = grid_of(found)
+    grid, other = bodies_of(found)
+    if other is not None:
+        raise Refused(f"{scene}: contact.mesh: a mesh of any cells is only read; writing it is not yet built")
     write_mesh(grid, out)
     print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")
 

@@ -45,9 +45,9 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
         patch, *coarse = solve_all(scene, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         warnings += _strained(scene, patch)
-        if patch.upper is not patch.piece:
+        if patch.coupling > 0.02:
             warnings.append("the pieces are unlike: what shear does to the normal closing, and the load to the slide, "
-                            "is left out")
+                            f"is left out; it is {patch.coupling:.2g} of what shear does to the slide")
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = _static(what, patch, coarse, seconds, warnings)

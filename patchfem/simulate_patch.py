@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from .contact import cache
-from .contact.elasticity import Layers, Piece, assemble, interface_compliance
+from .contact.elasticity import Layers, assemble, interface_compliance
 from .contact.gaps import crown, step, tilt
 from .contact.slip import normal_stiffness, tangential_stiffness
 from .contact.unilateral import press, press_by
@@ -19,16 +19,21 @@ LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patch:
-    """One solved patch; forces, areas and stiffnesses are of all pairs together. grid, piece: the lower piece (its
-    columns are the interface), upper_grid, upper: the other one, the same objects where the pieces are alike."""
+    """One solved patch; forces, areas and stiffnesses are of all pairs together.
 
-    grid: TensorGrid
-    upper_grid: TensorGrid
-    piece: Piece
-    upper: Piece
+    grid, piece: the lower piece (its columns are the interface), upper_grid, upper: the other one, the same objects
+    where the pieces are alike; TensorGrid with Piece, or PieceMesh with Substructure. coupling: the largest normal
+    closing per shear force that is left out, over the largest slide per shear force.
+    """
+
+    grid: object
+    upper_grid: object
+    piece: object
+    upper: object
     pieces: Compliance
     gap: np.ndarray
     pressure: Pressure
+    coupling: float
     seconds: dict
 
     @property
@@ -55,21 +60,48 @@ def layers_of(contact, side: str) -> Layers:
 
 
 def grid_of(scene, side: str = "lower") -> TensorGrid:
-    """The tensor grid of a piece: made, or recognised in the mesh file the scene names."""
+    """The tensor grid that is made for a piece of a scene without a mesh file."""
     contact = scene.contact
     height, _, coating = piece_of(contact, side)
-    thickness = coating.thickness if coating else 0.0
-    if contact.mesh is None:
-        size = contact.element_size or contact.length / AUTOMATIC_CELLS
-        return graded_grid(contact.length, height, size, thickness)
-    from .mesh.files import read_grid
+    size = contact.element_size or contact.length / AUTOMATIC_CELLS
+    return graded_grid(contact.length, height, size, coating.thickness if coating else 0.0)
 
-    grid = read_grid(scene.beside(contact.mesh))
-    for key, mine, wanted in (("length", grid.length, contact.length), ("height", grid.height, height),
-                              ("coating.thickness", grid.coating, thickness)):
+
+def bodies_of(scene) -> tuple:
+    """(lower piece, upper piece or None where it is alike): grids that are made, the tensor grid recognised in the
+    named mesh file, or its two pieces of any triangles and quads."""
+    contact = scene.contact
+    if contact.mesh is None:
+        return grid_of(scene), grid_of(scene, "upper") if unlike(contact) else None
+    from .mesh.files import read_grid, read_pieces
+
+    path = scene.beside(contact.mesh)
+    try:
+        low, high = read_grid(path), None
+    except PatchfemError:  # no tensor grid of alike pieces; what is wrong with the file is said by the general reader
+        pair = read_pieces(path)
+        low, high = pair.lower, pair.upper
+    for body in (low,) if high is None else (low, high):
+        _matches(scene, body)
+    return low, high
+
+
+def _matches(scene, body) -> None:
+    contact = scene.contact
+    thickness = contact.coating.thickness if contact.coating else 0.0
+    for key, mine, wanted in (("length", body.length, contact.length), ("height", body.height, contact.height),
+                              ("coating.thickness", body.coating, thickness)):
         if abs(mine - wanted) > 1e-6 * contact.length:
             raise PatchfemError(f"{scene.path}: contact.{key} is {wanted:.9g} m, the mesh has {mine:.9g} m")
-    return grid
+
+
+def finite_elements(body, layers: Layers):
+    """The assembled piece of a tensor grid (Piece) or of any mesh (Substructure)."""
+    if isinstance(body, TensorGrid):
+        return assemble(body.x, body.depth, body.coating_rows, layers)
+    from .contact import substructure
+
+    return substructure.assemble(body, layers)
 
 
 def shape_side(contact) -> str:
@@ -84,30 +116,33 @@ SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: 
           "step": lambda x, part: step(x, part.height, part.at)}
 
 
-def compliance_of(piece: Piece, coating_rows: int, fresh: bool) -> tuple:
-    """(nn, tt, nt) of one piece, from the cache of operators unless `fresh`; small ones are not worth a file."""
-    small = piece.x.size < LEAST_CACHED
-    key = "" if small else cache.key_of(piece.x, piece.depth, coating_rows, piece.layers)
-    found = None if small or fresh else cache.fetch(key, piece.x.size)
+def compliance_of(body, piece, fresh: bool) -> tuple:
+    """(nn, tt, nt) of one piece; that of a large tensor grid from the cache of operators unless `fresh`."""
+    if not isinstance(body, TensorGrid):
+        from .contact import substructure
+
+        return substructure.condense(piece)
+    if body.x.size < LEAST_CACHED:
+        return interface_compliance(piece)
+    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers)
+    found = None if fresh else cache.fetch(key, body.x.size)
     if found is None:
         found = interface_compliance(piece)
-        if not small:
-            cache.keep(key, found)
+        cache.keep(key, found)
     return found
 
 
-def solve(scene, grid: TensorGrid, upper_grid: TensorGrid | None = None, fresh: bool = False) -> Patch:
-    """Assemble, condense and press the pieces of a scene on `grid` (and `upper_grid` where the upper piece differs)."""
+def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
+    """Assemble, condense and press the pieces of a scene: bodies of `bodies_of`, the upper None where it is alike."""
     contact, seconds = scene.contact, {}
     width = contact.width * contact.pairs
     interface = Interface(grid.x, frozen_array(grid.tributary() * width), width)
     start = perf_counter()
-    piece = assemble(grid.x, grid.depth, grid.coating_rows, layers_of(contact, "lower"))
-    upper = piece if upper_grid is None else assemble(upper_grid.x, upper_grid.depth, upper_grid.coating_rows,
-                                                      layers_of(contact, "upper"))
+    piece = finite_elements(grid, layers_of(contact, "lower"))
+    upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(contact, "upper"))
     seconds["assemble"] = perf_counter() - start
-    low = compliance_of(piece, grid.coating_rows, fresh)
-    high = low if upper is piece else compliance_of(upper, upper_grid.coating_rows, fresh)
+    low = compliance_of(grid, piece, fresh)
+    high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
     pieces = Compliance(interface, frozen_array((low[0] + high[0]) / width), frozen_array((low[1] + high[1]) / width))
     seconds["condense"] = perf_counter() - start - seconds["assemble"]
@@ -125,7 +160,8 @@ def solve(scene, grid: TensorGrid, upper_grid: TensorGrid | None = None, fresh: 
     else:
         pressure = press(pieces, gap, contact.load, moment_of(contact), angle, spring=spring_of(contact))
     seconds["press"] = perf_counter() - begin
-    return Patch(grid, upper_grid or grid, piece, upper, pieces, frozen_array(gap), pressure, seconds)
+    coupling = float(np.abs(low[2] - high[2]).max() / np.abs(low[1] + high[1]).max())
+    return Patch(grid, upper_grid or grid, piece, upper, pieces, frozen_array(gap), pressure, coupling, seconds)
 
 
 def unlike(contact) -> bool:
@@ -245,13 +281,21 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
 
 def solve_all(scene, estimate: bool = True, fresh: bool = False) -> tuple:
     """(Patch on the asked mesh, on a mesh twice and four times as coarse); None where none is wanted or possible.
-    fresh: condense anew, whatever is kept on disk."""
-    grid = grid_of(scene)
-    other = grid_of(scene, "upper") if unlike(scene.contact) else None
-    out = [solve(scene, grid, other, fresh), None, None]
+
+    A mesh of any cells has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense
+    anew, whatever is kept on disk.
+    """
+    low, high = bodies_of(scene)
+    out = [solve(scene, low, high, fresh), None, None]
+    if not estimate or low.x.size <= 8:
+        return tuple(out)
+    if not isinstance(low, TensorGrid):
+        from .mesh.anymesh import halved
+
+        out[1] = solve(scene, halved(low), halved(high))
+        return tuple(out)
     for k in (1, 2):
-        if estimate and grid.x.size > 8:
-            grid = coarser(grid)
-            other = coarser(other) if other is not None else None
-            out[k] = solve(scene, grid, other, fresh)
+        if low.x.size > 8:
+            low, high = coarser(low), coarser(high) if high is not None else None
+            out[k] = solve(scene, low, high, fresh)
     return tuple(out)

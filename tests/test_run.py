@@ -480,7 +480,7 @@ def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
 @pytest.mark.parametrize("raised, code", [(KeyboardInterrupt(), 130), (MemoryError(), 4), (ValueError("odd"), 1),
                                           (PermissionError(13, "Permission denied", "x"), 4)])
 def test_exact_codes_of_interruptions(written, tmp_path, monkeypatch, raised, code):
-    def stop(*_):
+    def stop(*_, **__):
         raise raised
 
     monkeypatch.setattr(simulate_files, "run", stop)

@@ -10,11 +10,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-LINE, QUAD = 3, 9
+LINE, TRIANGLE, QUAD = 3, 5, 9
 
 
-def write_series(path: Path, points, quads, lines, times, point_data: dict, cell_data: dict, units: dict) -> None:
-    """points (N, 3), quads (t, 4), lines (l, 2); times (f,); data: name -> (f or 1, N or cells, ...), 1 if constant.
+def write_series(path: Path, points, blocks, times, point_data: dict, cell_data: dict, units: dict) -> None:
+    """points (N, 3); blocks: (t, 2 to 4) node numbers of lines, triangles or quads, one array after the other; times
+    (f,); data: name -> (f or 1, N or cells, ...), 1 if constant.
 
     The file is written whole beside `path` and then renamed; written with an HDF5 version that VTK's reader knows.
     """
@@ -24,16 +25,16 @@ def write_series(path: Path, points, quads, lines, times, point_data: dict, cell
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 2], dtype=np.int64)
         root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
-        cells = len(quads) + len(lines)
-        connectivity = np.concatenate([np.ravel(quads), np.ravel(lines)]).astype(np.int64)
-        sizes = np.concatenate([np.full(len(quads), 4), np.full(len(lines), 2)])
+        cells = sum(len(block) for block in blocks)
+        connectivity = np.concatenate([np.ravel(block) for block in blocks]).astype(np.int64)
+        sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in blocks])
         root["NumberOfPoints"] = np.array([len(points)], np.int64)
         root["NumberOfCells"] = np.array([cells], np.int64)
         root["NumberOfConnectivityIds"] = np.array([connectivity.size], np.int64)
         root["Points"] = np.asarray(points, np.float64)
         root["Connectivity"] = connectivity
         root["Offsets"] = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        root["Types"] = np.concatenate([np.full(len(quads), QUAD), np.full(len(lines), LINE)]).astype(np.uint8)
+        root["Types"] = np.array([0, 0, LINE, TRIANGLE, QUAD], np.uint8)[sizes]
         steps = root.create_group("Steps")
         count = len(times)
         steps.attrs["NSteps"] = np.int64(count)
@@ -67,17 +68,16 @@ def _arrays(root, steps, kind: str, data: dict, count: int, units: dict) -> None
 
 
 def bodies(lower: dict, upper: dict, interface: dict) -> tuple:
-    """Points, quads, lines, point data and cell data of a pair.
+    """Points, blocks of cells, point data and cell data of a pair.
 
-    lower, upper: "points" (n, 2), "quads" (t, 4) numbered from 0, "material" (t,), "rows" nodes per column (node
-    j * rows lies on the interface), "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises"
-    (f, t) [Pa]; interface: name -> (f, m).
+    lower, upper: "points" (n, 2), "blocks" of cells numbered from 0, "material" (t,) of all of them, "interface" (m,)
+    node numbers, "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises" (f, t) [Pa];
+    interface: name -> (f, m).
     """
-    low, high = (np.arange(0, len(body["points"]), body["rows"]) for body in (lower, upper))
+    low, high = lower["interface"], upper["interface"]
     first, last = len(lower["points"]), len(lower["points"]) + len(upper["points"])
     points = np.concatenate([lower["points"], upper["points"], lower["points"][low]])
     points = np.column_stack([points, np.zeros(len(points))])
-    quads = np.concatenate([lower["quads"], upper["quads"] + first])
     lines = last + np.stack([np.arange(low.size - 1), np.arange(1, low.size)], axis=1)
     frames = len(lower["displacement"])
     move = np.zeros((frames, len(points), 3), np.float32)
@@ -90,11 +90,13 @@ def bodies(lower: dict, upper: dict, interface: dict) -> tuple:
         for place in (low, high + first, last + np.arange(low.size)):
             full[:, place] = values
         point_data[name] = full
-    cells, body = len(quads) + len(lines), len(lower["quads"])
+    body, both = len(lower["material"]), len(lower["material"]) + len(upper["material"])
+    cells = both + len(lines)
     stress = np.full((frames, cells, 6), np.nan, np.float32)
     mises = np.full((frames, cells), np.nan, np.float32)
-    for rows, part in ((slice(0, body), lower), (slice(body, len(quads)), upper)):
+    for rows, part in ((slice(0, body), lower), (slice(body, both), upper)):
         stress[:, rows, :4], stress[:, rows, 4:], mises[:, rows] = part["stress"], 0, part["mises"]
-    part = np.concatenate([np.zeros(body), np.ones(len(quads) - body), np.full(len(lines), 2)]).astype(np.int8)[None]
+    part = np.concatenate([np.zeros(body), np.ones(both - body), np.full(len(lines), 2)]).astype(np.int8)[None]
     material = np.concatenate([lower["material"], upper["material"], np.full(len(lines), -1)]).astype(np.int8)[None]
-    return points, quads, lines, point_data, {"stress": stress, "von_mises": mises, "part": part, "material": material}
+    blocks = [*lower["blocks"], *(block + first for block in upper["blocks"]), lines]
+    return points, blocks, point_data, {"stress": stress, "von_mises": mises, "part": part, "material": material}

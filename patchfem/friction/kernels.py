@@ -78,7 +78,9 @@ def grow(eps, v0, v1, path, dt, growth):
     a_s, l_k, floor, eps0, epsk = growth[0], growth[1], growth[2], growth[3], growth[4]
     if a_s < 0:
         return eps, 0.0
-    if abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
+    if max(abs(v0), abs(v1)) < floor:
+        rest = a_s * dt / floor
+    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
         rest = a_s * dt * (_primitive(v1, floor) - _primitive(v0, floor)) / (v1 - v0)
     else:
         rest = a_s * dt / max(abs(v0 + v1) / 2, floor)

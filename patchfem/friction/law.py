@@ -42,7 +42,9 @@ def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> 
     def primitive(v):
         return v / floor if abs(v) < floor else np.sign(v) * (1 + log(abs(v) / floor))
 
-    if abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
+    if max(abs(v0), abs(v1)) < floor:
+        rest = law.rest_growth * dt / floor
+    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
         rest = law.rest_growth * dt * (primitive(v1) - primitive(v0)) / (v1 - v0)
     else:
         rest = law.rest_growth * dt / max(abs(v0 + v1) / 2, floor)

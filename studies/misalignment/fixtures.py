@@ -51,9 +51,10 @@ def main(tilts=TILTS, springs=SPRINGS) -> dict:
         print("rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad")
         for angle in tilts:
             found = out[angle, spring] = case(float(angle), spring)
-            print(f"  tilt {angle:8.1e}  contact {found['contact_fraction']:.4f}  peak {found['pressure_peak'] / 1e6:8.3f} "
-                  f"MPa  centre {found['pressure_centre'] * 1e3:7.3f} mm  K_n {found['normal_stiffness']:.3e}  "
-                  f"K_t {found['tangential_stiffness']:.3e} N/m  rotation {found['rotation']:.2e}")
+            print(f"  tilt {angle:8.1e}  contact {found['contact_fraction']:.4f}  "
+                  f"peak {found['pressure_peak'] / 1e6:8.3f} MPa  centre {found['pressure_centre'] * 1e3:7.3f} mm  "
+                  f"K_n {found['normal_stiffness']:.3e}  K_t {found['tangential_stiffness']:.3e} N/m  "
+                  f"rotation {found['rotation']:.2e}")
     return out
 
 

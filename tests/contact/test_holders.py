@@ -1,5 +1,6 @@
-"""Fixtures and bodies of a patch through its scene: springs, prescribed approach, unlike pieces, a step."""
+"""Fixtures and bodies of a patch through its scene: springs, approach, unlike pieces, a step, any mesh."""
 
+import meshio
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,6 +8,9 @@ from hypothesis import strategies as st
 
 from patchfem import scene, simulate_patch
 from patchfem.contact.gaps import step
+from patchfem.core import PatchfemError
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh
+from patchfem.mesh.tensor import graded_grid
 
 TEXT = """
 [contact]
@@ -104,3 +108,40 @@ def test_refuses_an_approach_beside_a_line_or_a_spring():
     for tables in ('[contact.load_line]\noffset = "1 mm"\n', '[contact.holder]\nrotational_stiffness = "1 N m/rad"\n'):
         with pytest.raises(scene.SceneError, match=r"beside .contact.approach.*not yet built"):
             scene.loads(TEXT.format("", tables + '[contact.approach]\ndistance = "1 um"\n'))
+
+
+def triangles(path, size, shift=0.0):
+    """The pieces of TEXT cut into triangles, as a tagged .msh; the upper piece shifted along x."""
+    pair = pair_mesh(graded_grid(12.7e-3, 6.35e-3, size, 152.4e-6))
+    quads, points = pair["quads"], pair["points"].copy()
+    points[len(points) // 2:, 0] += shift
+    cells = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    mesh = meshio.Mesh(np.column_stack([points, np.zeros(len(points))]), [("triangle", cells), ("line", pair["edges"])])
+    tags = [np.concatenate([pair["tags"]] * 2).astype(np.int32), pair["edge_tags"].astype(np.int32)]
+    mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
+    mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
+    meshio.write(path, mesh, file_format="gmsh22", binary=True)
+
+
+def test_exact_a_scene_on_triangles_is_within_its_error_of_the_quads(tmp_path):
+    triangles(tmp_path / "pieces.msh", 2e-4)
+    text = TEXT.format(LOAD + '\nmesh = "pieces.msh"', '[contact.tilt]\nangle = "0.1 mrad"\n').replace(
+        'element_size = "0.2 mm"\n', "")
+    (tmp_path / "scene.toml").write_text(text, "utf-8")
+    found = scene.load(tmp_path / "scene.toml")
+    patch, finer, _ = simulate_patch.solve_all(found)
+    assert finer.grid.x.size == 2 * patch.grid.x.size - 1
+    cut = simulate_patch.measures(patch, finer)
+    whole = simulate_patch.measures(*simulate_patch.solve_all(
+        scene.loads(TEXT.format(LOAD, '[contact.tilt]\nangle = "0.1 mrad"\n'))))
+    for name, measure in cut.items():
+        assert abs(measure.value - whole[name].value) <= measure.error + whole[name].error + measure.floor
+    assert cut["normal_load"].value == pytest.approx(26 * 4.4482216152605, rel=1e-12)
+
+
+def test_refuses_a_mesh_whose_interfaces_do_not_match(tmp_path):
+    triangles(tmp_path / "pieces.msh", 5e-4, shift=1e-4)
+    (tmp_path / "scene.toml").write_text(TEXT.format(LOAD + '\nmesh = "pieces.msh"', ""), "utf-8")
+    with pytest.raises(PatchfemError, match=r"pieces.msh.*not yet built"):
+        simulate_patch.bodies_of(scene.load(tmp_path / "scene.toml"))
