@@ -25,6 +25,7 @@ EFFECTS = {
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta"),
     "contact.step": Effect("patchfem.contact.gaps", "g += height H(x - at)"),
+    "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
     "contact.tilt": Effect("patchfem.contact.gaps", "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect("patchfem.contact.gaps", "g += x^2/(2 radius)"),
@@ -52,12 +53,11 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "contact.profile", "contact.asperities.law=linear", "contact.asperities.law=exponential",
-    "contact.asperities.law=hertz", "contact.strips", "friction.law=tanh", "friction.law=convolution",
-    "friction.temperature", "slide.kind=dwell", "slide.kind=file", "structure.stiffening", "structure.bonded",
-    "drive.kind=force", "drive.kind=free", "drive.waveform=step", "drive.waveform=sweep", "drive.waveform=levels",
-    "drive.waveform=file", "wear", "accuracy.method=duhamel", "accuracy.method=newmark", "accuracy.method=euler",
-    "accuracy.method=harmonic",
+    "contact.profile", "contact.asperities.law=exponential", "contact.asperities.law=hertz", "contact.strips",
+    "friction.law=tanh", "friction.law=convolution", "friction.temperature", "slide.kind=dwell", "slide.kind=file",
+    "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
+    "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",
+    "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",
 )
 
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 NOT_YET_BUILT: dict[str, str] = {
     "contact.holder.tangential_stiffness": "",
     "contact.profile": "",
-    "contact.asperities": "",
+    "contact.asperities.law=exponential": "linear",
+    "contact.asperities.law=hertz": "linear",
     "contact.strips": "",
     "normal.amplitude": "",
     "normal.frequency": "",

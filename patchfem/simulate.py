@@ -237,8 +237,9 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
         if scene.friction.law == "nonlocal":
-            fewer = rig.run_march(scene, replace(few, shear_modes=max(1, settings.shear_modes // 2)), modes, drive,
-                                  patch)
+            kept = quarter.model.reduction.stiffness.size
+            pinned = replace(few, shear_modes=max(1, kept // 2), pinned=settings.pinned | {"shear_modes"})
+            fewer = rig.run_march(scene, pinned, modes, drive, patch)
             out.append(change(quarter.values, fewer.values))
             seconds["error"] += fewer.seconds
     return out

@@ -144,7 +144,11 @@ def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
-    pieces = Compliance(interface, frozen_array((low[0] + high[0]) / width), frozen_array((low[1] + high[1]) / width))
+    normal, tangential = (low[0] + high[0]) / width, (low[1] + high[1]) / width
+    if contact.asperities is not None:
+        crush, yielding = asperity_compliance(contact.asperities, interface.weight)
+        normal, tangential = normal + crush, tangential + yielding
+    pieces = Compliance(interface, frozen_array(normal), frozen_array(tangential))
     seconds["condense"] = perf_counter() - start - seconds["assemble"]
     gap = np.zeros(grid.x.size)
     for name, shape in SHAPES.items():
@@ -162,6 +166,14 @@ def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
     seconds["press"] = perf_counter() - begin
     coupling = float(np.abs(low[2] - high[2]).max() / np.abs(low[1] + high[1]).max())
     return Patch(grid, upper_grid or grid, piece, upper, pieces, frozen_array(gap), pressure, coupling, seconds)
+
+
+def asperity_compliance(asperities, weight) -> tuple:
+    """Diagonal (normal, tangential) compliance (m, m) [m/N] of a linear skin on nodal areas (m,) [m2]; a skin without a
+    tangential ratio is rigid in shear."""
+    crush = 1 / (asperities.normal_stiffness * weight)
+    ratio = asperities.tangential_ratio
+    return np.diag(crush), np.diag(crush / ratio) if ratio is not None else np.zeros((weight.size, weight.size))
 
 
 def unlike(contact) -> bool:

@@ -78,7 +78,10 @@ def _sizes(scene) -> tuple:
         chain["pieces_shear"] = block_shear(contact)
     else:
         chain["pieces_shear"] = "rigid"
-    chain["asperities"] = "rigid"
+    skin = contact.asperities if contact is not None else None
+    soft = skin is not None and skin.tangential_ratio is not None
+    chain["asperities"] = skin.tangential_ratio * skin.normal_stiffness * contact.length * contact.width \
+        * contact.pairs if soft else "rigid"
     f = scene.friction
     load = nominal_load(scene)
     if f is not None and load > 0:

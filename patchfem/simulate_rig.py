@@ -158,11 +158,15 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
 
         return hub.list_model(law, limit, cutoff(law.order, settings.tail), settings.merge)
     if shear:
-        from .contact.slip import shear_modes
+        from .contact.slip import enough_modes, shear_modes
 
         weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-        reduced = shear_modes(patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes,
-                              1 / law.ratio if law.ratio > 0 else np.inf)
+        given = (patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes)
+        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+        if "shear_modes" in settings.pinned:
+            reduced = shear_modes(*given, weakening)
+        else:
+            reduced = enough_modes(*given, 0.1 * scene.accuracy.tolerance, weakening)
         return replace(hub.points_model(law, weight, sigma, reduced), reduction=reduced)
     if settings.per_point:
         from .simulate_patch import shape_side

@@ -448,7 +448,7 @@ def test_refuses_verbs_not_yet_built(verb):
 
 
 @pytest.mark.parametrize("sets", [
-    ("contact.asperities.law=linear", "contact.asperities.normal_stiffness=1e13 Pa/m"),
+    ("contact.asperities.law=exponential", "contact.asperities.decay_length=1 um"),
     ("contact.strips.count=8",), ("contact.profile.file=before.csv",),
     ("contact.holder.tangential_stiffness=1e4 N/m",), ("friction.law=tanh", "friction.reference_speed=1 mm/s"),
     ("friction.spread=5 um",), ("structure.bonded.stiffness=4.6e6 N/m",), ("structure.stiffening.cubic=1e12 N/m^3",),

@@ -16,7 +16,6 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import nnls
 from threadpoolctl import threadpool_limits
 
 from ..core import NotConverged, Outcome, PatchfemError, frozen_array
@@ -94,7 +93,7 @@ class HertzSkin(_Smooth):
 
     @property
     def _level(self) -> float:
-        return np.log(4 / 3 * self.modulus * self.density) + 0.5 * np.log(self.radius) + 1.5 * np.log(self.deviation)
+        return np.log(4 / 3 * self.modulus * self.density * self.radius**0.5 * self.deviation**1.5)
 
     def log_pressure(self, s: np.ndarray) -> tuple:
         """log P and its fall per separation -d(log P)/ds [1/m], (m,) each."""
@@ -107,9 +106,8 @@ class HertzSkin(_Smooth):
         h = np.where(wanted < 0, np.sqrt(np.maximum(0.0, -2 * wanted)), -np.exp(np.clip(wanted, 0, 400) / 1.5))
         for _ in range(80):
             log, fall = peak_integral(h)
-            step = (log - wanted) / fall
-            h = h + step
-            if np.all(np.abs(step) <= 1e-14 * (1 + np.abs(h))):
+            h = h + (log - wanted) / fall
+            if np.all(np.abs(log - wanted) <= 1e-14 * (1 + np.abs(wanted))):
                 break
         return h * self.deviation
 
@@ -122,19 +120,15 @@ def peak_integral(h: np.ndarray) -> tuple:
     """log F and -d(log F)/dh of F(h) = int_h^inf (z - h)^3/2 phi(z) dz, phi the unit normal density; h any shape.
 
     F = phi(h) 2 int_0^inf v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of
-    (z - h)^3/2 below h = -8, where what it leaves out is exp(-32). Absolute error of log F 1e-14 + 1e-16 h^2.
-    """
+    (z - h)^3/2 below h = -8, short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of its fall 3e-13."""
     h = np.asarray(h, float)
     flat = np.maximum(h, -8.0).reshape(-1, 1)
     scale = 1 + np.maximum(flat, 0.0)
     square = _V**2 / scale
-    power = -flat * square - square**2 / 2
-    top = power.max(axis=1, keepdims=True)
-    weight = np.exp(power - top) * square
+    weight = np.exp(-flat * square - square**2 / 2) * square
     low, high = weight.sum(axis=1), (weight * square).sum(axis=1)
-    log = top[:, 0] - flat[:, 0]**2 / 2 - np.log(np.sqrt(2 * np.pi)) + np.log(0.2 * high / np.sqrt(scale[:, 0]))
-    fall = 1.5 * low / high
-    log, fall = log.reshape(h.shape), fall.reshape(h.shape)
+    log = -flat[:, 0]**2 / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))
+    log, fall = log.reshape(h.shape), (1.5 * low / high).reshape(h.shape)
     depth = np.where(h < -8, -h, 8.0)
     three, one = _moment(1.5, depth), _moment(0.5, depth)
     return np.where(h < -8, 1.5 * np.log(depth) + np.log(three), log), np.where(h < -8, 1.5 * one / three / depth, fall)
@@ -151,12 +145,9 @@ def _moment(n: float, a: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SkinState:
-    """A solved skin; every array (m,).
-
-    force [N] >= 0; pressure [Pa]; separation [m] of the mean planes by the law (< 0: crushed); stiffness k_n = -dP/ds
-    [Pa/m]; delta [m] and theta [rad] of the upper holder; load [N] and moment [N m] carried; `residuals` from the
-    independent check, relative.
-    """
+    """A solved skin; every array (m,). force [N] >= 0; pressure [Pa]; separation [m] of the mean planes by the law
+    (< 0: crushed); stiffness k_n = -dP/ds [Pa/m]; delta [m] and theta [rad] of the upper holder; load [N] and moment
+    [N m] carried; `residuals` from the independent check, relative."""
 
     force: np.ndarray
     pressure: np.ndarray
@@ -190,10 +181,8 @@ def _step(c, rigid, target, force, slope, missing) -> tuple:
     system[np.diag_indices_from(system)] += 1.0
     sides = root[:, None] * rigid[live]
     answer = cho_solve(cho_factor(system, lower=True, overwrite_a=True), np.column_stack([sides, root * missing[live]]))
-    motion = np.zeros(0)
-    if target.size:
-        lack = target - rigid.T @ force + sides.T @ answer[:, -1]
-        motion = np.linalg.lstsq(sides.T @ answer[:, :-1], lack, rcond=1e-14)[0]
+    lack = target - rigid.T @ force + sides.T @ answer[:, -1]
+    motion = np.linalg.lstsq(sides.T @ answer[:, :-1], lack, rcond=1e-14)[0] if target.size else target
     gain = np.zeros(force.size)
     gain[live] = root * (answer[:, :-1] @ motion - answer[:, -1])
     return gain, motion, missing - rigid @ motion + c[:, live] @ gain[live]
@@ -210,15 +199,14 @@ def _newton(skin, c, weight, gap, rigid, target, s, q, limit: int) -> tuple | No
                 gain, motion, change = _step(c, rigid, target, force, force * fall, gap - rigid @ q + c @ force - s)
             except (np.linalg.LinAlgError, ValueError):  # left the numbers
                 return None
-        lack = np.abs(target - rigid.T @ force).max(initial=0.0) / max(target[0] if target.size else 1.0, 1e-300)
-        q = q + motion
-        folds = -change * fall
+        lack = np.abs(target - rigid.T @ force).max() / target[0] if target.size else 0.0
+        q, folds = q + motion, -change * fall
         share = np.exp(np.minimum(0.0, np.maximum(log, log + folds) - log.max()))
         depth = np.ptp(gap) + np.abs(c @ force).max() + 2 * np.abs(q[1:]).max(initial=0.0)
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
         if max(lack, np.max(share * np.abs(folds))) <= noise:
             follow = np.exp(np.minimum(log + folds, 600.0))  # what carries next to nothing takes its law
-            return np.where(share < 1e-9, follow, np.maximum(force + gain, 0.0)), s + change, q, count
+            return np.where(share < 1e-15, follow, np.maximum(force + gain, 0.0)), s + change, q, count
         mean = (target[0] if target.size else force.sum()) / weight.sum()
         careful = np.where(folds > 0, -np.log1p(np.maximum(folds, 0.0)) / fall, change)
         s = s + np.maximum(change, np.minimum(careful, skin.separation(np.array(0.01 * mean)) - s))
@@ -231,8 +219,11 @@ def _start(skin, c, x, weight, gap, target) -> tuple:
     rest = skin.separation(np.array([mean]))
     fall = skin.log_pressure(rest)[1]
     edge = rest[0] + 1 / fall[0]  # where the tangent is zero
-    force, motion, _ = solve_forces(c + np.diag(1 / (mean * fall * weight)), x, gap - edge, target)
     rigid, scale = _rigid(x, target)
+    try:
+        force, motion, _ = solve_forces(c + np.diag(1 / (mean * fall * weight)), x, gap - edge, target)
+    except (np.linalg.LinAlgError, NotConverged):  # a start is all that is lost
+        return np.full(x.size, rest[0]), np.array([gap.mean() - rest[0], 0.0])[:target.size]
     stress = force / weight
     low = np.where(force > 0, edge - stress / (mean * fall), gap - rigid @ (motion * scale) + c @ force)
     return np.where(stress > mean, skin.separation(np.maximum(stress, mean)), low), motion * scale
@@ -274,7 +265,6 @@ def _reach(skin, c, weight, overlap) -> np.ndarray | None:
 def _smooth(skin, c, x, weight, gap, target, delta, start, limit) -> tuple:
     """Forces, separations, motions (delta or delta, -theta) and steps of a smooth law."""
     rigid, scale = _rigid(x, target)
-    wanted = target / scale
     if not target.size:
         gap = gap - delta
         s, q = _reach(skin, c, weight, -gap), np.zeros(0)
@@ -284,7 +274,7 @@ def _smooth(skin, c, x, weight, gap, target, delta, start, limit) -> tuple:
         s, q = start.separation, np.array([start.delta, -start.theta])[:target.size] * scale
     else:
         s, q = _start(skin, c, x, weight, gap, target)
-    answer = _newton(skin, c, weight, gap, rigid, wanted, s, q, limit)
+    answer = _newton(skin, c, weight, gap, rigid, target / scale, s, q, limit)
     if answer is None and target.size:
         answer = _softening(skin, c, x, weight, gap, target, limit)
     if answer is None:
@@ -295,63 +285,52 @@ def _smooth(skin, c, x, weight, gap, target, delta, start, limit) -> tuple:
 
 
 def _crush(skin, c, weight, gap, rigid, target, s, q) -> tuple:
-    """Semismooth Newton on the crush: forces, separations, motions, steps and whether the contact set has settled."""
+    """Semismooth Newton on the crush: forces, separations, motions and steps (60 of them: not settled)."""
     for count in range(1, 61):
         held = np.where(s < 0, skin.k * weight, 0.0)
         force = -held * s
-        if not held.any():
-            return force, s, q, count, True
         gain, motion, change = _step(c, rigid, target, force, held, gap - rigid @ q + c @ force - s)
         same = np.array_equal(s + change < 0, s < 0)
         force, s, q = force + gain, s + change, q + motion
         if same and np.abs(gain).max() <= 1e-12 * np.abs(force).max():
-            return np.maximum(force, 0.0), s, q, count, True
-    return np.maximum(force, 0.0), s, q, count, False
+            return np.maximum(force, 0.0), s, q, count
+    return np.maximum(force, 0.0), s, q, 60
 
 
 def _linear(skin, c, x, weight, gap, target, delta, start) -> tuple:
-    """Forces, separations, motions (delta or delta, -theta) and steps of the linear skin.
-
-    Under a load the active set of `unilateral` goes first; the steps on the crush then take out the round-off that
-    comes with gaps far larger than the crush.
-    """
+    """Forces, separations, motions (delta or delta, -theta) and steps of the linear skin: the active set of
+    `unilateral`, then steps on the crush that take out the round-off of gaps far larger than the crush."""
     rigid, scale = _rigid(x, target)
-    soft = c + np.diag(1 / (skin.k * weight))
-    if target.size:
-        active = None if start is None or not (start.force > 0).any() else start.force > 0
-        force, motion, count = solve_forces(soft, x, gap, target, active)
-        s = np.where(force > 0, -force / (skin.k * weight), gap - rigid @ (motion * scale) + c @ force)
-        force, s, motion, _, _ = _crush(skin, c, weight, gap, rigid, target / scale, np.where(force > 0, s, abs(s)),
-                                        motion * scale)
-        return force, s, motion / scale, count
-    answer = _crush(skin, c, weight, gap - delta, rigid, target, gap - delta, target)
-    if not answer[-1]:  # the sets went round in a circle: finite least squares
-        root = np.linalg.cholesky(soft).T
-        force, _ = nnls(root, np.linalg.solve(root.T, delta - gap), maxiter=50 * x.size)
-        s = np.where(force > 0, -force / (skin.k * weight), np.maximum(gap - delta + c @ force, 0.0))
-        answer = _crush(skin, c, weight, gap - delta, rigid, target, s, target)
-    return *answer[:2], np.array([delta]), answer[3]
+    gap = gap if target.size else gap - delta
+    if not target.size and gap.min() >= 0:
+        return np.zeros(x.size), gap, np.array([delta]), 0
+    active = None if start is None or not (start.force > 0).any() else start.force > 0
+    try:
+        force, motion, count = solve_forces(c + np.diag(1 / (skin.k * weight)), x, gap, target, active)
+    except (np.linalg.LinAlgError, NotConverged):  # a thin smooth skin finds the nodes that carry
+        mean = (target[0] if target.size else skin.k * weight @ np.maximum(-gap, 0.0)) / weight.sum()
+        thin = ExponentialSkin(mean / skin.k, mean)
+        force, _, motion, count = _smooth(thin, c, x, weight, gap, target, 0.0, None, 60)
+        force, motion = np.where(force > 0.05 * mean * weight, force, 0.0), motion[:target.size]
+    s = np.where(force > 0, -force / (skin.k * weight), np.abs(gap - rigid @ (motion * scale) + c @ force))
+    force, s, q, _ = _crush(skin, c, weight, gap, rigid, target / scale, s, motion * scale)
+    return force, s, q / scale if target.size else np.array([delta]), count
 
 
-def residuals(skin, c, x, weight, gap, state: SkinState, free: float, load=None, moment=None) -> MappingProxyType:
+def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=None, moment=None) -> MappingProxyType:
     """Relative residuals of a solved skin, recomputed from its definition alone; `free` rotation beyond the gap's.
 
     Keys: law (largest mismatch of a force, against the largest force and what the law gains over the depth of the
     gap, or 1e-5 of it for the smooth laws), tension, and force_balance, moment_balance where prescribed.
     """
-    opening = gap + free * x - state.delta + c @ state.force
-    crush = np.abs(state.separation[state.force > 0]).max(initial=0.0)
-    depth = np.ptp(gap) + np.abs(c @ state.force).max() + abs(free) * np.ptp(x) + crush
-    most = max(state.force.max(), np.exp(FLOOR))
-    off = np.abs(state.force - weight * skin.pressure(opening)).max()
-    stiff = (weight * skin.stiffness(state.separation)).max()
-    share = 1.0 if isinstance(skin, LinearSkin) else 1e-5
-    out = {"law": off / (most + share * stiff * depth)}
-    out["tension"] = max(0.0, -state.force.min()) / most
-    if load is not None:
-        out["force_balance"] = abs(state.force.sum() - load) / load
-    if moment is not None:
-        out["moment_balance"] = abs(state.force @ x - moment) / (load * np.ptp(x))
+    opening = gap + free * x - delta + c @ force
+    depth = np.ptp(gap) + np.abs(c @ force).max() + abs(free) * np.ptp(x)
+    gain = depth * (weight * (skin.k if isinstance(skin, LinearSkin) else 1e-5 * skin.stiffness(opening))).max()
+    most = max(force.max(), np.exp(FLOOR))
+    out = {"law": np.abs(force - weight * skin.pressure(opening)).max() / (most + gain),
+           "tension": max(0.0, -force.min()) / most}
+    out |= {} if load is None else {"force_balance": abs(force.sum() - load) / load}
+    out |= {} if moment is None else {"moment_balance": abs(force @ x - moment) / (load * np.ptp(x))}
     return MappingProxyType({key: float(value) for key, value in out.items()})
 
 
@@ -367,47 +346,41 @@ def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarra
     not finite or an exponential law without `reference` under an approach; NotConverged above a residual of 1e-9.
     """
     _refuse(skin, x, gap, load, moment, approach)
-    if load == 0:
-        return _state(skin, weight, np.zeros(x.size), gap - gap.min(), float(gap.min()), rotation, x, 0)
-    if isinstance(skin, ExponentialSkin) and skin.reference is None:
+    target = np.array([value for value in (load, moment) if value is not None])
+    if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
         skin = replace(skin, reference=load / weight.sum())
     if start is not None:
         start = replace(start, theta=start.theta - rotation)
-    target = np.array([value for value in (load, moment) if value is not None])
+    force, s, motion, count, checks = np.zeros(x.size), gap - gap.min(), np.array([gap.min()]), 0, {}
     with threadpool_limits(1, "blas"):
-        if isinstance(skin, LinearSkin):
+        if load != 0 and isinstance(skin, LinearSkin):
             force, s, motion, count = _linear(skin, c, x, weight, gap, target, approach, start)
-        else:
+        elif load != 0:
             force, s, motion, count = _smooth(skin, c, x, weight, gap, target, approach, start, limit)
-        free = -float(motion[1]) if motion.size > 1 else 0.0
-        bare = _state(skin, weight, force, s, float(motion[0]), rotation + free, x, count)
-        checks = residuals(skin, c, x, weight, gap, bare, free, load, moment)
+    free, touch = -float(motion[1]) if motion.size > 1 else 0.0, bool((force > 0).any())
+    if load != 0:
+        checks = residuals(skin, c, x, weight, gap, force, float(motion[0]), free, load, moment)
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
         raise NotConverged(f"contact.asperities: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}")
-    return replace(bare, residuals=checks)
+    stiffness = np.where(force > 0, skin.stiffness(s), 0.0) if touch else 0.0 * x
+    return SkinState(frozen_array(force), frozen_array(force / weight), frozen_array(s), frozen_array(stiffness),
+                     float(motion[0]), rotation + free, float(force.sum()), float(force @ x), count,
+                     Outcome.DONE if touch else Outcome.NO_CONTACT, MappingProxyType(checks))
 
 
 def _refuse(skin, x, gap, load, moment, approach) -> None:
     """PatchfemError for controls without an answer."""
     if (load is None) == (approach is None) or (moment is not None and load is None):
-        raise PatchfemError("contact: give either a load (with or without a moment) or an approach")
+        raise PatchfemError("contact: give a load, a load and a moment, or an approach")
     if not (np.isfinite(gap).all() and np.isfinite(load if approach is None else approach) and (load or 0.0) >= 0):
         raise PatchfemError("contact.load: the load must be >= 0, load, approach and gap finite")
     if load and moment is not None and not abs(moment) < load * np.ptp(x) / 2:
         raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
                             f"outside the half length {np.ptp(x) / 2:.6g} m: the piece tips over")
     if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
-        raise PatchfemError("contact.approach with contact.asperities.law = \"exponential\": the law has no "
-                            "first touch to measure from; give contact.load, or another law")
-
-
-def _state(skin, weight, force, s, delta: float, theta: float, x, count: int) -> SkinState:
-    carried = (force > 0).any()
-    stiffness = np.where(force > 0, skin.stiffness(s), 0.0) if carried else 0.0 * x
-    return SkinState(frozen_array(force), frozen_array(force / weight), frozen_array(s), frozen_array(stiffness), delta,
-                     theta, float(force.sum()), float(force @ x), count,
-                     Outcome.DONE if carried else Outcome.NO_CONTACT, MappingProxyType({}))
+        raise PatchfemError("contact.approach with contact.asperities.law = \"exponential\": the law has no first "
+                            "touch to measure from; give contact.load, or another law")
 
 
 def tangent(c: np.ndarray, weight: np.ndarray, stiffness: np.ndarray) -> float:
@@ -417,8 +390,6 @@ def tangent(c: np.ndarray, weight: np.ndarray, stiffness: np.ndarray) -> float:
     tangential compliance and tangential_ratio * k_n: dT/d(slide) in stick. Nodes of no stiffness carry nothing.
     """
     d = weight * stiffness
-    if not (d > 0).any():
-        return 0.0
     live = _live(d)
     root = np.sqrt(d[live])
     with threadpool_limits(1, "blas"):

@@ -113,6 +113,19 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
                       frozen_array(1 / values[:count]), error)
 
 
+def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int, tolerance: float,
+                 weakening: float = 1.0, most: int = 64) -> ShearModes:
+    """`shear_modes` with the fewest modes, doubled from `count` up to `most`, whose backbone error meets `tolerance`.
+
+    A soft skin spreads the compliance over many modes; the pieces alone need eight.
+    """
+    found = shear_modes(tangential, limit, bond_length, count, weakening)
+    while found.backbone_error > tolerance and found.stiffness.size == count and count < most:
+        count = min(2 * count, most)
+        found = shear_modes(tangential, limit, bond_length, count, weakening)
+    return found
+
+
 def _backbone(limit, shape, values, length, slides) -> np.ndarray:
     """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton."""
     b = np.zeros(values.size)

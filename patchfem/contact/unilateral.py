@@ -152,8 +152,12 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
         raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
                             f"outside the half length {np.ptp(x) / 2:.6g} m: the piece tips over")
     target = np.array([load]) if moment is None else np.array([load, moment])
-    with threadpool_limits(1, "blas"):
-        force, motion, count = solve_forces(pieces.normal, x, gap, target, start, spring=spring)
+    try:
+        with threadpool_limits(1, "blas"):
+            force, motion, count = solve_forces(pieces.normal, x, gap, target, start, spring=spring)
+    except np.linalg.LinAlgError:
+        raise NotConverged("contact: the rotation is not determined by the contact set; raise the load or name "
+                           "contact.holder.rotational_stiffness") from None
     theta = 0.0 if moment is None else -float(motion[1])
     return _checked(pieces, gap, force, float(motion[0]), theta, rotation, load, moment, spring, count)
 

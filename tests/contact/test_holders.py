@@ -145,3 +145,24 @@ def test_refuses_a_mesh_whose_interfaces_do_not_match(tmp_path):
     (tmp_path / "scene.toml").write_text(TEXT.format(LOAD + '\nmesh = "pieces.msh"', ""), "utf-8")
     with pytest.raises(PatchfemError, match=r"pieces.msh.*not yet built"):
         simulate_patch.bodies_of(scene.load(tmp_path / "scene.toml"))
+
+
+@pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])
+def test_exact_a_soft_linear_skin_is_the_wedge_on_a_foundation(angle):
+    """Bodies a thousand times stiffer than the skin: contact length sqrt(2 N/(k theta b)), full below 2 p/(k L)."""
+    stiffness, load, size = 1e10, 26 * 4.4482216152605, 12.7e-3
+    found = solved(tables=f'[contact.tilt]\nangle = "{angle} rad"\n[contact.asperities]\nlaw = "linear"\n'
+                          f'normal_stiffness = "{stiffness} Pa/m"\ntangential_ratio = 0.8\n')[1]
+    opening = 2 * load / size**2 / (stiffness * size)
+    length = min(size, np.sqrt(2 * load / (stiffness * angle * size)))
+    assert (found["contact_fraction"] == 1) == (angle < opening)
+    assert found["contact_fraction"] == pytest.approx(length / size, abs=0.02)
+    assert found["normal_stiffness"] == pytest.approx(stiffness * size * found["contact_fraction"] * size, rel=2e-3)
+    assert found["tangential_stiffness"] == pytest.approx(0.8 * found["normal_stiffness"], rel=2e-2)
+
+
+def test_exact_a_hard_skin_is_none():
+    tilt, skin = '[contact.tilt]\nangle = "0.1 mrad"\n', '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = '
+    bare, hard = solved(tables=tilt)[1], solved(tables=tilt + skin + '"1e21 Pa/m"\n')[1]
+    for name, value in bare.items():
+        assert hard[name] == pytest.approx(value, rel=1e-6)

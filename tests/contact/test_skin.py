@@ -1,0 +1,370 @@
+"""The skin of asperities: wedges in closed form, the unilateral limit, quadrature, scales, and random controls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from patchfem.contact.skin import ExponentialSkin, HertzSkin, LinearSkin, peak_integral, residuals, solve, tangent
+from patchfem.contact.slip import normal_stiffness, tangential_stiffness
+from patchfem.contact.unilateral import LIMIT, press
+from patchfem.core import Compliance, NotConverged, Outcome, PatchfemError
+
+AREA = LENGTH * WIDTH
+MEAN = LOAD / AREA
+PEAKS = HertzSkin(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)
+SKINS = {"linear": LinearSkin(1e13), "exponential": ExponentialSkin(0.5e-6, 1e6), "hertz": PEAKS}
+each_skin = pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS.keys())
+
+
+def strip(cells):
+    """Places and areas of a rigid patch, cells of equal width with the nodes in their middle: exact for wedges."""
+    x = (np.arange(cells) + 0.5) * (LENGTH / cells) - LENGTH / 2
+    return x, np.full(cells, AREA / cells)
+
+
+def bodies(cells=100):
+    """Closing compliance, places and areas of the coated pair."""
+    pair = coated_pair(cells)
+    return pair.normal, pair.interface.x, pair.interface.weight
+
+
+# ---------------------------------------------------------------------------------------------- wedges on rigid bodies
+@pytest.mark.parametrize("times", [1.5, 3.0, 12.0])
+def test_exact_wedge_on_the_linear_skin(times):
+    """Contact fraction sqrt(2N/(k theta b))/L and centre -(L/2 - c/3) beyond the opening tilt 2p/(kL)."""
+    x, weight = strip(4000)
+    theta = times * 2 * MEAN / (1e13 * LENGTH)
+    state = solve(LinearSkin(1e13), np.zeros((x.size, x.size)), x, weight, theta * x, LOAD)
+    fraction = np.sqrt(2 * LOAD / (1e13 * theta * WIDTH)) / LENGTH
+    assert fraction == pytest.approx(times**-0.5, rel=1e-12)
+    assert weight[state.force > 0].sum() / AREA == pytest.approx(fraction, abs=0.51 / x.size)
+    assert state.moment / LOAD == pytest.approx(-LENGTH * (0.5 - fraction / 3), rel=1e-6)
+    assert state.pressure.max() == pytest.approx(2 * MEAN / fraction, rel=1e-3)
+    assert state.delta == pytest.approx(theta * LENGTH * (fraction - 0.5), rel=1e-6, abs=1e-6 * theta * LENGTH)
+
+
+def test_exact_linear_skin_starts_to_open_at_twice_the_mean_pressure_over_k_and_length():
+    x, weight = strip(1000)
+    rigid, opening = np.zeros((x.size, x.size)), 2 * MEAN / (1e13 * LENGTH)
+    assert opening == pytest.approx(1.129e-5, rel=1e-3)
+    below = solve(LinearSkin(1e13), rigid, x, weight, 0.9999 * opening * x, LOAD)
+    beyond = solve(LinearSkin(1e13), rigid, x, weight, 1.01 * opening * x, LOAD)
+    assert (below.force > 0).all() and not (beyond.force > 0).all()
+    assert below.moment == pytest.approx(-1e13 * 0.9999 * opening * (weight @ x**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.01, 1.0, 5.0, 60.0, 1e3])
+def test_exact_wedge_on_the_exponential_skin(ratio):
+    """p_mean/p_max = (1 - exp(-B))/B and the centre L(1/2 - 1/B + 1/(exp(B) - 1)) towards the closed end at -x."""
+    x, weight = strip(2000)
+    u0 = 2.5e-6
+    theta = ratio * u0 / LENGTH
+    state = solve(ExponentialSkin(u0), np.zeros((x.size, x.size)), x, weight, theta * x, LOAD)
+    half = ratio / x.size / 2  # half a cell in e-folds; the sums over the middles of the cells are geometric series
+    peak = state.pressure.max() * np.exp(half)
+    assert MEAN / peak == pytest.approx(-np.expm1(-ratio) / ratio * half / np.sinh(half), rel=1e-9)
+    away = 0.0 if ratio > 500 else 1 / np.expm1(ratio)
+    assert state.moment / LOAD == pytest.approx(-LENGTH * (0.5 - 1 / np.tanh(half) / 2 / x.size + away), rel=1e-9)
+    assert state.moment / LOAD == pytest.approx(-LENGTH * (0.5 - 1 / ratio + away),
+                                                abs=LENGTH * 1.01 * ratio / 12 / x.size**2)
+
+
+def test_exact_flat_aligned_exponential_skin_stands_at_zero_separation():
+    x, weight = strip(50)
+    state = solve(ExponentialSkin(1e-6), np.zeros((50, 50)), x, weight, np.zeros(50), LOAD)
+    assert np.abs(state.separation).max() <= 1e-18 and abs(state.delta) <= 1e-18
+    assert tangent(np.zeros((50, 50)), weight, state.stiffness) == pytest.approx(LOAD / 1e-6, rel=1e-12)
+
+
+def test_exact_reference_pressure_only_shifts_the_approach():
+    c, x, weight = bodies()
+    gap = rough(np.random.default_rng(1), x, 1e-6)
+    one, two = (solve(ExponentialSkin(1e-7, p), c, x, weight, gap, LOAD) for p in (None, 1e3 * MEAN))
+    assert np.abs(one.force - two.force).max() <= 1e-11 * LOAD
+    assert one.delta - two.delta == pytest.approx(1e-7 * np.log(1e3), rel=1e-9)
+
+
+def test_exact_load_off_the_middle_opens_a_linear_skin_at_a_sixth_of_the_length():
+    """The kern: contact fraction 3(1/2 - e/L), rotation 12 N e/(k b L^3) before; rotation < 0 for a load at +x."""
+    x, weight = strip(3000)
+    skin, rigid = LinearSkin(1e13), np.zeros((x.size, x.size))
+    inside = solve(skin, rigid, x, weight, 0 * x, LOAD, LOAD * LENGTH * 0.16)
+    assert (inside.force > 0).all()
+    assert inside.theta == pytest.approx(-0.16 * 12 * LOAD / (1e13 * WIDTH * LENGTH**2), rel=1e-6)
+    outside = solve(skin, rigid, x, weight, 0 * x, LOAD, LOAD * LENGTH * 0.4)
+    assert weight[outside.force > 0].sum() / AREA == pytest.approx(0.3, abs=1e-3)
+
+
+# ------------------------------------------------------------------------------------------ against the bare unilateral
+GAPS = {"flat": lambda x: 0 * x, "tilt": lambda x: 1e-4 * x,
+        "rough": lambda x: rough(np.random.default_rng(5), x, 3e-7)}
+
+
+@pytest.mark.parametrize("shape", GAPS.values(), ids=GAPS.keys())
+@pytest.mark.parametrize("offset", [None, 2e-3])
+@pytest.mark.parametrize("k", [1e11, 1e13, 1e15])
+def test_exact_linear_skin_is_unilateral_contact_of_softer_pieces(shape, offset, k):
+    pair = coated_pair(100)
+    c, x, weight = bodies()
+    soft = Compliance(pair.interface, c + np.diag(1 / (k * weight)), pair.tangential)
+    moment = None if offset is None else offset * LOAD
+    bare, state = press(soft, shape(x), LOAD, moment), solve(LinearSkin(k), c, x, weight, shape(x), LOAD, moment)
+    assert np.abs(state.pressure - bare.sigma_n).max() <= 1e-10 * bare.sigma_n.max()
+    assert state.delta == pytest.approx(bare.approach, rel=1e-10)
+    assert state.theta == pytest.approx(bare.rotation, rel=1e-9, abs=1e-18)
+
+
+@pytest.mark.parametrize("offset", [None, 2e-3])
+def test_order_one_a_stiff_linear_skin_tends_to_bare_contact(offset):
+    pair = coated_pair(100)
+    c, x, weight = bodies()
+    gap, moment = GAPS["tilt"](x), None if offset is None else offset * LOAD
+    bare = press(pair, gap, LOAD, moment)
+    off = [np.abs(solve(LinearSkin(k), c, x, weight, gap, LOAD, moment).pressure - bare.sigma_n).max() / MEAN
+           for k in (1e16, 1e17, 1e18)]
+    assert off[2] < 1e-3
+    assert np.log10(off[0] / off[1]) == pytest.approx(1, abs=0.1)
+    assert np.log10(off[1] / off[2]) == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("skin", [ExponentialSkin(1e-6, MEAN), PEAKS])
+def test_order_one_thin_smooth_skins_tend_to_bare_contact(skin):
+    """P(s/t) with t -> 0, to within the logarithm of t."""
+    c, x, weight = bodies()
+    gap = GAPS["tilt"](x)
+    bare = press(coated_pair(100), gap, LOAD).sigma_n
+    off = [np.abs(solve(skin.softened(t), c, x, weight, gap, LOAD).pressure - bare).max() / bare.max()
+           for t in (1e-3, 1e-4, 1e-5, 1e-6)]
+    assert off[3] < 2e-3 and all(6 < a / b < 14 for a, b in pairwise(off[1:]))
+
+
+@each_skin
+@pytest.mark.parametrize("offset", [0.0, 1.7e-3, -6.2e-3])
+def test_exact_rotation_and_approach_held_where_the_moment_put_them_give_the_same_forces(skin, offset):
+    c, x, weight = bodies()
+    gap = 2e-5 * x + rough(np.random.default_rng(3), x, 1e-7)
+    free = solve(skin, c, x, weight, gap, LOAD, LOAD * offset)
+    held = solve(skin, c, x, weight, gap + free.theta * x, LOAD, rotation=free.theta)
+    pushed = solve(skin, c, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta)
+    for other in (held, pushed):
+        assert np.abs(other.force - free.force).max() <= 1e-9 * free.force.max()
+        assert other.delta == pytest.approx(free.delta, rel=1e-9) and other.theta == free.theta
+    assert pushed.load == pytest.approx(LOAD, rel=1e-9)
+    again = solve(skin, c, x, weight, gap, LOAD, LOAD * offset, start=free)
+    assert again.iterations <= 2 and np.abs(again.force - free.force).max() <= 1e-10 * free.force.max()
+
+
+def test_exact_forces_minimise_the_energy():
+    """f.Cf/2 + g.f + sum A Psi(f/A) with Psi' = -P^-1 rises in every direction that keeps load and moment."""
+    c, x, weight = bodies()
+    rng = np.random.default_rng(4)
+    gap = rough(rng, x, 1e-7)
+    for skin in (ExponentialSkin(1e-7, 1e6), PEAKS):
+        state = solve(skin, c, x, weight, gap, LOAD, 1e-3 * LOAD)
+        slope = c @ state.force + gap - skin.separation(state.pressure)
+        move = np.stack([np.ones(x.size), x / LENGTH], axis=1)
+        left = slope - move @ np.linalg.lstsq(move, slope, rcond=None)[0]
+        assert np.abs(left).max() <= 1e-10 * (np.ptp(gap) + np.ptp(c @ state.force))
+
+
+# ----------------------------------------------------------------------------------------------------- the law of peaks
+@pytest.mark.parametrize("h", [-200.0, -8.001, -7.999, -3.0, 0.0, 0.7, 3.0, 12.0, 30.0])
+def test_exact_peak_integral_against_adaptive_quadrature(h):
+    log, fall = peak_integral(np.array([h]))
+
+    def weighted(power):  # in units of phi(h) for a positive h: the tail underflows
+        if h > 0:
+            return quad(lambda t: t**power * np.exp(-h * t - t * t / 2), 0, np.inf, epsabs=0, epsrel=1e-12)[0]
+        points = [max(-h - 9, 0), -h, -h + 9]
+        inner = [quad(lambda t: t**power * norm.pdf(t + h), a, b, epsabs=0, epsrel=1e-12, limit=200)[0]
+                 for a, b in zip(points, [*points[1:], -h + 40], strict=False) if b > a]
+        return sum(inner)
+
+    shift = -h * h / 2 - 0.5 * np.log(2 * np.pi) if h > 0 else 0.0
+    assert log[0] == pytest.approx(np.log(weighted(1.5)) + shift, abs=1e-10, rel=1e-12)
+    assert fall[0] == pytest.approx(1.5 * weighted(0.5) / weighted(1.5), rel=1e-9)
+
+
+def test_always_the_tail_of_the_peaks_is_finite_and_keeps_its_law():
+    """log F -> -h^2/2 - 5/2 log h + log(Gamma(5/2)/sqrt(2 pi)) far out, where F itself underflows."""
+    log, fall = peak_integral(np.array([1e2, 1e3, 1e5]))
+    h = np.array([1e2, 1e3, 1e5])
+    far = -h * h / 2 - 2.5 * np.log(h) + np.log(0.75 * np.sqrt(np.pi) / np.sqrt(2 * np.pi))
+    assert np.abs(log - far).max() <= 1e-3 and np.abs(fall / h - 1).max() <= 1e-3
+    middle = np.linspace(-20, 30, 400)
+    step = 1e-4
+    rate = (peak_integral(middle - step)[0] - peak_integral(middle + step)[0]) / (2 * step)
+    assert np.abs(rate / peak_integral(middle)[1] - 1).max() <= 1e-6
+
+
+@pytest.mark.parametrize("skin", [ExponentialSkin(1e-7, 1e6), PEAKS])
+def test_exact_separation_inverts_the_pressure(skin):
+    wanted = 10.0 ** np.arange(-60, 16)
+    assert np.abs(skin.pressure(skin.separation(wanted)) / wanted - 1).max() <= 1e-10
+    s = np.linspace(-5, 5, 21) * 1e-6
+    step = 1e-12
+    slope = -(skin.pressure(s + step) - skin.pressure(s - step)) / (2 * step)
+    assert np.abs(slope / skin.stiffness(s) - 1).max() <= 1e-5
+
+
+# ------------------------------------------------------------------------------------------- scales and whole stiffness
+@each_skin
+def test_exact_twice_the_gap_skin_and_load_doubles_the_pressure(skin):
+    c, x, weight = bodies()
+    gap = 3e-5 * x + rough(np.random.default_rng(2), x, 1e-7)
+    twice = {"linear": lambda: skin, "exponential": lambda: ExponentialSkin(1e-6, 2e6),
+             "hertz": lambda: replace(skin.softened(2.0), density=2 * skin.softened(2.0).density)}
+    other = next(twice[name]() for name, law in SKINS.items() if law is skin)
+    for moment in (None, 1e-3 * LOAD):
+        one = solve(skin, c, x, weight, gap, LOAD, moment)
+        two = solve(other, c, x, weight, 2 * gap, 2 * LOAD, None if moment is None else 2 * moment)
+        assert np.abs(two.force - 2 * one.force).max() <= 1e-9 * two.force.max()
+        assert two.delta == pytest.approx(2 * one.delta, rel=1e-9)
+
+
+@each_skin
+def test_exact_mirror_and_shift_of_the_gap(skin):
+    c, x, weight = bodies()
+    gap = rough(np.random.default_rng(6), x, 3e-7)
+    one = solve(skin, c, x, weight, gap, LOAD, 2e-3 * LOAD)
+    other = solve(skin, c, x, weight, gap[::-1] + 1e-6, LOAD, -2e-3 * LOAD)
+    assert np.abs(other.force[::-1] - one.force).max() <= 1e-8 * one.force.max()
+    assert other.delta - one.delta == pytest.approx(1e-6, rel=1e-8)
+    assert other.theta == pytest.approx(-one.theta, rel=1e-7)
+
+
+@each_skin
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_exact_normal_stiffness_is_the_slope_of_load_over_approach(skin, angle):
+    c, x, weight = bodies()
+    state = solve(skin, c, x, weight, angle * x, LOAD)
+    step = 1e-5 * LOAD / tangent(c, weight, state.stiffness)
+    more, less = (solve(skin, c, x, weight, angle * x, approach=state.delta + s * step) for s in (1, -1))
+    assert (more.load - less.load) / (2 * step) == pytest.approx(tangent(c, weight, state.stiffness), rel=1e-6)
+
+
+def test_exact_skin_and_bodies_in_series():
+    """Rigid bodies leave the skin's sum k A; a stiff skin leaves the bodies; between, the matrix C + 1/(k A)."""
+    pair = coated_pair(100)
+    c, _, weight = bodies()
+    k = np.full(weight.size, 1e13)
+    assert tangent(0 * c, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
+    everywhere = np.ones(weight.size, bool)
+    assert tangent(c, weight, 1e9 * k) == pytest.approx(normal_stiffness(c, everywhere), rel=1e-5)
+    ratio = tangent(pair.tangential, weight, 0.8 * k)
+    summed = np.linalg.solve(pair.tangential + np.diag(1 / (0.8e13 * weight)), np.ones(weight.size)).sum()
+    assert ratio == pytest.approx(summed, rel=1e-11)
+    assert ratio < min(0.8e13 * AREA, tangential_stiffness(pair.tangential, everywhere))
+    half = np.where(np.arange(weight.size) < 40, k, 0.0)
+    part = np.ix_(half > 0, half > 0)
+    assert tangent(c, weight, half) == pytest.approx(
+        np.linalg.solve(c[part] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)).sum(), rel=1e-11)
+    assert tangent(c, weight, 0 * k) == 0.0
+
+
+# ------------------------------------------------------------------------------------------------------- never failing
+def holds(skin, c, x, weight, gap, state, load, moment):
+    """Law, balance and signs, from the state alone."""
+    assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= LIMIT
+    assert state.force.min() >= 0 and np.isfinite(state.stiffness).all() and state.stiffness.min() >= 0
+    assert state.force.sum() == pytest.approx(load, rel=1e-11)
+    if moment is not None:
+        assert abs(state.force @ x - moment) <= 1e-11 * load * np.ptp(x)
+    opening = gap + (0.0 if moment is None else state.theta) * x - state.delta + c @ state.force
+    depth = np.ptp(gap) + np.abs(c @ state.force).max() + np.abs(state.theta * x).max()
+    big = state.force > 1e-3 * state.force.max()
+    assert np.abs(opening - state.separation)[big].max() <= 1e-9 * np.abs(state.separation[big]).max() + 1e-13 * depth
+
+
+@settings(max_examples=150, deadline=None)
+@given(law=st.sampled_from(["linear", "exponential", "hertz"]), scale=st.floats(-9, 6), stiff=st.floats(9, 18),
+       thin=st.floats(-9, -5), angle=st.floats(-6, -2), rough_size=st.floats(-9, -4), jagged=st.booleans(),
+       place=st.none() | st.floats(-0.499, 0.499), rigid=st.booleans(), seed=st.integers(0, 2**32 - 1))
+def test_always_any_gap_load_moment_and_skin_converge(law, scale, stiff, thin, angle, rough_size, jagged, place, rigid,
+                                                      seed):
+    c, x, weight = bodies(40)
+    c = 0 * c if rigid else c
+    rng = np.random.default_rng(seed)
+    gap = 10**angle * x + (10**rough_size * rng.normal(size=x.size) if jagged else rough(rng, x, 10**rough_size))
+    skin = {"linear": LinearSkin(10**stiff), "exponential": ExponentialSkin(10**thin),
+            "hertz": replace(PEAKS, deviation=10**thin)}[law]
+    load = LOAD * 10**scale
+    moment = None if place is None else place * LENGTH * load
+    holds(skin, c, x, weight, gap, solve(skin, c, x, weight, gap, load, moment), load, moment)
+
+
+@settings(max_examples=40, deadline=None)
+@given(depth=st.floats(-9, -5), sign=st.sampled_from([-1, 1]), seed=st.integers(0, 2**32 - 1),
+       law=st.sampled_from(["linear", "exponential", "hertz"]))
+def test_always_any_approach_is_answered(depth, sign, seed, law):
+    c, x, weight = bodies(40)
+    gap = 1e-6 * np.random.default_rng(seed).normal(size=x.size)
+    skin = {**SKINS, "exponential": ExponentialSkin(1e-8, 1e6)}[law]
+    state = solve(skin, c, x, weight, gap, approach=gap.min() + sign * 10**depth)
+    assert state.force.min() >= 0 and max(state.residuals.values()) <= LIMIT
+    assert (state.outcome is Outcome.DONE) == (state.load > 0)
+
+
+def test_exact_softened_laws_lead_to_the_same_answer():
+    from patchfem.contact.skin import _softening
+
+    c, x, weight = bodies(40)
+    gap = 1e-5 * np.random.default_rng(9).normal(size=x.size)
+    for skin in (ExponentialSkin(1e-8, MEAN), replace(PEAKS, deviation=1e-8)):
+        for moment in (None, 2e-3 * LOAD):
+            target = np.array([LOAD] if moment is None else [LOAD, moment])
+            there = _softening(skin, c, x, weight, gap, target, 60)
+            assert there is not None
+            here = solve(skin, c, x, weight, gap, LOAD, moment)
+            assert np.abs(there[0] - here.force).max() <= 1e-9 * LOAD
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+@each_skin
+def test_exact_zero_load_and_an_open_skin_carry_nothing(skin):
+    c, x, weight = bodies(40)
+    state = solve(skin, c, x, weight, 1e-6 + 1e-5 * np.abs(x), 0.0)
+    assert state.outcome is Outcome.NO_CONTACT and not state.force.any() and not state.stiffness.any()
+    away = solve(skin, c, x, weight, 0 * x, approach=-1e-3)
+    assert away.outcome is Outcome.NO_CONTACT and away.load == 0 and tangent(c, weight, away.stiffness) == 0
+
+
+def test_refuses_controls_without_an_answer():
+    c, x, weight = bodies(40)
+    for control in ({}, {"load": 1.0, "approach": 1e-6}, {"approach": 1e-6, "moment": 0.0}):
+        with pytest.raises(PatchfemError, match="give a load"):
+            solve(PEAKS, c, x, weight, 0 * x, **control)
+    for load in (-1.0, np.nan, np.inf):
+        with pytest.raises(PatchfemError, match=r"contact\.load"):
+            solve(PEAKS, c, x, weight, 0 * x, load)
+    with pytest.raises(PatchfemError, match="tips over"):
+        solve(PEAKS, c, x, weight, 0 * x, LOAD, 0.5 * LENGTH * LOAD)
+    with pytest.raises(PatchfemError, match="no first touch"):
+        solve(ExponentialSkin(1e-6), c, x, weight, 0 * x, approach=1e-6)
+    with pytest.raises(PatchfemError, match="more than any number"):
+        solve(ExponentialSkin(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
+
+
+def test_refuses_an_answer_that_did_not_settle():
+    c, x, weight = bodies(40)
+    with pytest.raises(NotConverged, match=r"contact\.asperities"):
+        solve(PEAKS, c, x, weight, 1e-4 * x, LOAD, limit=1)
+
+
+def test_always_the_independent_check_sees_a_wrong_force():
+    c, x, weight = bodies(40)
+    for skin in SKINS.values():
+        state = solve(skin, c, x, weight, 1e-5 * x, LOAD)
+        wrong = state.force.copy()
+        wrong[3], wrong[4] = wrong[3] * 1.001, wrong[4] - 0.001 * wrong[3]
+        checks = residuals(skin, c, x, weight, 1e-5 * x, wrong, state.delta, 0.0, LOAD)
+        assert checks["law"] > LIMIT and checks["force_balance"] < LIMIT
