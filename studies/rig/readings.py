@@ -1,7 +1,7 @@
 """What does the printed law change on the rig, against its passive reading?
 
-Over 20 cycles at 143 Hz and 5 g with a rigid slide the printed law holds the block tighter: amplitude 11.69 ± 0.03 um
-against 14.69 ± 0.02 um, loop area 1.694 ± 0.005 mJ against 2.195 ± 0.003 mJ. At a reversal the printed direction u/|u|
+Over 20 cycles at 143 Hz and 5 g with a rigid slide the printed law holds the block tighter: amplitude 11.69 ± 0.06 um
+against 14.69 ± 0.06 um, loop area 1.69 ± 0.01 mJ against 2.195 ± 0.008 mJ. At a reversal the printed direction u/|u|
 flips bond by bond, which makes the interface stiffer than mu_s N/eps_0.
 
 Run: python studies/rig/readings.py

@@ -3,8 +3,8 @@
 A tilt of 0.1 mrad leaves 22 % of the patch in contact and 1 mrad 3 %. The patch's shear stiffness falls from 4.05e8 to
 2.30e8 and 1.22e8 N/m, and half of the friction has given way after 95, 213 and 301 nm of slide: always far below the
 micrometre of the bonds and the micrometres of the motion. So the rig at 5 g hardly notices: its amplitude falls from
-15.32 ± 0.02 um to 14.81 ± 0.02 and 14.25 ± 0.02 um, its loop area from 2.043 ± 0.004 mJ to 1.962 ± 0.003 and
-1.872 ± 0.003 mJ.
+15.32 ± 0.04 um to 14.81 ± 0.04 and 14.25 ± 0.05 um, its loop area from 2.043 ± 0.006 mJ to 1.962 ± 0.006 and
+1.872 ± 0.008 mJ.
 
 Run: python studies/rig/tilt.py
 """
