@@ -68,8 +68,10 @@ def _loose(result: Result) -> list:
             if m.error is not None and m.error > tolerance * abs(m.value) + m.floor]
     if not wide:
         return []
-    return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; lower "
-            "contact.element_size or raise accuracy.steps_per_cycle"]
+    remedies = ["lower contact.element_size"] if result.plan.scene.contact is not None else []
+    remedies += ["raise accuracy.steps_per_cycle"] if result.plan.kind in ("rig", "bench") else []
+    return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; "
+            f"{' or '.join(remedies)}"]
 
 
 def _strained(scene, patch) -> list:
@@ -182,7 +184,8 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
                                         estimate)
         extra |= {"steps_per_cycle": settings.steps, "iterations": raw.book["iterations"]}
-    outcome, found = rig.settle(raw, _without_errors(found, estimate), scene.accuracy.tolerance)
+    estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
+    outcome, found = rig.settle(raw, _without_errors(found, estimated), scene.accuracy.tolerance)
     fields = {}
     if patch is not None:
         from .simulate_patch import measures
@@ -238,8 +241,7 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
         seconds["error"] += rough.seconds
         if scene.friction.law == "nonlocal":
             kept = quarter.model.reduction.stiffness.size
-            pinned = replace(few, shear_modes=max(1, kept // 2), pinned=settings.pinned | {"shear_modes"})
-            fewer = rig.run_march(scene, pinned, modes, drive, patch)
+            fewer = rig.run_march(scene, replace(few, shear_modes=max(1, kept // 2)), modes, drive, patch)
             out.append(change(quarter.values, fewer.values))
             seconds["error"] += fewer.seconds
     return out

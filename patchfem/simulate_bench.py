@@ -263,15 +263,14 @@ def point_fields(patch, law: Bonds, shear, states) -> tuple:
 def _points(scene, patch, time, slide, frames, say):
     """Bond points behind the shear modes of the pieces, by the compiled hub along the given slide."""
     from .compiled import load_kernels
-    from .contact.slip import shear_modes
     from .simulate_march import GOAL, points_model
+    from .simulate_patch import shear_of
 
     law = bonds_of(scene)
     if law.reading != "stretch" or law.order != 1:
         raise PatchfemError(f"{scene.path}: [contact.shear] with order = {law.order:g}: not yet built; use order = 1")
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-    shear = shear_modes(patch.pieces.tangential, law.static * sigma * weight, law.length,
-                        scene.accuracy.shear_modes or 8, 1 / law.ratio if law.ratio > 0 else np.inf)
+    shear = shear_of(patch, law, scene.accuracy.shear_modes, scene.accuracy.tolerance)
     model = points_model(law, weight, sigma, shear)
     hub = load_kernels(say)
     contact, work_arrays = model.build(hub)

@@ -43,8 +43,8 @@ def effects_of(result: Result) -> list:
         seconds = 0.0
         if patch is not None and name == "contact":
             seconds = sum(patch.seconds.get(k, 0.0) for k in ("assemble", "condense", "press"))
-        elif patch is not None and name in ("contact.tilt", "contact.crown"):
-            seconds = patch.seconds.get(name.removeprefix("contact."), 0.0)
+        elif patch is not None and name.removeprefix("contact.") in patch.seconds:
+            seconds = patch.seconds[name.removeprefix("contact.")]
         elif name == "contact.shear":
             seconds = result.seconds.get("reduce", 0.0)
         elif name.startswith("friction.law=") or (name == "structure" and result.plan.kind == "linear"):
@@ -151,6 +151,8 @@ def _write_fields(result: Result, path: Path) -> dict:
 
 def _body(patch, fields: dict, side: str) -> dict:
     """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface."""
+    from .contact.elasticity import von_mises
+
     lower = side == "lower"
     piece, grid = (patch.piece, patch.grid) if lower else (patch.upper, patch.upper_grid)
     sign = -1.0 if lower else 1.0
@@ -169,7 +171,7 @@ def _body(patch, fields: dict, side: str) -> dict:
     blocks = [block if not lower else block[:, ::-1] for block in blocks]
     return {"points": points * [1.0, sign], "blocks": blocks, "interface": interface, "displacement": move,
             "material": grid.is_coating if hasattr(grid, "is_coating") else piece.is_coating, "stress": stress,
-            "mises": mises(stress)}
+            "mises": von_mises(stress)}
 
 
 def _inside(piece, grid, shear, normal) -> tuple:
@@ -186,12 +188,6 @@ def _inside(piece, grid, shear, normal) -> tuple:
     u = substructure.displacement(piece, shear, normal)
     blocks = [block for block in (grid.triangles, grid.quads) if len(block)]
     return grid.points, blocks, grid.interface, u, substructure.cell_stress(piece, u)[0]
-
-
-def mises(s: np.ndarray) -> np.ndarray:
-    """Von Mises stress [Pa] of (..., 4) stresses xx, yy, zz, xy."""
-    xx, yy, zz, xy = np.moveaxis(s, -1, 0)
-    return np.sqrt(((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) / 2 + 3 * xy**2)
 
 
 def report_data(result: Result) -> dict:

@@ -14,6 +14,7 @@ from .core import Compliance, Interface, Measure, Outcome, PatchfemError, Pressu
 from .mesh.tensor import TensorGrid, coarser, graded_grid
 
 AUTOMATIC_CELLS = 200
+SHEAR_MODES = 8  # modes a shear reduction starts from
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
 
 
@@ -174,6 +175,17 @@ def asperity_compliance(asperities, weight) -> tuple:
     crush = 1 / (asperities.normal_stiffness * weight)
     ratio = asperities.tangential_ratio
     return np.diag(crush), np.diag(crush / ratio) if ratio is not None else np.zeros((weight.size, weight.size))
+
+
+def shear_of(patch: Patch, law, count: int | None, tolerance: float):
+    """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for."""
+    from .contact.slip import enough_modes, shear_modes
+
+    limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
+    weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+    if count is not None:
+        return shear_modes(patch.pieces.tangential, limit, law.length, count, weakening)
+    return enough_modes(patch.pieces.tangential, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)
 
 
 def unlike(contact) -> bool:

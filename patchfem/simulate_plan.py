@@ -126,8 +126,10 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
             each = list_cost(scene, settings, drive)[1] / steps
             unknowns["bond_list_about"] = int(list_cost(scene, settings, drive)[0])
         elif shear:
-            unknowns["shear_modes"] = settings.shear_modes
-            each = 4e-8 * unknowns.get("interface_points", 1) * (1 + settings.shear_modes / 4)
+            from .simulate_patch import SHEAR_MODES
+
+            unknowns["shear_modes"] = settings.shear_modes or SHEAR_MODES
+            each = 4e-8 * unknowns.get("interface_points", 1) * (1 + unknowns["shear_modes"] / 4)
         elif settings.per_point:
             each = 6e-8 * unknowns.get("interface_points", 1)
     elif shear:

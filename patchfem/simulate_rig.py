@@ -23,19 +23,18 @@ from .response.measures import (
 from .structure.modes import basis
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
-SHEAR_MODES = 8
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Numerical choices of a run; `pinned` names the ones the scene fixed."""
+    """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance."""
 
     engine: str
     steps: int
     cycles: float
     window: int
-    shear_modes: int
+    shear_modes: int | None
     tail: float
     merge: float
     per_point: bool
@@ -108,14 +107,14 @@ def choose(scene, per_point: bool = False) -> Settings:
     drive = drive_of(scene)
     cycles = cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
-    fastest = max((m.frequency for m in scene.structure.mode), default=drive.omega) / scene.drive.frequency
+    fastest = max(m.frequency for m in scene.structure.mode) / scene.drive.frequency
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * max(1.0, fastest)), 100, MOST_STEPS))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
     tail = accuracy.tail if accuracy.tail is not None else min(1e-3 * accuracy.tolerance, 1e-6)
     merge = accuracy.merge if accuracy.merge is not None else min(0.02, sqrt(accuracy.tolerance) / 1.6)
-    return Settings(engine, steps, cycles, window, accuracy.shear_modes or SHEAR_MODES, max(tail, 1e-15), merge,
+    return Settings(engine, steps, cycles, window, accuracy.shear_modes, max(tail, 1e-15), merge,
                     per_point or side == "lower", frozenset(pinned))
 
 
@@ -158,16 +157,11 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
 
         return hub.list_model(law, limit, cutoff(law.order, settings.tail), settings.merge)
     if shear:
-        from .contact.slip import enough_modes, shear_modes
+        from .simulate_patch import shear_of
 
-        weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-        given = (patch.pieces.tangential, law.static * sigma * weight, law.length, settings.shear_modes)
-        weakening = 1 / law.ratio if law.ratio > 0 else np.inf
-        if "shear_modes" in settings.pinned:
-            reduced = shear_modes(*given, weakening)
-        else:
-            reduced = enough_modes(*given, 0.1 * scene.accuracy.tolerance, weakening)
-        return replace(hub.points_model(law, weight, sigma, reduced), reduction=reduced)
+        reduced = shear_of(patch, law, settings.shear_modes, scene.accuracy.tolerance)
+        model = hub.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
+        return replace(model, reduction=reduced)
     if settings.per_point:
         from .simulate_patch import shape_side
 

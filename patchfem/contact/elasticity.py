@@ -108,17 +108,25 @@ def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
     along = (corner[:, :, 1] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 3]) / (2 * dx)
     inward = (corner[:, :, 3] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 1]) / (2 * dy)
     exx, eyy, exy = along[..., 0], inward[..., 1], (along[..., 1] + inward[..., 0]) / 2
-    pick = piece.is_coating.astype(int)
-    pairs = np.array([lame(*piece.layers.substrate, piece.layers.plane),
-                      lame(*piece.layers.coating, piece.layers.plane)])
-    lam, mu = pairs[pick].T
-    poisson = np.array([piece.layers.substrate[1], piece.layers.coating[1]])[pick]
+    return hooke(exx, eyy, exy, piece.is_coating, piece.layers)
+
+
+def hooke(exx, eyy, exy, is_coating, layers: Layers) -> tuple:
+    """((..., t, 4) stresses xx, yy, zz, xy [Pa], (..., t) von Mises [Pa]) of plane strains (..., t) [1]."""
+    pick = is_coating.astype(int)
+    lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[pick].T
+    poisson = np.array([layers.substrate[1], layers.coating[1]])[pick]
     sxx = lam * (exx + eyy) + 2 * mu * exx
     syy = lam * (exx + eyy) + 2 * mu * eyy
-    szz = poisson * (sxx + syy) if piece.layers.plane == "strain" else np.zeros_like(sxx)
-    sxy = 2 * mu * exy
-    mises = np.sqrt(((sxx - syy)**2 + (syy - szz)**2 + (szz - sxx)**2) / 2 + 3 * sxy**2)
-    return np.stack([sxx, syy, szz, sxy], axis=-1), mises
+    szz = poisson * (sxx + syy) if layers.plane == "strain" else np.zeros_like(sxx)
+    stress = np.stack([sxx, syy, szz, 2 * mu * exy], axis=-1)
+    return stress, von_mises(stress)
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Von Mises stress [Pa] (...,) of stresses (..., 4) as xx, yy, zz, xy."""
+    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
+    return np.sqrt(((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) / 2 + 3 * xy**2)
 
 
 def interface_compliance(piece: Piece) -> tuple:

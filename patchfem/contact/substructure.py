@@ -16,7 +16,7 @@ from skfem.helpers import ddot, sym_grad, trace
 from threadpoolctl import threadpool_limits
 
 from ..core import NotConverged, frozen_array
-from .elasticity import Layers, lame
+from .elasticity import Layers, hooke, lame
 
 LEAF = 24  # nodes below which a part is not cut any further
 RESIDUAL = 1e-8  # of a solve with random loads, relative
@@ -185,15 +185,8 @@ def cell_stress(piece: Substructure, u: np.ndarray) -> tuple:
 
     u: (frames, N, 2); triangles first. The inward axis is kept, so xy changes sign for the piece drawn at y < 0.
     """
-    mesh, layers = piece.mesh, piece.layers
+    mesh = piece.mesh
     slope = np.concatenate([np.einsum("cnj,fcni->fcij", _gradients(mesh.points[cells]), u[:, cells])
                             for cells in (mesh.triangles, mesh.quads) if len(cells)], axis=1)
-    pick = mesh.is_coating.astype(int)
-    lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[pick].T
-    poisson = np.array([layers.substrate[1], layers.coating[1]])[pick]
-    volume = lam * (slope[..., 0, 0] + slope[..., 1, 1])
-    sxx, syy = volume + 2 * mu * slope[..., 0, 0], volume + 2 * mu * slope[..., 1, 1]
-    szz = poisson * (sxx + syy) if layers.plane == "strain" else np.zeros_like(sxx)
-    sxy = mu * (slope[..., 0, 1] + slope[..., 1, 0])
-    mises = np.sqrt(((sxx - syy)**2 + (syy - szz)**2 + (szz - sxx)**2) / 2 + 3 * sxy**2)
-    return np.stack([sxx, syy, szz, sxy], axis=-1), mises
+    shear = (slope[..., 0, 1] + slope[..., 1, 0]) / 2
+    return hooke(slope[..., 0, 0], slope[..., 1, 1], shear, mesh.is_coating, piece.layers)
