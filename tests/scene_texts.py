@@ -52,6 +52,20 @@ kind = "triangle"
 amplitude = "10 um"
 speed = "5 mm/s"
 """
+STRUCTURE = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 30
+"""
 LINEAR = RIG[RIG.index("[structure]") :]
 PATCH = RIG[RIG.index("[contact]") : RIG.index("[friction]")]
 

@@ -10,32 +10,16 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from scene_texts import STRUCTURE
 
 import patchfem
 from patchfem import compiled
 
-SCENE = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "elastic-plastic"
-static = 0.3
-bond_length = "1 um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 4
-[accuracy]
-steps_per_cycle = 100
-"""
+SCENE = (
+    '[normal]\nload = "26 lbf"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n'
+    + STRUCTURE.replace("cycles = 30", "cycles = 4")
+    + "[accuracy]\nsteps_per_cycle = 100\n"
+)
 MARCH = """\
 import json, sys
 import patchfem.simulate as simulate

@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 
 import pytest
+from scene_texts import STRUCTURE
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = """\
@@ -23,20 +24,6 @@ material = "WC-Co"
 thickness = "6 mil"
 [contact.tilt]
 angle = "0.1 mrad"
-"""
-STRUCTURE = """\
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
 """
 POINT = """\
 [normal]

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from scene_texts import STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -46,20 +47,6 @@ POINT = '[normal]\nload = "26 lbf"\n'
 COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
 SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
-STRUCTURE = """\
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
-"""
 STEPS = "[accuracy]\nsteps_per_cycle = 200\n"
 SCENES = {
     "patch": PATCH, "bench": POINT + COULOMB + SLIDE, "bench patch": PATCH + SHEAR + COULOMB + SLIDE + STEPS,
