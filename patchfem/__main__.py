@@ -55,7 +55,8 @@ def plan(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(na
     found = make(_scene(scene, set_))
     answer = found.as_json()
     if probe and found.scene.contact is not None:
-        from .simulate_patch import solve_all, values
+        from .simulate_measures import values
+        from .simulate_patch import solve_all
 
         solved = values(solve_all(found.scene, False)[0])
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] \
@@ -157,7 +158,7 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     if found.contact is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
-    from .simulate_patch import bodies_of, unlike
+    from .simulate_bodies import bodies_of, unlike
 
     if unlike(found.contact):
         raise Refused(f"{scene}: contact.upper, contact.lower: a mesh of unlike pieces is not yet built")

@@ -26,6 +26,10 @@ EFFECTS = {
     "contact.holder": Effect("", "sum f x = N offset + K theta"),
     "contact.step": Effect("patchfem.contact.gaps", "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
+    "contact.asperities.law=exponential": Effect("patchfem.contact.skin", "f = A p_0 exp(-s/u_0), s = g + theta x - "
+                                                 "delta + C f"),
+    "contact.asperities.law=hertz": Effect("patchfem.contact.skin", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) "
+                                           "dz"),
     "contact.tilt": Effect("patchfem.contact.gaps", "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect("patchfem.contact.gaps", "g += x^2/(2 radius)"),
@@ -53,7 +57,7 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "contact.profile", "contact.asperities.law=exponential", "contact.asperities.law=hertz", "contact.strips",
+    "contact.profile", "contact.strips",
     "friction.law=tanh", "friction.law=convolution", "friction.temperature", "slide.kind=dwell", "slide.kind=file",
     "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
     "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 NOT_YET_BUILT: dict[str, str] = {
     "contact.holder.tangential_stiffness": "",
     "contact.profile": "",
-    "contact.asperities.law=exponential": "linear",
-    "contact.asperities.law=hertz": "linear",
     "contact.strips": "",
     "normal.amplitude": "",
     "normal.frequency": "",
@@ -88,7 +86,7 @@ def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
 def combinations(draft: Draft, kind: str) -> None:
     """Say every combination of built keys that a run of this kind cannot do yet; silent about values not there."""
     contact, law, accuracy = draft.tables.contact, draft.tables.friction, draft.tables.accuracy
-    shear = contact is not None and contact.shear is not None
+    shear = contact.gives_way if contact is not None else ""
     if kind == "linear" and accuracy and accuracy.method == "march":
         draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
     if contact is not None:
@@ -96,7 +94,7 @@ def combinations(draft: Draft, kind: str) -> None:
     if kind not in ("bench", "rig") or law is None:
         return
     if shear:
-        _behind_shear(draft, law)
+        _behind_shear(draft, law, shear)
     elif kind == "rig" and law.law == "nonlocal" and law.reading == "report" and _inside(law.order, -1, 0):
         draft.say("friction.order", f"{law.order:g} in a rig: use order >= 0 or a bench, [slide]; not yet built")
     if contact is not None:
@@ -114,19 +112,19 @@ def _approach(draft: Draft, contact: Contact) -> None:
                 draft.say(f"contact.{name}", "beside contact.mesh: leave mesh out; not yet built")
 
 
-def _behind_shear(draft: Draft, law: Friction) -> None:
+def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
     least = -1 if law.reading == "report" else 0
     if law.law == "nonlocal" and law.order != 1 and (law.order == 0 or _inside(law.order, least)):
-        draft.say("friction.order", f"{law.order:g} beside [contact.shear]: use order = 1; not yet built")
+        draft.say("friction.order", f"{law.order:g} beside {shear}: use order = 1; not yet built")
     if law.law == "coulomb" and law.static is not None and _inside(law.kinetic, -1, law.static):
-        draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside [contact.shear]: leave "
-                                      "kinetic out; not yet built")  # fmt: skip
+        draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside {shear}: leave kinetic "
+                                      "out; not yet built")  # fmt: skip
 
 
-def _only_on_upper(kind: str, law: Friction, shear: bool) -> str:
+def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
     """What keeps the pressure of such a run on the upper piece; empty where it may lie on the lower one as well."""
     if shear:
-        return "beside [contact.shear]"
+        return f"beside {shear}"
     if kind == "bench":
         return ""
     if law.law in ("coulomb", "elastic-plastic"):

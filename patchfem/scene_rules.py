@@ -176,11 +176,11 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         wanted = ">= 0 (reading 'stretch')" if law.reading == "stretch" else "> -1 (reading 'report')"
         draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
     contact = draft.tables.contact
-    if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.shear:
-        draft.say(f"{at}.reading", "'report' is refused beside [contact.shear]; use 'stretch' or leave out the shear")
-    if law.static == 0 and contact and contact.shear:
-        draft.say(f"{at}.static", "0 beside [contact.shear]: no point carries friction; static > 0 is wanted, or leave "
-                                  "out [contact.shear]")  # fmt: skip
+    if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.gives_way:
+        draft.say(f"{at}.reading", f"'report' is refused beside {contact.gives_way}; use 'stretch' or leave it out")
+    if law.static == 0 and contact and contact.gives_way:
+        draft.say(f"{at}.static", f"0 beside {contact.gives_way}: no point carries friction; static > 0 is wanted, or "
+                                  f"leave out {contact.gives_way}")  # fmt: skip
 
 
 def kinetic_unused(law: Friction) -> bool:
@@ -322,9 +322,9 @@ def _method(draft: Draft, kind: str) -> None:
         draft.remark(f"accuracy.method = '{method}' has no meaning in a {kind} scene and is not used")
     if method != "exact" or kind != "rig" or law is None or law.law is None:
         return
-    shear = contact is not None and contact.shear is not None
+    shear = contact.gives_way if contact is not None else ""
     if law.law != "coulomb" or shear:
-        beside = " beside [contact.shear]" if shear else ""
+        beside = f" beside {shear}" if shear else ""
         draft.say("accuracy.method", f"no exact solution exists for law '{law.law}'{beside}; use 'march' or leave "
                                      "method out")  # fmt: skip
 

@@ -160,6 +160,14 @@ class Contact(Table):
     shear: Shear | None = None
     strips: Strips | None = None
 
+    @property
+    def gives_way(self) -> str:
+        """What lets the patch slip part by part under one slide of the holders, as written; empty where nothing."""
+        if self.shear is not None:
+            return "[contact.shear]"
+        soft = self.asperities is not None and self.asperities.tangential_ratio is not None
+        return "contact.asperities.tangential_ratio" if soft else ""
+
 
 class Normal(Table):
     """A normal load on a single point, with an optional oscillation."""

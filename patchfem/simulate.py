@@ -45,9 +45,9 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
         patch, *coarse = solve_all(scene, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         warnings += _strained(scene, patch)
-        if patch.coupling > 0.02:
+        if patch.pair.coupling > 0.02:
             warnings.append("the pieces are unlike: what shear does to the normal closing, and the load to the slide, "
-                            f"is left out; it is {patch.coupling:.2g} of what shear does to the slide")
+                            f"is left out; it is {patch.pair.coupling:.2g} of what shear does to the slide")
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = _static(what, patch, coarse, seconds, warnings)
@@ -95,13 +95,14 @@ def _overhang(scene, fine) -> list:
 
 
 def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
-    from .simulate_patch import measures
+    from .simulate_measures import measures, plane_band
 
-    p = patch.pressure
+    p, extra = patch.pressure, {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    return Result(what, p.outcome, measures(patch, *coarse), None, None, patch, _still(patch), seconds, warnings,
-                  {"residuals": dict(p.residuals), "iterations": p.iterations})
+    elif coarse[-1] is not None and what.kind == "patch":
+        warnings = [*warnings, *plane_band(what.scene, coarse[-1])]
+    return Result(what, p.outcome, measures(patch, *coarse), None, None, patch, _still(patch), seconds, warnings, extra)
 
 
 def _still(patch) -> dict:
@@ -151,7 +152,7 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     found = with_errors(fine.values, *others, least=1e-10)
     fields = {}
     if patch is not None:
-        from .simulate_patch import measures
+        from .simulate_measures import measures
 
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         warnings = warnings + _overhang(scene, fine)
@@ -171,7 +172,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     scene = what.scene
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
-    if patch is not None and scene.contact.shear is None and not settings.per_point:
+    if patch is not None and not scene.contact.gives_way and not settings.per_point:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
@@ -188,7 +189,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     outcome, found = rig.settle(raw, _without_errors(found, estimated), scene.accuracy.tolerance)
     fields = {}
     if patch is not None:
-        from .simulate_patch import measures
+        from .simulate_measures import measures
 
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         fields = _rig_fields(scene, settings, patch, raw, drive)
@@ -235,7 +236,7 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
 
     out = []
     few = replace(settings, steps=max(1, settings.steps // 4))
-    if coarse[0] is not None and scene.contact.shear is not None:
+    if coarse[0] is not None and scene.contact.gives_way:
         rough = rig.run_march(scene, few, modes, drive, coarse[0])
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
@@ -261,7 +262,7 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
         return _fields(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
-    shear = scene.contact.shear is not None
+    shear = bool(scene.contact.gives_way)
     if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or settings.per_point):
         law = rig.law_of(scene, drive.acceleration / drive.omega)
         tau, local = bench.point_fields(patch, law, raw.model.reduction, [(s["slide"], s["bonds"]) for s in shots])

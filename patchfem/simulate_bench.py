@@ -105,7 +105,7 @@ def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
     """Slide the interface of a scene along its path with `steps` per cycle; patch None for [normal]."""
     begin = perf_counter()
     time, slide, first, omega = path_of(scene.slide, steps)
-    if scene.contact is not None and scene.contact.shear is not None:
+    if scene.contact is not None and scene.contact.gives_way:
         out = _with_shear(scene, patch, time, slide, frames, say)
     else:
         out = _rigid(scene, patch, time, slide, frames)
@@ -149,7 +149,7 @@ def _rigid(scene, patch, time, slide, frames):
     else:
         from .simulate_patch import shape_side
 
-        x, weight, at_rest = patch.grid.x, patch.pieces.interface.weight, patch.pressure.sigma_n
+        x, weight, at_rest = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
         lower = shape_side(scene.contact) == "lower"
     _refuse_costly(scene, law, time.size, weight.size, slide)
 
@@ -195,8 +195,8 @@ def _with_shear(scene, patch, time, slide, frames, say):
     from .simulate_patch import shape_side
 
     if shape_side(scene.contact) == "lower":
-        raise PatchfemError(f"{scene.path}: [contact.shear] with the pressure on the lower piece: not yet built; "
-                            "put the shapes on the upper piece")
+        raise PatchfemError(f"{scene.path}: {scene.contact.gives_way} with the pressure on the lower piece: not "
+                            "yet built; put the shapes on the upper piece")
     if scene.friction.law == "nonlocal":
         return _points(scene, patch, time, slide, frames, say)
     return _elements(scene, patch, time, slide, frames)
@@ -209,8 +209,9 @@ def _elements(scene, patch, time, slide, frames):
     f = scene.friction
     per_node = patch.pressure.sigma_n * patch.pieces.interface.weight
     if f.law == "coulomb" and f.kinetic < f.static:
-        raise PatchfemError(f"{scene.path}: friction.kinetic below static with [contact.shear]: not yet built")
-    found = jenkins_set(patch.pieces.tangential, f.static * per_node,
+        raise PatchfemError(f"{scene.path}: friction.kinetic below static with {scene.contact.gives_way}: not yet "
+                            "built")
+    found = jenkins_set(patch.giving, f.static * per_node,
                         f.bond_length if f.law == "elastic-plastic" else 0.0)
     k, limit = found.stiffness, found.yield_slide
     stretch = np.zeros(k.size)
@@ -236,20 +237,20 @@ def _elements(scene, patch, time, slide, frames):
 
 def element_fields(patch, found, states, length: float) -> tuple:
     """(traction, irreversible local slip), both (f, m), of a Jenkins set in states [(slide, stretch), ...]."""
-    m, weight = patch.grid.x.size, patch.pieces.interface.weight
+    m, weight = patch.x.size, patch.pieces.interface.weight
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
     for i, (slide, stretch) in enumerate(states):
         force = np.zeros(m)
         force[found.points] = found.share @ stretch
         tau[i] = force / weight
-        local[i] = slide - patch.pieces.tangential @ force
+        local[i] = slide - patch.giving @ force
         local[i, found.points] -= length * force[found.points] / found.limit
     return tau, local
 
 
 def point_fields(patch, law: Bonds, shear, states) -> tuple:
     """(traction, irreversible local slip), both (f, m), of bond points in states [(slide, bonds (4, a)), ...]."""
-    m = patch.grid.x.size
+    m = patch.x.size
     index = np.arange(m) if shear is None else shear.points
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
     for i, (slide, bonds) in enumerate(states):
@@ -268,7 +269,8 @@ def _points(scene, patch, time, slide, frames, say):
 
     law = bonds_of(scene)
     if law.reading != "stretch" or law.order != 1:
-        raise PatchfemError(f"{scene.path}: [contact.shear] with order = {law.order:g}: not yet built; use order = 1")
+        raise PatchfemError(f"{scene.path}: {scene.contact.gives_way} with order = {law.order:g}: not yet built; "
+                            "use order = 1")
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     shear = shear_of(patch, law, scene.accuracy.shear_modes, scene.accuracy.tolerance)
     model = points_model(law, weight, sigma, shear)

@@ -85,7 +85,7 @@ def resolved(scene) -> str:
     """The scene in SI with every default written out, also those that follow from other keys."""
     contact, friction = scene.contact, scene.friction
     if contact is not None and contact.element_size is None and contact.mesh is None:
-        from .simulate_patch import AUTOMATIC_CELLS
+        from .simulate_bodies import AUTOMATIC_CELLS
 
         contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
@@ -122,7 +122,7 @@ def _write_netcdf(result: Result, path: Path, text: str) -> None:
 
     histories, modal = _histories(result)
     patch = result.patch
-    x, weight = (patch.grid.x, patch.pieces.interface.weight) if patch is not None else (None, None)
+    x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
     write(dataset(histories, modal, fields, x, weight), path, summary_of(result), text, versions())
 
@@ -142,10 +142,10 @@ def _write_fields(result: Result, path: Path) -> dict:
              "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1"}
     used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
     write_series(path, points, blocks, times, point_data, cell_data, used)
-    if not isinstance(patch.piece, Piece):
+    if not isinstance(patch.pair.piece, Piece):
         return {}
-    shape = (patch.grid.x.size - 1, -1)
-    return {"depth": (patch.grid.depth, patch.upper_grid.depth),
+    shape = (patch.x.size - 1, -1)
+    return {"depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
             "mises": [body["mises"][0].reshape(shape) for body in (low, high)]}
 
 
@@ -154,7 +154,7 @@ def _body(patch, fields: dict, side: str) -> dict:
     from .contact.elasticity import von_mises
 
     lower = side == "lower"
-    piece, grid = (patch.piece, patch.grid) if lower else (patch.upper, patch.upper_grid)
+    piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
     sign = -1.0 if lower else 1.0
     force = patch.pieces.interface.weight / patch.pieces.interface.width
     tau = fields.get("shear_stress", np.zeros((len(fields["time"]), force.size)))
@@ -195,7 +195,7 @@ def report_data(result: Result) -> dict:
     scene, r, w = result.plan.scene, result.response, result.window
     data = {"name": scene.path.stem, "summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
             "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
-            "x": None if result.patch is None else result.patch.grid.x, "versions": versions()}
+            "x": None if result.patch is None else result.patch.x, "versions": versions()}
     if r is not None:
         slow = result.plan.kind == "bench"
         data["history"] = {"time": r.time, "displacement": r.slide if slow else r.output, "force": r.force}

@@ -64,7 +64,7 @@ def _sizes(scene) -> tuple:
     unknowns, chain = {}, {}
     contact = scene.contact
     if contact is not None:
-        from .simulate_patch import AUTOMATIC_CELLS
+        from .simulate_bodies import AUTOMATIC_CELLS
 
         size = contact.element_size or contact.length / AUTOMATIC_CELLS
         points = round(contact.length / size) + 1
@@ -78,12 +78,15 @@ def _sizes(scene) -> tuple:
         chain["pieces_shear"] = block_shear(contact)
     else:
         chain["pieces_shear"] = "rigid"
-    skin = contact.asperities if contact is not None else None
-    soft = skin is not None and skin.tangential_ratio is not None
-    chain["asperities"] = skin.tangential_ratio * skin.normal_stiffness * contact.length * contact.width \
-        * contact.pairs if soft else "rigid"
     f = scene.friction
     load = nominal_load(scene)
+    skin = contact.asperities if contact is not None else None
+    chain["asperities"] = "rigid"
+    if skin is not None and skin.tangential_ratio is not None:
+        from .simulate_skin import mean_stiffness
+
+        area = contact.length * contact.width * contact.pairs
+        chain["asperities"] = skin.tangential_ratio * mean_stiffness(contact, load / area) * area
     if f is not None and load > 0:
         chain["bonds"] = f.static * load / f.bond_length if f.bond_length else "rigid until it slips"
     return unknowns, chain
@@ -119,7 +122,7 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
     if settings.engine == "exact":
         return "exact", int(4 * settings.cycles), 2e-4 * 4 * settings.cycles * len(scene.structure.mode)
     steps = int(settings.cycles * settings.steps)
-    f, shear = scene.friction, scene.contact is not None and scene.contact.shear is not None
+    f, shear = scene.friction, scene.contact is not None and bool(scene.contact.gives_way)
     each = 1e-6
     if f is not None and f.law == "nonlocal":
         if f.reading == "report" or f.order != 1:

@@ -91,7 +91,7 @@ def law_of(scene, speed: float) -> Bonds:
 def choose(scene, per_point: bool = False) -> Settings:
     """Engine and numerical settings from the scene; PatchfemError for a method that cannot do it."""
     accuracy, f, contact = scene.accuracy, scene.friction, scene.contact
-    shear = contact is not None and contact.shear is not None
+    shear = contact.gives_way if contact is not None else ""
     closed = f is None or (f.law == "coulomb" and not shear)
     side = "upper"
     if contact is not None:
@@ -100,7 +100,7 @@ def choose(scene, per_point: bool = False) -> Settings:
         side = shape_side(contact)
     if accuracy.method == "exact" and not closed:
         raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
-                            f"{' with [contact.shear]' if shear else ''}; use method = \"march\"")
+                            f"{f' with {shear}' if shear else ''}; use method = \"march\"")
     engine = "exact" if closed and accuracy.method != "march" else "march"
     if engine == "march" and f is not None:
         _refuse(scene, shear, side)
@@ -118,15 +118,15 @@ def choose(scene, per_point: bool = False) -> Settings:
                     per_point or side == "lower", frozenset(pinned))
 
 
-def _refuse(scene, shear: bool, side: str) -> None:
+def _refuse(scene, shear: str, side: str) -> None:
     f = scene.friction
     recursion = f.law == "nonlocal" and f.reading == "stretch" and f.order == 1
     if side == "lower" and (shear or not recursion):
-        what = "[contact.shear]" if shear else f"law '{f.law}' other than the stretch reading with order = 1"
+        what = shear if shear else f"law '{f.law}' other than the stretch reading with order = 1"
         raise PatchfemError(f"{scene.path}: pressure on the lower piece with {what} in the rig: not yet built; "
                             "put the shapes on the upper piece")
     if shear and f.law == "nonlocal" and not recursion:
-        raise PatchfemError(f"{scene.path}: [contact.shear] with order = {f.order:g}: not yet built; use order = 1")
+        raise PatchfemError(f"{scene.path}: {shear} with order = {f.order:g}: not yet built; use order = 1")
 
 
 def contact_model(scene, settings: Settings, patch, drive: BaseSine):
@@ -136,7 +136,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     f, contact = scene.friction, scene.contact
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
-    shear = contact is not None and contact.shear is not None
+    shear = contact.gives_way if contact is not None else ""
     if f.law in ("coulomb", "elastic-plastic"):
         length = f.bond_length if f.law == "elastic-plastic" else 0.0
         if shear:
@@ -144,9 +144,9 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
 
             per_node = patch.pressure.sigma_n * patch.pieces.interface.weight
             if f.law == "coulomb" and f.kinetic < f.static:
-                raise PatchfemError(f"{scene.path}: friction.kinetic below static with [contact.shear]: not yet "
+                raise PatchfemError(f"{scene.path}: friction.kinetic below static with {shear}: not yet "
                                     "built; the exact set of elements needs static = kinetic")
-            found = jenkins_set(patch.pieces.tangential, f.static * per_node, length)
+            found = jenkins_set(patch.giving, f.static * per_node, length)
             return replace(hub.jenkins_model(found.stiffness, found.yield_slide), reduction=found)
         if f.law == "coulomb":
             return hub.coulomb_model(limit, f.kinetic * load)
@@ -165,7 +165,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     if settings.per_point:
         from .simulate_patch import shape_side
 
-        x, weight, sigma = patch.grid.x, patch.pieces.interface.weight, patch.pressure.sigma_n
+        x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
         pattern = (x, sigma) if shape_side(contact) == "lower" else None
         return hub.points_model(law, weight, sigma, None, pattern)
     return hub.points_model(law, [1.0], [load])

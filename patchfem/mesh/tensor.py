@@ -1,4 +1,4 @@
-"""One coated piece as a graded tensor grid: uniform columns along the interface, rows growing with depth.
+"""One coated piece as a graded tensor grid: columns along the interface, rows growing with depth.
 
 Both pieces of a pair share the columns, so their interface nodes match and every shape of the surfaces lives in
 the gap g(x), never in the mesh.
@@ -73,6 +73,26 @@ def graded_rows(start: float, total: float, growth: float = GROWTH, least: int =
     return rows * (total / rows.sum())
 
 
+def graded_depth(height: float, first: float, coating: float = 0.0, growth: float = GROWTH,
+                 least: int = COATING_ROWS) -> tuple:
+    """((ny,) depths [m], rows in the coating): rows from about `first` on, at least `least` of them in the coating.
+
+    PatchfemError when the coating fills the height.
+    """
+    if coating >= height:
+        raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in {height:.6g} m")
+    rows = np.empty(0)
+    if coating > 0:
+        rows = graded_rows(min(first, coating / least), coating, growth, least)
+        first = rows[-1] * growth
+    under = graded_rows(first, height - coating, growth, 3)
+    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
+    if coating > 0:
+        depth[rows.size] = coating
+    depth[-1] = height
+    return frozen_array(depth), int(rows.size)
+
+
 def graded_grid(length: float, height: float, element_size: float, coating: float = 0.0,
                 growth: float = GROWTH) -> TensorGrid:
     """Grid of one piece [m]: cells of `element_size` (or just below) along x, at least 4 rows in the coating.
@@ -81,24 +101,44 @@ def graded_grid(length: float, height: float, element_size: float, coating: floa
     """
     if element_size > length * (1 + 1e-12):
         raise PatchfemError(f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m")
-    if coating >= height:
-        raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in {height:.6g} m")
     cells = max(2, ceil(length / element_size - 1e-9))
-    x = np.linspace(-length / 2, length / 2, cells + 1)
-    first = length / cells
-    rows = np.empty(0)
-    if coating > 0:
-        rows = graded_rows(min(first, coating / COATING_ROWS), coating, growth, COATING_ROWS)
-        first = rows[-1] * growth
-    under = graded_rows(first, height - coating, growth, 3)
-    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
-    if coating > 0:
-        depth[rows.size] = coating
-    depth[-1] = height
-    return TensorGrid(frozen_array(x), frozen_array(depth), int(rows.size))
+    depth, rows = graded_depth(height, length / cells, coating, growth)
+    return TensorGrid(frozen_array(np.linspace(-length / 2, length / 2, cells + 1)), depth, rows)
 
 
 def coarser(grid: TensorGrid) -> TensorGrid:
-    """The same piece with half as many columns and rows re-graded from twice the element size."""
-    size = 2 * grid.length / (grid.x.size - 1)
-    return graded_grid(grid.length, grid.height, min(size, grid.length / 2), grid.coating)
+    """The same piece with its cells merged two by two in both directions; a single one that is left over stays."""
+    nx, coat = grid.x.size - 1, grid.coating_rows
+    if nx % 2:
+        x = np.linspace(grid.x[0], grid.x[-1], nx // 2 + 2)
+    else:
+        x = grid.x[::2]
+    coated, under = _every_second(grid.depth[:coat + 1]), _every_second(grid.depth[coat:])
+    return TensorGrid(frozen_array(x), frozen_array(np.concatenate([coated, under[1:]])), coated.size - 1)
+
+
+def _every_second(levels) -> np.ndarray:
+    return levels[::2] if levels.size % 2 else np.concatenate([levels[:-1:2], levels[-1:]])
+
+
+def finer(grid: TensorGrid) -> TensorGrid:
+    """The same piece with every cell split in two in both directions, so that the grading goes on smoothly."""
+    coat = grid.coating_rows
+    coated, under = _split(grid.depth[:coat + 1]), _split(grid.depth[coat:])
+    return TensorGrid(frozen_array(_split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat)
+
+
+def _split(levels) -> np.ndarray:
+    """Levels with one more inside each cell, nearer to the shorter neighbour: a geometric series stays one."""
+    if levels.size < 2:
+        return levels
+    cells = np.diff(levels)
+    ratio = np.ones(cells.size)
+    if cells.size > 1:
+        inner = cells[2:] / cells[:-2]
+        ratio[1:-1] = np.sqrt(inner)
+        ratio[0], ratio[-1] = cells[1] / cells[0], cells[-1] / cells[-2]
+    out = np.empty(2 * levels.size - 1)
+    out[::2] = levels
+    out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
+    return out

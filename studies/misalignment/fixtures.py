@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from patchfem import scene
-from patchfem.simulate_patch import grid_of, solve, values
+from patchfem.simulate_bodies import grid_of
+from patchfem.simulate_measures import values
+from patchfem.simulate_patch import solve
 
 SCENE = Path(__file__).parents[1] / "rig" / "rig.toml"
 TILTS = 10.0 ** np.arange(-6, -1.5, 0.5)

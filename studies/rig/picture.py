@@ -21,7 +21,7 @@ HERE = Path(__file__).parent
 def main(path: Path = HERE / "rig.svg") -> Path:
     """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
     found = simulate.run(simulate.plan(scene.load(HERE / "rig.toml")), estimate=False)
-    x, fields, window = found.patch.grid.x * 1e3, found.fields, found.window
+    x, fields, window = found.patch.x * 1e3, found.fields, found.window
     rows = [r for r in read_table(HERE / "table1.csv") if abs(r.frequency - 143) < 0.5 and r.acceleration]
     with rc_context(STYLE):
         figure = Figure(figsize=(9.6, 2.7))

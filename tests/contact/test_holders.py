@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem import scene, simulate_patch
+from patchfem import scene, simulate_bodies, simulate_measures, simulate_patch
 from patchfem.contact.gaps import step
 from patchfem.core import PatchfemError
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh
@@ -31,7 +31,7 @@ LOAD = 'load = "26 lbf"'
 def solved(keys=LOAD, tables=""):
     found = scene.loads(TEXT.format(keys, tables))
     patch = simulate_patch.solve_all(found, False)[0]
-    return patch, simulate_patch.values(patch)
+    return patch, simulate_measures.values(patch)
 
 
 def test_exact_a_soft_holder_is_a_free_piece_and_a_stiff_one_a_clamp():
@@ -85,7 +85,7 @@ def test_exact_unlike_pieces_add_their_compliances_and_may_be_swapped():
     (a, one), (_, two) = solved(tables=tilt + UNLIKE.format("upper")), solved(tables=tilt + UNLIKE.format("lower"))
     for name, value in one.items():
         assert two[name] == pytest.approx(value, rel=1e-9, abs=1e-15)
-    assert a.upper_grid.height == 9e-3 and a.grid.height == 6.35e-3 and a.upper_grid.coating_rows == 0
+    assert a.pair.upper_grid.height == 9e-3 and a.pair.grid.height == 6.35e-3 and a.pair.upper_grid.coating_rows == 0
     like = solved(tables=tilt)[0]
     other = solved(tables=tilt + UNLIKE.format("upper") + UNLIKE.format("lower"))[0]
     assert a.pieces.normal == pytest.approx((like.pieces.normal + other.pieces.normal) / 2, rel=1e-9)
@@ -93,12 +93,12 @@ def test_exact_unlike_pieces_add_their_compliances_and_may_be_swapped():
 
 def test_exact_naming_what_a_piece_is_anyway_changes_nothing():
     patch, found = solved(tables='[contact.upper]\nheight = "6.35 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n')
-    assert patch.upper is patch.piece and found == solved()[1]
+    assert patch.pair.upper is patch.pair.piece and found == solved()[1]
 
 
 def test_exact_a_step_lifts_one_side():
     patch, found = solved(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
-    x = patch.grid.x
+    x = patch.pair.grid.x
     assert patch.gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
     assert patch.pressure.sigma_n[x > 2e-3].max() == 0 and found["pressure_centre"] < 0
     assert step(np.array([-1.0, 0.0, 1.0]), 2.0, 0.0).tolist() == [0.0, 1.0, 2.0]
@@ -131,9 +131,9 @@ def test_exact_a_scene_on_triangles_is_within_its_error_of_the_quads(tmp_path):
     (tmp_path / "scene.toml").write_text(text, "utf-8")
     found = scene.load(tmp_path / "scene.toml")
     patch, finer, _ = simulate_patch.solve_all(found)
-    assert finer.grid.x.size == 2 * patch.grid.x.size - 1
-    cut = simulate_patch.measures(patch, finer)
-    whole = simulate_patch.measures(*simulate_patch.solve_all(
+    assert finer.pair.grid.x.size == 2 * patch.pair.grid.x.size - 1
+    cut = simulate_measures.measures(patch, finer)
+    whole = simulate_measures.measures(*simulate_patch.solve_all(
         scene.loads(TEXT.format(LOAD, '[contact.tilt]\nangle = "0.1 mrad"\n'))))
     for name, measure in cut.items():
         assert abs(measure.value - whole[name].value) <= measure.error + whole[name].error + measure.floor
@@ -144,7 +144,7 @@ def test_refuses_a_mesh_whose_interfaces_do_not_match(tmp_path):
     triangles(tmp_path / "pieces.msh", 5e-4, shift=1e-4)
     (tmp_path / "scene.toml").write_text(TEXT.format(LOAD + '\nmesh = "pieces.msh"', ""), "utf-8")
     with pytest.raises(PatchfemError, match=r"pieces.msh.*not yet built"):
-        simulate_patch.bodies_of(scene.load(tmp_path / "scene.toml"))
+        simulate_bodies.bodies_of(scene.load(tmp_path / "scene.toml"))
 
 
 @pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])

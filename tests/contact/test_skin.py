@@ -13,7 +13,8 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from patchfem.contact.skin import ExponentialSkin, HertzSkin, LinearSkin, peak_integral, residuals, solve, tangent
+from patchfem.contact.skin import residuals, solve, tangent
+from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin, peak_integral
 from patchfem.contact.slip import normal_stiffness, tangential_stiffness
 from patchfem.contact.unilateral import LIMIT, press
 from patchfem.core import Compliance, NotConverged, Outcome, PatchfemError
@@ -272,6 +273,32 @@ def test_exact_skin_and_bodies_in_series():
 
 
 # ------------------------------------------------------------------------------------------------------- never failing
+@each_skin
+@pytest.mark.parametrize("spring", [1e2, 1e4, 1e7])
+def test_exact_spring_of_the_holder_is_the_moment_it_gives(skin, spring):
+    """The rotation against a spring, sum f x = M + K theta, is the free rotation under the moment M + K theta."""
+    c, x, weight = bodies(60)
+    gap, moment = 1e-4 * x, 2e-3 * LOAD
+    held = solve(skin, c, x, weight, gap, LOAD, moment, rotation=1e-4, spring=spring)
+    turned = held.theta - 1e-4
+    free = solve(skin, c, x, weight, gap, LOAD, moment + spring * turned)
+    assert abs(turned) > 1e-9 and free.theta == pytest.approx(turned, rel=1e-7)
+    assert np.abs(held.force - free.force).max() <= 1e-9 * LOAD
+    assert held.moment == pytest.approx(moment + spring * turned, rel=1e-8, abs=1e-9 * LOAD * LENGTH)
+
+
+@each_skin
+def test_exact_stiff_and_absent_springs_are_the_held_and_the_free_rotation(skin):
+    c, x, weight = bodies(60)
+    gap = 1e-5 * x
+    rigid, free = solve(skin, c, x, weight, gap, LOAD), solve(skin, c, x, weight, gap, LOAD, 0.0)
+    stiff = solve(skin, c, x, weight, gap, LOAD, 0.0, spring=1e13)
+    loose = solve(skin, c, x, weight, gap, LOAD, 0.0, spring=1e-6)
+    assert np.abs(stiff.force - rigid.force).max() <= 1e-7 * LOAD
+    assert np.abs(loose.force - free.force).max() <= 1e-7 * LOAD
+    assert np.abs(rigid.force - free.force).max() > 1e-4 * LOAD
+
+
 def holds(skin, c, x, weight, gap, state, load, moment):
     """Law, balance and signs, from the state alone."""
     assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= LIMIT

@@ -1,0 +1,138 @@
+"""The two pieces of a scene: their meshes, materials and the compliance of their common interface."""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from .contact import cache
+from .contact.elasticity import Layers, assemble, interface_compliance
+from .core import Compliance, Interface, PatchfemError, frozen_array
+from .mesh.tensor import TensorGrid, graded_grid
+
+AUTOMATIC_CELLS = 200
+LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pair:
+    """Two pieces condensed to their interface; everything about them that no load and no shape changes.
+
+    grid, piece: the lower piece (its columns are the interface), upper_grid, upper: the other one, the same objects
+    where the pieces are alike; TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all
+    pairs together; closing (m, m): normal closing per shear force on the interface [m/N], zero for like pieces.
+    """
+
+    grid: object
+    upper_grid: object
+    piece: object
+    upper: object
+    compliance: Compliance
+    closing: np.ndarray
+    seconds: dict
+
+    @property
+    def coupling(self) -> float:
+        """The largest normal closing per shear force over the largest slide per shear force."""
+        return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
+
+
+def piece_of(contact, side: str) -> tuple:
+    """(height, substrate, coating or None) of one piece, its own table before the common keys."""
+    own = getattr(contact, side)
+    height, substrate, coating = contact.height, contact.substrate, contact.coating
+    if own is not None:
+        height, substrate = own.height or height, own.substrate or substrate
+        coating = None if own.coating == "none" else own.coating or coating
+    return height, substrate, coating
+
+
+def layers_of(contact, side: str) -> Layers:
+    """Elastic layers of one piece."""
+    _, substrate, coating = piece_of(contact, side)
+    coat = coating.material if coating else substrate
+    return Layers((coat.young, coat.poisson), (substrate.young, substrate.poisson), contact.plane)
+
+
+def grid_of(scene, side: str = "lower") -> TensorGrid:
+    """The tensor grid that is made for a piece of a scene without a mesh file."""
+    contact = scene.contact
+    height, _, coating = piece_of(contact, side)
+    size = contact.element_size or contact.length / AUTOMATIC_CELLS
+    return graded_grid(contact.length, height, size, coating.thickness if coating else 0.0)
+
+
+def bodies_of(scene) -> tuple:
+    """(lower piece, upper piece or None where it is alike): grids that are made, the tensor grid recognised in the
+    named mesh file, or its two pieces of any triangles and quads."""
+    contact = scene.contact
+    if contact.mesh is None:
+        return grid_of(scene), grid_of(scene, "upper") if unlike(contact) else None
+    from .mesh.files import read_grid, read_pieces
+
+    path = scene.beside(contact.mesh)
+    try:
+        low, high = read_grid(path), None
+    except PatchfemError:  # no tensor grid of alike pieces; what is wrong with the file is said by the general reader
+        pair = read_pieces(path)
+        low, high = pair.lower, pair.upper
+    for body in (low,) if high is None else (low, high):
+        _matches(scene, body)
+    return low, high
+
+
+def _matches(scene, body) -> None:
+    contact = scene.contact
+    thickness = contact.coating.thickness if contact.coating else 0.0
+    for key, mine, wanted in (("length", body.length, contact.length), ("height", body.height, contact.height),
+                              ("coating.thickness", body.coating, thickness)):
+        if abs(mine - wanted) > 1e-6 * contact.length:
+            raise PatchfemError(f"{scene.path}: contact.{key} is {wanted:.9g} m, the mesh has {mine:.9g} m")
+
+
+def finite_elements(body, layers: Layers):
+    """The assembled piece of a tensor grid (Piece) or of any mesh (Substructure)."""
+    if isinstance(body, TensorGrid):
+        return assemble(body.x, body.depth, body.coating_rows, layers)
+    from .contact import substructure
+
+    return substructure.assemble(body, layers)
+
+
+def compliance_of(body, piece, fresh: bool) -> tuple:
+    """(nn, tt, nt) of one piece; that of a large tensor grid from the cache of operators unless `fresh`."""
+    if not isinstance(body, TensorGrid):
+        from .contact import substructure
+
+        return substructure.condense(piece)
+    if body.x.size < LEAST_CACHED:
+        return interface_compliance(piece)
+    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers)
+    found = None if fresh else cache.fetch(key, body.x.size)
+    if found is None:
+        found = interface_compliance(piece)
+        cache.keep(key, found)
+    return found
+
+
+def unlike(contact) -> bool:
+    """Whether the pieces differ in height, material or coating."""
+    return piece_of(contact, "lower") != piece_of(contact, "upper")
+
+
+def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
+    """Assemble and condense the pieces of a scene: bodies of `bodies_of`, the upper None where it is alike."""
+    contact = scene.contact
+    width = contact.width * contact.pairs
+    interface = Interface(grid.x, frozen_array(grid.tributary() * width), width)
+    start = perf_counter()
+    piece = finite_elements(grid, layers_of(contact, "lower"))
+    upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(contact, "upper"))
+    assembled = perf_counter()
+    low = compliance_of(grid, piece, fresh)
+    high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
+    # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
+    parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])
+    normal, tangential, closing = (frozen_array(part / width) for part in parts)
+    seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
+    return Pair(grid, upper_grid or grid, piece, upper, Compliance(interface, normal, tangential), closing, seconds)

@@ -1,0 +1,137 @@
+"""Measures of a static patch with their errors from coarser meshes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .contact.slip import normal_stiffness, tangential_stiffness
+from .core import Measure, Outcome
+from .simulate_patch import Patch, solve
+
+UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "moment": "N m", "rotation": "rad",
+         "approach": "m", "contact_half_width": "m", "pressure_centre": "m", "loaded_fraction": "1",
+         "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1"}
+CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
+BANDED = ("approach", "pressure_peak", "normal_stiffness", "tangential_stiffness")
+
+
+def half_width(x, sigma) -> float:
+    """Half the contact length [m], soft edges found between nodes.
+
+    sigma^2 is linear towards an edge of smooth contact (and exactly quadratic for Hertz), so an edge is the root of a
+    cubic fitted to sigma^2 over the loaded nodes from 10 to 80 % of the contact length behind it; the nodes nearest to
+    the edge carry its discretisation error and are left out. A root farther than a cell from the border of the contact
+    set is not believed: a coating bends sigma^2 within its own thickness of the edge.
+    """
+    index = np.flatnonzero(sigma > 0)
+    if index.size == 0:
+        return 0.0
+    ends = []
+    for side in (-1, 1):
+        outer = index[-1] if side > 0 else index[0]
+        if outer in (0, x.size - 1):
+            ends.append(float(x[outer]))
+            continue
+        ordered = index[::-1] if side > 0 else index
+        behind = side * (x[outer] - x[ordered]) / max(x[index[-1]] - x[index[0]], 1e-300)
+        pick = ordered[(behind >= 0.1) & (behind <= 0.8)] if index.size >= 12 else ordered[2:7]
+        ends.append(_edge(x, sigma, pick, outer, side))
+    return (ends[1] - ends[0]) / 2
+
+
+def _edge(x, sigma, pick, outer, side) -> float:
+    cell = abs(x[outer + side] - x[outer])
+    guess = float(x[outer]) + side * cell / 2
+    degree = 3 if pick.size >= 8 else 2
+    if pick.size < degree + 1:
+        return guess
+    s = (x[pick] - x[outer]) / cell
+    roots = np.roots(np.polyfit(s, sigma[pick]**2, degree))
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    real = real[np.abs(real - side / 2) <= 1.0] * cell + x[outer]
+    return float(real[np.argmin(np.abs(real - guess))]) if real.size else guess
+
+
+def peak_pressure(x, sigma) -> float:
+    """Largest pressure [Pa]: the vertex of the parabola through the largest inner node and its neighbours."""
+    top = int(np.argmax(sigma))
+    if top in (0, x.size - 1) or sigma[top - 1] <= 0 or sigma[top + 1] <= 0:
+        return float(sigma[top])
+    left, right = x[top] - x[top - 1], x[top + 1] - x[top]
+    before, after = (sigma[top] - sigma[top - 1]) / left, (sigma[top + 1] - sigma[top]) / right
+    bend = (after - before) / (left + right)
+    slope = (before * right + after * left) / (left + right)
+    return float(sigma[top] - slope**2 / (4 * bend)) if bend < 0 else float(sigma[top])
+
+
+def values(patch: Patch) -> dict:
+    """name -> value of every static measure; loaded_fraction: the mean over the largest pressure."""
+    x, weight, p = patch.x, patch.pieces.interface.weight, patch.pressure
+    area = weight.sum()
+    peak = peak_pressure(x, p.sigma_n)
+    out = {"normal_load": p.load, "contact_fraction": float(weight[p.sigma_n > 0].sum() / area),
+           "pressure_peak": peak, "moment": p.moment, "rotation": p.rotation,
+           "approach": p.approach, "contact_half_width": half_width(x, p.sigma_n)}
+    out["pressure_centre"] = p.moment / p.load if p.load > 0 else 0.0
+    touching = p.outcome is not Outcome.NO_CONTACT
+    out["loaded_fraction"] = p.load / (area * peak) if touching else 0.0
+    out["normal_stiffness"] = normal_stiffness(patch.pieces.normal, patch.active) if touching else 0.0
+    out["tangential_stiffness"] = tangential_stiffness(patch.pieces.tangential, patch.active) if touching else 0.0
+    return out
+
+
+def plane_band(scene, patch: Patch) -> list:
+    """One sentence on the model error of the plane state, from the mesh of `patch`; none for a piece far wider than
+    tall in plane strain or far taller than wide in plane stress. Between the two no mesh narrows the band."""
+    contact, pair = scene.contact, patch.pair
+    ratio = contact.width / contact.height
+    if ratio >= CLEAR if contact.plane == "strain" else ratio <= 1 / CLEAR:
+        return []
+    other = "stress" if contact.plane == "strain" else "strain"
+    turned = replace(scene, contact=contact.model_copy(update={"plane": other}))
+    upper = None if pair.upper is pair.piece else pair.upper_grid
+    mine, theirs = values(patch), values(solve(turned, pair.grid, upper))
+    parts = [f"{name} by {100 * (theirs[name] / mine[name] - 1):+.2g} %" for name in BANDED if mine[name]]
+    return [f"plane {contact.plane} is assumed for pieces {ratio:.2g} times as wide as tall; the truth lies towards "
+            f"plane {other}, which would change {', '.join(parts)}"]
+
+
+def edge_cells(x, active) -> np.ndarray:
+    """Lengths [m] of the cells in which the contact set ends, empty for full contact."""
+    return np.diff(x)[active[1:] != active[:-1]]
+
+
+def remainder(last: float, before: float) -> float:
+    """What is still to come after the changes `before` and `last` of a value under two halvings of the mesh.
+
+    A geometric series whose ratio is taken from them, no better than second order and no worse than 1.5.
+    """
+    last = max(last, before / 4)
+    ratio = min(max(before / last, 1.5), 4.0) if last > 0 else 4.0
+    return last / (ratio - 1)
+
+
+def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -> dict:
+    """name -> Measure; the error is three times what the changes between the three meshes leave to come (`remainder`),
+    at least what the snapping of the contact edge to a node costs."""
+    mine = values(fine)
+    second = values(coarse) if coarse is not None else {}
+    third = values(coarsest) if coarsest is not None else second
+    cells = edge_cells(fine.x, fine.active)
+    cell = float(max(cells.max(), cells.sum() / 2)) if cells.size else 0.0
+    length = fine.pieces.interface.length
+    floors = {"contact_fraction": max(cell, np.diff(fine.x).min()) / length, "contact_half_width": 1e-12,
+              "pressure_centre": 1e-12, "rotation": 1e-12, "moment": 1e-10, "approach": 1e-13}
+    snap = cell / max(2 * cell, mine["contact_fraction"] * length) if cell else 0.0
+    least = {"contact_fraction": cell / length, "normal_load": 1e-10 * mine["normal_load"],
+             "contact_half_width": cell / 2, "normal_stiffness": snap / 4 * mine["normal_stiffness"],
+             "tangential_stiffness": snap / 4 * mine["tangential_stiffness"]}
+    out = {}
+    for name, value in mine.items():
+        error = None
+        if second:
+            error = 3 * remainder(abs(value - second[name]), abs(second[name] - third[name]))
+            error = max(error, least.get(name, 0.0), 1e-12 * abs(value))
+            error = 0.0 if mine["normal_load"] == 0 else error
+        out[name] = Measure(value, UNITS[name], error, floors.get(name, 0.0))
+    return out

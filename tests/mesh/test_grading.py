@@ -1,0 +1,67 @@
+"""Graded columns, and grids split and merged cell by cell."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.mesh.grading import Layout, columns
+from patchfem.mesh.tensor import TensorGrid, coarser, finer, graded_depth, graded_grid
+
+
+@settings(max_examples=60, deadline=None)
+@given(place=st.floats(-0.5, 0.5), least=st.floats(1e-5, 1e-2), slope=st.floats(0.05, 0.6), wide=st.floats(0.01, 0.9))
+def test_always_cells_follow_the_layout(place, least, slope, wide):
+    """Cells add up to the length, none is longer than wanted at its farther end, neighbours differ by the slope."""
+    low = max(-0.5, place - wide)
+    layout = Layout(1.0, (place,), (low, place), least, max(least, 0.05), 0.1, slope)
+    x = columns(layout)
+    cells = np.diff(x)
+    assert x[0] == -0.5 and x[-1] == 0.5 and cells.min() > 0 and cells.size % 2 == 0
+    ends = layout.size(x)
+    assert (cells <= 1.02 * np.maximum(ends[1:], ends[:-1]) + 1e-12).all()
+    inner = cells[1:] / cells[:-1]
+    assert np.abs(np.log(inner)).max() <= 1.6 * slope + 0.05
+    assert cells[np.argmin(np.abs((x[1:] + x[:-1]) / 2 - place))] <= 2.5 * least * (1 + slope)
+
+
+def test_exact_columns_of_a_linear_size_are_a_geometric_series():
+    """At equal steps of the integral of dx/(least + slope x) the places grow by one factor."""
+    layout = Layout(1.0, (-0.5,), (-0.5, 0.5), 1e-3, 1.0, 1.0, 0.25)
+    x = columns(layout) + 0.5 + 1e-3 / 0.25
+    ratio = x[1:] / x[:-1]
+    assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=2e-4)
+    assert np.log(ratio[0]) == pytest.approx(0.25, rel=0.05)
+
+
+def test_exact_symmetric_layouts_give_symmetric_columns():
+    x = columns(Layout(2.0, (-0.3, 0.3), (-0.3, 0.3), 1e-4, 0.04, 0.1, 0.5))
+    assert np.abs(x + x[::-1]).max() <= 1e-12
+
+
+@pytest.mark.parametrize("coating", [0.0, 152.4e-6])
+def test_exact_splitting_and_merging_undo_one_another(coating):
+    grid = graded_grid(12.7e-3, 6.35e-3, 0.2e-3, coating)
+    twice = finer(finer(grid))
+    back = coarser(coarser(twice))
+    assert twice.coating_rows == 4 * grid.coating_rows and twice.coating == pytest.approx(coating, abs=1e-18)
+    assert np.array_equal(back.x, grid.x) and np.array_equal(back.depth, grid.depth)
+    assert back.coating_rows == grid.coating_rows
+
+
+def test_exact_a_geometric_series_of_rows_stays_one_when_split():
+    depth = np.concatenate([[0.0], np.cumsum(1.3 ** np.arange(12))])
+    rows = np.diff(finer(TensorGrid(np.linspace(-1, 1, 5), depth, 0)).depth)
+    assert rows[1:] / rows[:-1] == pytest.approx(np.full(rows.size - 1, 1.3**0.5), rel=1e-12)
+
+
+def test_exact_merging_keeps_what_is_left_over():
+    grid = graded_grid(10.0, 4.0, 10 / 7, 1.0)
+    half = coarser(grid)
+    assert half.x.size == 5 and half.length == pytest.approx(10.0) and half.height == 4.0 and half.coating == 1.0
+
+
+def test_exact_depths_reach_the_coating_and_the_far_face():
+    depth, rows = graded_depth(5.0, 0.01, 0.3, 1.2, 2)
+    assert depth[0] == 0 and depth[rows] == 0.3 and depth[-1] == 5.0 and np.diff(depth).min() > 0
+    assert (np.diff(depth)[1:] <= 1.2 * np.diff(depth)[:-1] * (1 + 1e-6)).all()
