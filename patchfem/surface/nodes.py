@@ -18,6 +18,7 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     """
     if how not in ("auto", "own", "centred"):
         raise PatchfemError(f"placing of a profile '{how}' is not known; use auto, own or centred")
+    x = _nodes(x)
     there = profile.x[~profile.missing]
     if there.size < 2:
         raise PatchfemError(f"{profile.source}: {there.size} heights; a trace wants two at least")
@@ -27,15 +28,17 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
         if how == "auto":
             notes += (f"{profile.source}: x from {say(there[0])} to {say(there[-1])} does not cover the patch, "
                       f"{say(x[0])} to {say(x[-1])}: the trace is centred, x moved by {say(shift)}",)
-    _demand(replace(profile, x=there + shift, z=there), x)
-    first = max(int(np.searchsorted(there + shift, x[0], "right")) - 1, 0)
-    last = min(int(np.searchsorted(there + shift, x[-1], "left")), there.size - 1)
-    keep = (profile.x >= there[first]) & (profile.x <= there[last])
-    gap = (there[last] - there[first]) / max(int(keep.sum()) - 1, 1)
-    if gap > 1.5 * np.diff(x).max():
-        notes += (f"{profile.source}: samples lie {say(gap)} apart, elements are {say(np.diff(x).max())}: between "
-                  "samples the surface is taken as straight",)
-    return replace(profile, x=frozen_array(profile.x[keep] + shift), z=frozen_array(profile.z[keep]), notes=notes)
+    there = there + shift
+    _demand(profile.source, there, x)
+    first = max(int(np.searchsorted(there, x[0], "right")) - 1, 0)
+    last = min(int(np.searchsorted(there, x[-1], "left")), there.size - 1)
+    moved = profile.x + shift
+    keep = (moved >= there[first]) & (moved <= there[last])
+    apart, element = float(np.median(np.diff(moved[keep]))), float(np.diff(x).max())
+    if apart > 1.5 * element:
+        notes += (f"{profile.source}: samples lie {say(apart)} apart, elements are {say(element)}: between samples the "
+                  "surface is taken as straight",)
+    return replace(profile, x=frozen_array(moved[keep]), z=frozen_array(profile.z[keep]), notes=notes)
 
 
 def on_nodes(profile: Profile, x: np.ndarray) -> np.ndarray:
@@ -49,9 +52,10 @@ def on_nodes(profile: Profile, x: np.ndarray) -> np.ndarray:
     (h^2 z''/24 inside even nodes). Beyond the trace it goes on flat, over half an element at most.
     PatchfemError for missing heights and a trace that does not cover the patch.
     """
+    x = _nodes(x)
     if profile.missing.any():
         raise PatchfemError(f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first")
-    _demand(profile, x)
+    _demand(profile.source, profile.x, x)
     edges = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2, x[-1:]])
     mean = np.diff(_primitive(profile, edges)) / np.diff(edges)
     middle = (edges[1:] + edges[:-1]) / 2
@@ -72,6 +76,13 @@ def _primitive(profile: Profile, at) -> np.ndarray:
     return inside + (at - within) * np.where(at < within, z[0], z[-1])
 
 
+def _nodes(x) -> np.ndarray:
+    x = np.asarray(x, dtype=np.float64)
+    if x.ndim != 1 or x.size < 2 or not (np.diff(x) > 0).all():
+        raise PatchfemError("the nodes under a profile must be two or more and grow along x")
+    return x
+
+
 def _covers(there, x) -> bool:
     return bool(there[0] <= x[0] + _slack(x)[0] and there[-1] >= x[-1] - _slack(x)[1])
 
@@ -81,15 +92,12 @@ def _slack(x) -> tuple:
     return 0.5000001 * float(x[1] - x[0]), 0.5000001 * float(x[-1] - x[-2])
 
 
-def _demand(profile: Profile, x) -> None:
-    x = np.asarray(x)
-    if x.ndim != 1 or x.size < 2 or not (np.diff(x) > 0).all():
-        raise PatchfemError("the nodes under a profile must be two or more and grow along x")
-    if _covers(profile.x, x):
+def _demand(source: str, there, x) -> None:
+    if _covers(there, x):
         return
-    length, patch = profile.length, float(x[-1] - x[0])
+    length, patch = float(there[-1] - there[0]), float(x[-1] - x[0])
     if length < patch:
-        raise PatchfemError(f"{profile.source}: the profile is {say(length)} long, the patch {say(patch)}; measure a "
-                            f'longer trace or set contact.length = "{say(length)}"')
-    raise PatchfemError(f"{profile.source}: the profile runs from {say(profile.x[0])} to {say(profile.x[-1])}, the "
-                        f"patch from {say(x[0])} to {say(x[-1])}: move the profile's x so that it covers the patch")
+        raise PatchfemError(f"{source}: the profile is {say(length)} long, the patch {say(patch)}; measure a longer "
+                            f'trace or set contact.length = "{say(length)}"')
+    raise PatchfemError(f"{source}: the profile runs from {say(there[0])} to {say(there[-1])}, the patch from "
+                        f"{say(x[0])} to {say(x[-1])}; move the profile's x so that it covers the patch")

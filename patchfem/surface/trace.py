@@ -236,10 +236,12 @@ def _evened(path, x, factor: float) -> tuple:
     step = float(count @ x / (count @ count))
     even = float(x.mean()) + step * count
     off = float(np.abs(x - even).max())
-    if not off > 1e-6 * step > 0:
+    if not off > 1e-6 * step > 0 or not x[-1] > x[0]:
         return x, ()
-    digit = next((d for d in 10.0 ** np.arange(6, -10, -1) if np.abs(x / d - np.rint(x / d)).max() < 1e-4), 0.0)
-    if off > 0.55 * digit:
+    largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
+    digits = 10.0 ** np.arange(largest, largest - 8, -1)
+    digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
+    if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
         return x, ()
     return even, (f"{path}: x is printed to {say(digit * factor)}; taken as evenly spaced at {say(step * factor)}",)
 
@@ -250,9 +252,9 @@ def _single(path, x, z, at, factor: float) -> tuple:
     same = 1e-6 * (x[-1] - x[0]) / x.size
     if (step < -same).any():
         back = int(np.argmax(step < -same))
-        raise PatchfemError(
-            f"{path}:{max(at[back], at[back + 1])}: x turns back, {say(x[back] * factor)} and then "
-            f"{say(x[back + 1] * factor)}; a trace runs one way: keep one trace per file")
+        one, other = sorted((back, back + 1), key=lambda k: at[k])
+        raise PatchfemError(f"{path}:{at[other]}: x turns back, {say(x[one] * factor)} and then "
+                            f"{say(x[other] * factor)}; a trace runs one way: keep one trace per file")
     if x[-1] == x[0]:
         raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace wants two places at least")
     if (step > same).all():
