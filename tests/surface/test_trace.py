@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import tempfile
+import tracemalloc
 from pathlib import Path
 from time import process_time
 
@@ -173,6 +174,20 @@ def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
     for content in (bomb, b" " * (1 << 21)):
         with pytest.raises(PatchfemError, match="more than 1 MiB of text; keep every few samples"):
             read(tmp_path, content)
+
+
+def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch):
+    """A gzip file of 32 MiB of blanks and a line of a million columns; unpacked or split they take 30 MB and more."""
+    monkeypatch.setattr(trace, "LARGEST", 1 << 20)
+    columns = b"x [um],z [um]\n0,0\n" + b"," * 10**6 + b"1\n"
+    for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
+        (tmp_path / "before.csv").write_bytes(content)
+        tracemalloc.start()
+        with pytest.raises(PatchfemError, match=r"more than 1 MiB|a line of 1000001 characters"):
+            read_trace(tmp_path / "before.csv")
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < megabytes * 2**20
 
 
 def timed(tmp_path, count) -> float:
