@@ -182,8 +182,8 @@ def test_exact_reading_order():
 
 def test_exact_reading_order_follows_the_physics():
     named = re.findall(r"^\d+\. `(\w+)`", patchfem.__doc__, re.M)
-    chain = ["core", "scene", "effects", "mesh", "contact", "friction", "structure", "dynamics", "response", "export",
-             "closed_forms", "simulate"]
+    chain = ["core", "scene", "effects", "mesh", "surface", "contact", "friction", "structure", "dynamics", "response",
+             "export", "closed_forms", "simulate"]
     assert [name for name in named if name in chain] == chain
 
 

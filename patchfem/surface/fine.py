@@ -1,0 +1,87 @@
+"""How much of a trace is too fine for the elements: the share of its height in short waves."""
+
+import numpy as np
+
+from ..core import PatchfemError
+from .profile import Profile, level, say
+
+ELEMENTS = 2  # a wave shorter than this many elements has no place on the nodes
+LIMIT = 0.1  # share of the height in such waves from which something is really lost
+_MOST = 1 << 20  # samples of an evened trace
+
+
+def spectrum(profile: Profile) -> tuple:
+    """(wavelength (k,) [m] falling from twice the length, mean square (k,) [m2]) of the levelled trace.
+
+    The cosines of half a wave and its multiples over the trace: its mirror image goes on without a jump, so the ends
+    put no false short waves in, as those of a Fourier series do. The mean squares add up to that of the trace (exactly,
+    by the trapezoidal rule). Uneven samples are first read off at an even step. PatchfemError for missing heights.
+    """
+    from scipy.fft import dct
+
+    if profile.missing.any():
+        raise PatchfemError(f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first")
+    z = level(_even(profile)).z
+    count = z.size - 1
+    amplitude = dct(z, type=1) / count
+    power = amplitude[1:] ** 2 / 2
+    power[-1] /= 2  # the wave of two samples: its transform counts twice, its mean square is the square
+    return 2 * profile.length / np.arange(1, count + 1), power
+
+
+def _even(profile: Profile) -> Profile:
+    steps = np.diff(profile.x)
+    if np.ptp(steps) <= 1e-6 * steps.mean():
+        return profile
+    step = max(float(np.percentile(steps, 10)), profile.length / _MOST)
+    x = np.linspace(profile.x[0], profile.x[-1], int(np.ceil(profile.length / step)) + 1)
+    return Profile(x, np.interp(x, profile.x, profile.z), profile.source)
+
+
+def fine_share(profile: Profile, length: float) -> float:
+    """Share of the height (rms over rms, of the levelled trace) in waves shorter than `length` [m]: 0 to 1."""
+    waves, power = spectrum(profile)
+    return float(np.sqrt(_below(waves, power, length)))
+
+
+def element_for(profile: Profile, kept: float) -> float:
+    """Largest element [m] whose waves of ELEMENTS elements and more leave out at most 1 - kept of the height (rms); inf
+    for a flat trace."""
+    return _element(*spectrum(profile), kept)
+
+
+def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | None:
+    """The sentence for a scene whose elements [m] are too long for the trace, None where `limit` is kept.
+
+    It is the refusal of a scene without [contact.asperities], and a warning of `plan`.
+    """
+    waves, power = spectrum(profile)
+    share = float(np.sqrt(_below(waves, power, ELEMENTS * element)))
+    if share <= limit:
+        return None
+    most, nearly = (_two_digits(_element(waves, power, kept)) for kept in (1 - limit, 1 - limit / 10))
+    return (f"{profile.source} holds {100 * share:.0f} % of its height below {ELEMENTS} elements "
+            f'({say(ELEMENTS * element)}): add [contact.asperities] or set element_size = "{say(most)}" '
+            f'({100 - 100 * limit:g} % kept; "{say(nearly)}" keeps {100 - 10 * limit:g} %)')
+
+
+def _below(waves, power, length: float) -> float:
+    total = power.sum()
+    return float(power[waves < length * (1 - 1e-9)].sum() / total) if total > 0 else 0.0
+
+
+def _element(waves, power, kept: float) -> float:
+    total = power.sum()
+    if not 0 < kept < 1:
+        raise PatchfemError(f"the share kept is {kept:g}; it lies between 0 and 1")
+    if total == 0:
+        return np.inf
+    lost = np.cumsum(power[::-1])[::-1] / total  # in this wave and all shorter ones
+    kept_waves = np.flatnonzero(lost > (1 - kept) ** 2)
+    return float(waves[kept_waves[-1]]) / ELEMENTS
+
+
+def _two_digits(length: float) -> float:
+    """Rounded down to two digits, so that the suggestion itself passes."""
+    unit = 10.0 ** (np.floor(np.log10(length)) - 1)
+    return float(np.floor(length / unit * (1 + 1e-12)) * unit)

@@ -1,0 +1,122 @@
+"""One measured or made trace of heights, and what every trace goes through first: levelling and cleaning."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core import PatchfemError, frozen_array
+
+WINDOW = 7  # samples of the running median; what is three samples wide or less can be a spike
+SPIKE = 8.0  # robust standard deviations from the running median
+_BLOCK = 1 << 17  # windows sorted at a time
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Profile:
+    """Heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m]; straight lines between them.
+
+    source: what a message calls it. notes: what was done to it on the way, one sentence each, for the warnings.
+    """
+
+    x: np.ndarray
+    z: np.ndarray
+    source: str
+    notes: tuple = ()
+
+    @property
+    def missing(self) -> np.ndarray:
+        """(n,) bool: where no height was measured."""
+        return np.isnan(self.z)
+
+    @property
+    def length(self) -> float:
+        """From the first to the last sample [m]."""
+        return float(self.x[-1] - self.x[0])
+
+
+def level(profile: Profile) -> Profile:
+    """Minus the least-squares line of its measured samples, which all count alike."""
+    there = ~profile.missing
+    x, z = profile.x, profile.z
+    if there.sum() < 2:
+        return replace(profile, z=frozen_array(z - z[there].mean() if there.any() else z))
+    s = (x - x[there].mean()) / profile.length
+    z = z - z[there].mean()
+    return replace(profile, z=frozen_array(z - s * (s[there] @ z[there] / (s[there] @ s[there]))))
+
+
+def cleaned(profile: Profile, longest: float) -> Profile:
+    """Without spikes (`spikes`) and missing heights: straight lines stand in their place, missing ends are cut off.
+
+    longest: what a line may bridge [m], from one good sample to the next, such as two elements. The notes tell the
+    counts. PatchfemError where a run is longer or fewer than two heights are left.
+    """
+    lost = profile.missing
+    peaked = spikes(profile)
+    bad = lost | peaked
+    good = np.flatnonzero(~bad)
+    if good.size < 2:
+        raise PatchfemError(f"{profile.source}: {good.size} usable heights; a trace wants two at least")
+    if good.size == bad.size:
+        return profile
+    x = profile.x[good]
+    bridged = np.where(np.diff(good) > 1, np.diff(x), 0.0)
+    worst = int(np.argmax(bridged))
+    if bridged[worst] > longest * (1 + 1e-9):
+        raise PatchfemError(
+            f"{profile.source}: no usable height between x = {say(x[worst])} and {say(x[worst + 1])}, and a straight "
+            f"line may bridge {say(longest)} at most; measure that stretch anew or use a larger contact.element_size")
+    keep = slice(good[0], good[-1] + 1)
+    z = np.interp(profile.x[keep], x, profile.z[good])
+    notes = tuple(_counts(profile, lost, peaked, float(bridged[worst])))
+    return replace(profile, x=frozen_array(profile.x[keep]), z=frozen_array(z), notes=profile.notes + notes)
+
+
+def _counts(profile: Profile, lost, peaked, widest: float):
+    n, name = profile.x.size, profile.source
+    if peaked.any():
+        first = profile.x[np.argmax(peaked)]
+        yield (f"{name}: {peaked.sum()} of {n} heights are spikes, more than {SPIKE:g} robust standard deviations off "
+               f"the median of {WINDOW} samples (the first at x = {say(first)}); straight lines stand in their place")
+    if lost.any():
+        yield (f"{name}: {lost.sum()} of {n} heights are missing; straight lines stand in their place, "
+               f"the longest over {say(widest)}")
+
+
+def spikes(profile: Profile) -> np.ndarray:
+    """(n,) bool: heights more than SPIKE robust standard deviations off the median of the WINDOW samples around them.
+
+    The standard deviation is 1.4826 times the largest of: the median deviation inside the window, its median over all
+    windows, and the smallest step between two heights (coarse digits). A feature of more than half the window stays.
+    Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
+    """
+    out, there = np.zeros(profile.x.size, bool), np.flatnonzero(~profile.missing)
+    if there.size < WINDOW:
+        return out
+    z = profile.z[there]
+    middle, spread = _running(z)
+    place = np.clip(np.arange(z.size) - WINDOW // 2, 0, z.size - WINDOW)
+    off = np.abs(z - middle[place])
+    digits = np.diff(np.unique(z)).min(initial=np.inf)
+    scale = np.maximum(spread[place], max(float(np.median(spread)), digits if np.isfinite(digits) else 0.0))
+    out[there] = off > SPIKE * 1.4826 * scale
+    return out
+
+
+def _running(z) -> tuple:
+    """Median and median deviation of every full window."""
+    windows, half = np.lib.stride_tricks.sliding_window_view(z, WINDOW), WINDOW // 2
+    middle, spread = np.empty(len(windows)), np.empty(len(windows))
+    for start in range(0, len(windows), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        middle[part] = np.partition(windows[part], half, axis=1)[:, half]
+        spread[part] = np.partition(np.abs(windows[part] - middle[part, None]), half, axis=1)[:, half]
+    return middle, spread
+
+
+def say(length: float) -> str:
+    """A length for a message: "200 um", "12.7 mm"."""
+    for unit, factor in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
+        if abs(length) >= factor * (1 - 1e-9):
+            return f"{length / factor:.4g} {unit}"
+    return f"{length / 1e-9:.4g} nm" if length else "0 um"

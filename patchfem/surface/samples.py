@@ -1,0 +1,88 @@
+"""The numbers of a file made a trace: finite, plausible, in order, one height per place."""
+
+import numpy as np
+
+from ..core import PatchfemError, frozen_array
+from .profile import Profile, say
+
+LONGEST = 10.0  # [m] beyond which a unit must be wrong
+SHORTEST = 1e-9  # [m]
+
+
+def checked(path, x, z, at, factors: tuple) -> Profile:
+    """The trace of samples x, z (n,) in the units of a file, with their factors to metres; at (n,): their lines.
+
+    In order of growing x, one per place; the notes tell what that took. PatchfemError names line and value.
+    """
+    if np.isfinite(z).sum() < 2:
+        raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
+    for name, values, bad in (("x", x, ~np.isfinite(x)), ("z", z, np.isinf(z))):
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise PatchfemError(f"{path}:{at[first]}: {name} is {values[first]:g}; finite numbers are wanted")
+    for name, values, factor in (("x", x, factors[0]), ("z", z, factors[1])):
+        worst = int(np.nanargmax(np.abs(values)))
+        if abs(values[worst]) > LONGEST / factor:
+            raise PatchfemError(f"{path}:{at[worst]}: {name} is {float(values[worst]) * factor:.4g} m; is its unit "
+                                "right? a missing height is written nan")
+    if x[-1] < x[0]:
+        x, z, at = x[::-1], z[::-1], at[::-1]
+    x, notes = _evened(path, x, factors[0])
+    x, z, more = _single(path, x, z, at, factors[0])
+    x, z = x * factors[0], z * factors[1]
+    _plausible(path, x, z)
+    return Profile(frozen_array(x), frozen_array(z), str(path), notes + more)
+
+
+def _evened(path, x, factor: float) -> tuple:
+    """x without the rounding of its printed digits, where even spacing explains every one of them.
+
+    A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
+    """
+    if x.size < 10:
+        return x, ()
+    count = np.arange(x.size) - (x.size - 1) / 2
+    step = float(count @ x / (count @ count))
+    even = float(x.mean()) + step * count
+    off = float(np.abs(x - even).max())
+    if not off > 1e-6 * step > 0 or not x[-1] > x[0]:
+        return x, ()
+    largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
+    digits = 10.0 ** np.arange(largest, largest - 8, -1)
+    digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
+    if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
+        return x, ()
+    return even, (f"{path}: x is printed to {say(digit * factor)}; taken as evenly spaced at {say(step * factor)}",)
+
+
+def _single(path, x, z, at, factor: float) -> tuple:
+    """x strictly growing: neighbours at one place become their mean."""
+    step = np.diff(x)
+    same = 1e-6 * (x[-1] - x[0]) / x.size
+    if (step < -same).any():
+        back = int(np.argmax(step < -same))
+        one, other = sorted((back, back + 1), key=lambda k: at[k])
+        raise PatchfemError(f"{path}:{at[other]}: x turns back, {say(x[one] * factor)} and then "
+                            f"{say(x[other] * factor)}; a trace runs one way: keep one trace per file")
+    if x[-1] == x[0]:
+        raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace wants two places at least")
+    if (step > same).all():
+        return x, z, ()
+    group = np.concatenate([[0], np.cumsum(step > same)])
+    heights = np.bincount(group, np.isfinite(z))
+    with np.errstate(invalid="ignore"):
+        mean = np.bincount(group, np.nan_to_num(z)) / heights
+    first = int(at[np.argmax(step <= same) + 1])
+    note = f"{path}: {x.size - mean.size} samples lie where another one does (the first in line {first}): mean taken"
+    return np.bincount(group, x) / np.bincount(group), mean, (note,)
+
+
+def _plausible(path, x, z) -> None:
+    if np.isfinite(z).sum() < 2:
+        raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
+    length, span = float(x[-1] - x[0]), float(np.nanmax(z) - np.nanmin(z))
+    if length < SHORTEST:
+        raise PatchfemError(f"{path}: the profile is {length:.3g} m long; is the unit of x right?")
+    if span > length:
+        raise PatchfemError(f"{path}: heights span {say(span)} over a length of {say(length)}; is the unit of z right? "
+                            "a missing height is written nan")

@@ -1,0 +1,254 @@
+"""Reading a two-column trace: every spelling of one file gives the same numbers, every other file a named refusal."""
+
+from __future__ import annotations
+
+import gzip
+import tempfile
+import tracemalloc
+import warnings
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from traces import UM, bumpy, text
+
+from patchfem.core import Missing, PatchfemError
+from patchfem.quantities import KINDS
+from patchfem.surface import trace
+from patchfem.surface.trace import UNITS, read_trace
+
+QUIET = settings(deadline=None, suppress_health_check=list(HealthCheck))
+
+
+def read(tmp_path, content, name="before.csv"):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_trace(path)
+
+
+def test_exact_units_are_those_of_the_package():
+    assert UNITS == KINDS["length"]
+
+
+X, Z = bumpy()
+SPELLINGS = {
+    "comma": text(X, Z),
+    "semicolon": text(X, Z, "x [um]; z [um]", ";"),
+    "tab": text(X, Z, "x [um]\tz [um]", "\t"),
+    "blanks": text(X, Z, "x [um]   z [um]", "   "),
+    "windows": text(X, Z).replace("\n", "\r\n"),
+    "mark": "\ufeff" + text(X, Z),
+    "micro sign": text(X, Z, "x [µm],z [μm]"),
+    "latin-1": text(X, Z, "x [µm],z [µm]").encode("latin-1"),
+    "utf-16": text(X, Z).encode("utf-16"),
+    "brackets": text(X, Z, '"X (um)", "Z (um)"'),
+    "header in a comment": "# stylus, 2.5 um tip\n\n" + text(X, Z, "# x [um],z [um]"),
+    "comments": "% one\n// two\n" + text(X, Z) + "# end\n\n,\n",
+    "empty columns behind": text(X, Z, "x [um],z [um],,").replace("\n", ",,\n"),
+    "columns swapped": text(Z, X, "z [um],x [um]"),
+    "from the far end": text(X[::-1], Z[::-1]),
+    "gzip": gzip.compress(text(X, Z).encode()),
+    "gzip of blanks": gzip.compress(text(X, Z, "x [um] z [um]", " ").encode()),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("content", SPELLINGS.values(), ids=SPELLINGS)
+def test_exact_every_spelling_is_the_same_trace(tmp_path, content):
+    profile = read(tmp_path, content)
+    assert np.array_equal(profile.x, X * UM) and np.array_equal(profile.z, Z * UM)
+    assert not profile.missing.any() and profile.notes == ()
+    assert not profile.x.flags.writeable and not profile.z.flags.writeable
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_exact_units_of_both_columns(tmp_path, unit):
+    profile = read(tmp_path, text([0, 1, 2], [0, 0.25, -0.25], f"x [{unit}],z [{unit}]") if unit != "km" else
+                   text([0, 1e-3, 2e-3], [0, 0.25e-3, -0.25e-3], "x [km],z [km]"))
+    scale = UNITS[unit] if unit != "km" else 1.0
+    assert profile.x == pytest.approx(np.array([0, 1, 2]) * scale, rel=1e-15)
+    assert profile.z == pytest.approx(np.array([0, 0.25, -0.25]) * scale, rel=1e-15)
+
+
+def test_exact_the_caller_names_the_units(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("x [thou],z [thou]\n0,1\n5,3\n")
+    assert read_trace(path, {"thou": 25.4e-6}).z == pytest.approx([25.4e-6, 76.2e-6])
+    with pytest.raises(PatchfemError, match=r"use one of thou$"):
+        path.write_text("x [um],z [thou]\n0,1\n5,3\n")
+        read_trace(path, {"thou": 25.4e-6})
+
+
+def test_exact_missing_heights_keep_their_place(tmp_path):
+    profile = read(tmp_path, "x [um],z [um]\n0,1\n1,\n2,NaN\n3,***\n4, nan \n5,2\n6,*****\n7,1\n")
+    assert profile.missing.tolist() == [False, True, True, True, True, False, True, False]
+    assert np.array_equal(profile.z[[0, 5, 7]], np.array([1.0, 2.0, 1.0]) * UM)
+
+
+def test_exact_samples_at_one_place_become_their_mean(tmp_path):
+    profile = read(tmp_path, "# a step\nx [um],z [um]\n0,1\n1,1\n1,2\n1,nan\n4,3\n4,nan\n9,3\n")
+    assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
+        np.array([1, 1.5, 3, 3]) * UM)
+    path = tmp_path / "before.csv"
+    assert profile.notes == (f"{path}: 3 samples lie where another one does (the first in line 5): mean taken",)
+
+
+@pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
+def test_exact_rounded_x_is_evened(tmp_path, step):
+    x, z = np.arange(2000) * step, np.random.default_rng(0).normal(size=2000)
+    profile = read(tmp_path, "x [um],z [um]\n" + "".join(f"{a:.1f},{b:.5f}\n" for a, b in zip(x, z)))
+    assert profile.x.size == 2000
+    if step < 7:
+        assert np.ptp(np.diff(profile.x)) < 1e-9 * step * UM
+        assert profile.length == pytest.approx(x[-1] * UM, abs=0.1 * UM)
+        assert "x is printed to 100 nm; taken as evenly spaced at" in profile.notes[0]
+    else:
+        assert profile.notes == ()
+
+
+REFUSED = {
+    "": "{path}: the profile is empty",
+    "\ufeff \n\n": "{path}: the profile is empty",
+    "# only words\n% more\n": "{path}: no data, only comments",
+    "0,1\n1,2\n": "{path}:1: no header, and units are never guessed; write the header as `x [um],z [um]` above the "
+                  "first sample",
+    "x,z\n0,1\n": "{path}:1: column 'x' has no unit, and units are never guessed; write the header as `x [um],z [um]`",
+    "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
+    "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
+    "x [um]\n0\n": "{path}:1: one column, 'x [um]', where x and z are wanted; write the header as `x [um],z [um]`",
+    "x [um],y [um],z [um]\n0,0,1\n": "{path}:1: 3 columns where x and z are wanted; keep one trace of two columns and "
+                                     "write the header as `x [um],z [um]`",
+    "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
+    "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known, x and z are wanted; write the header as `x [um],z [um]`",
+    "x [um],z [um]\n": "{path}: 0 heights; a trace wants two at least",
+    "x [um],z [um]\n0,1\n1,\n2,nan\n": "{path}: 1 heights; a trace wants two at least",
+    "x [um],z [um]\n0,1\n1,2\n1.5\n": "{path}:4: '1.5': two numbers are wanted; write nan for a missing height",
+    "x [um],z [um]\n0,1\n1,2,3\n": "{path}:3: '1,2,3': two numbers are wanted; write nan for a missing height",
+    "x [um] z [um]\n0 1\n# c\n1\n": "{path}:4: '1': two numbers are wanted; write nan for a missing height",
+    "x [um];z [um]\n0;1\n1;2,5\n": "{path}:3: '1;2,5': two numbers are wanted; the decimal sign is a point, no comma",
+    "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': two numbers are wanted; the decimal sign is a point, no comma",
+    "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or leave it out",
+    "x [um],z [um]\n0,1\n1,bad\n": "{path}:3: 'bad' is not a height; a missing one is empty, nan or ***",
+    "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; a missing one is empty, nan or ***",
+    "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; a missing one is empty, nan or ***",
+    "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are wanted",
+    "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are wanted",
+    "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are wanted",
+    "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is its unit right? a missing height is written nan",
+    "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? a missing height is written nan",
+    "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? a "
+                                       "missing height is written nan",
+    "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 1e-10 m long; is the unit of x right?",
+    "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x turns back, 3 um and then 2 um; a trace runs one way: "
+                                                  "keep one trace per file",
+    "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x turns back, 1 um and then 2 um; a trace runs one way: keep one "
+                                           "trace per file",
+    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace wants two places at least",
+    "x [um],z [um]\n" + "1" * 2000: "{path}:2: a line of 2000 characters; two numbers are wanted",
+    "a" * 2000: "{path}:1: a line of 2000 characters; two columns are wanted, write the header as `x [um],z [um]`",
+    "x [um],z [um]\n0,\x00\n": "{path}: not a text file; export the profile as text with two columns and write the "
+                               "header as `x [um],z [um]`",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("content", REFUSED, ids=lambda content: repr(content[:30]))
+def test_refuses_by_name(tmp_path, content):
+    with pytest.raises(PatchfemError) as caught:
+        read(tmp_path, content)
+    message = REFUSED[content].replace("{path}", str(tmp_path / "before.csv"))
+    assert str(caught.value) == message
+
+
+def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
+    with pytest.raises(Missing, match=r"no such profile; contact\.profile\.file is relative to the scene"):
+        read_trace(tmp_path / "none.csv")
+    with pytest.raises(PatchfemError, match="not a file; a profile is a text file with two columns"):
+        read_trace(tmp_path)
+    with pytest.raises(PatchfemError, match="cannot be read"):
+        read_trace("a\0b")
+    with pytest.raises(PatchfemError, match=r"damaged .*; pack it again"):
+        read(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
+    monkeypatch.setattr(trace, "LARGEST", 1 << 20)
+    bomb = gzip.compress(b"0" * (1 << 22))
+    for content in (bomb, b" " * (1 << 21)):
+        with pytest.raises(PatchfemError, match="more than 1 MiB of text; keep every few samples"):
+            read(tmp_path, content)
+
+
+def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch):
+    """A gzip file of 32 MiB of blanks and a line of a million columns; unpacked or split they take 30 MB and more."""
+    monkeypatch.setattr(trace, "LARGEST", 1 << 20)
+    columns = b"x [um],z [um]\n0,0\n" + b"," * 10**6 + b"1\n"
+    for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
+        (tmp_path / "before.csv").write_bytes(content)
+        tracemalloc.start()
+        with pytest.raises(PatchfemError, match=r"more than 1 MiB|a line of 1000001 characters"):
+            read_trace(tmp_path / "before.csv")
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert peak < megabytes * 2**20
+
+
+def timed(tmp_path, count) -> float:
+    z = np.random.default_rng(1).normal(size=count)
+    path = tmp_path / "long.csv"
+    path.write_text("x [um],z [um]\n" + "".join(f"{i * 0.0127:.4f},{h:.6f}\n" for i, h in enumerate(z)))
+    start = process_time()
+    profile = read_trace(path)
+    seconds = process_time() - start
+    assert profile.x.size == count and np.allclose(profile.z, np.round(z, 6) * UM, rtol=1e-14, atol=0)
+    return seconds
+
+
+def test_always_reading_is_quick(tmp_path):
+    """0.5 us a sample on one core, 0.03 s here; a parser twenty times slower fails."""
+    assert timed(tmp_path, 50_000) < 0.5
+
+
+@pytest.mark.slow
+def test_always_a_million_samples_take_seconds(tmp_path):
+    assert timed(tmp_path, 1_000_000) < 10.0
+
+
+SEED = text(X, Z).encode()
+lines_of_junk = st.lists(st.text(alphabet="0123456789.,;\t eE+-nax[]um*#\"z()\n", max_size=30), max_size=8)
+
+
+def attempt(content: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.csv"
+        path.write_bytes(content)
+        start = process_time()
+        try:
+            with warnings.catch_warnings(action="error"):
+                profile = read_trace(path)
+        except PatchfemError as refusal:
+            assert str(path) in str(refusal) and len(str(refusal)) < 400 + len(str(path))
+        else:
+            there = ~profile.missing
+            assert there.sum() >= 2 and np.isfinite(profile.z[there]).all() and np.isfinite(profile.x).all()
+            assert (np.diff(profile.x) > 0).all()
+        assert process_time() - start < 2.0
+
+
+@QUIET
+@given(st.one_of(st.binary(max_size=300), st.text(max_size=200).map(lambda t: t.encode("utf-8", "surrogatepass")),
+                 st.binary(max_size=100).map(lambda b: b"\x1f\x8b" + b),
+                 lines_of_junk.map(lambda rows: ("x [um],z [um]\n" + "\n".join(rows)).encode()),
+                 lines_of_junk.map(lambda rows: "\n".join(rows).encode())))  # fmt: skip
+def test_always_junk_is_refused_by_name(content):
+    attempt(content)
+
+
+@QUIET
+@given(st.integers(0, len(SEED)), st.integers(0, 40), st.binary(max_size=6))
+def test_always_a_damaged_file_is_read_or_refused_by_name(at, cut, put):
+    attempt(SEED[:at] + put + SEED[at + cut:])
+
+
+@QUIET
+@given(st.lists(st.tuples(st.floats(), st.floats()), max_size=30), st.sampled_from([*UNITS]))
+def test_always_any_numbers_are_read_or_refused_by_name(rows, unit):
+    attempt((f"x [{unit}] z [{unit}]\n" + "".join(f"{a!r} {b!r}\n" for a, b in rows)).encode())
