@@ -211,7 +211,8 @@ def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span:
     """Forces (s, m), motion q at the bottom of the dual, and steps, from `sink` [m] beyond the nearest node.
 
     Newton directions, stiffened by 1e-9 of the load over `span` [m]. Along each the slope of the dual rises, so the
-    step is bracketed and taken where the slope is halved at least and not yet > 0: the dual falls each time.
+    step is bracketed and taken where the slope is halved at least and not yet > 0: the dual falls each time; or at once
+    where what is lacking halves its record.
     """
     q, soft = np.zeros(target.size), 1e-9 * target[0] / span * np.eye(target.size)
     q[0] = gap.min() + sink
@@ -223,10 +224,11 @@ def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span:
             return None, None, None, 0
         return force, slope, target - rigid.T @ force.sum(axis=0) - spring @ q, steps
 
-    force, slope, lack, total = at(q)
+    (force, slope, lack, total), record = at(q), np.inf
     for _ in range(60):
-        if force is None or np.abs(lack).max() <= 1e-12 * target[0]:
+        if force is None or (size := np.abs(lack).max()) <= 1e-12 * target[0]:
             break
+        record = min(record, size)
         system = (_skin_parts(c, rigid, slope, slope) if _smooth(skin) else _bare_parts(c, rigid, slope))[1]
         way = np.linalg.solve(system + spring + soft, lack)
         low, high, length, best = 0.0, np.inf, 1.0, None
@@ -234,9 +236,10 @@ def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span:
             *trial, steps = at(q + length * way)
             total += steps
             push = -np.inf if trial[0] is None else trial[2] @ way  # > 0: further
-            if push >= -1e-9 * (lack @ way):
+            halved = trial[0] is not None and np.abs(trial[2]).max() <= 0.5 * record
+            if push >= 0 or halved:
                 best, low = (*trial, q + length * way), length
-                if push <= 0.5 * (lack @ way):
+                if halved or push <= 0.5 * (lack @ way):
                     break
             else:
                 high = length
@@ -307,8 +310,8 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
     """
     bent = force @ c
     opening = gap + free * x - delta + bent
-    depth = np.ptp(gap, axis=1) + np.abs(bent).max() + abs(free) * np.ptp(x) + 1e-300
-    most, total = max(force.max(), 1e-260), max(force.sum(), 1e-260)
+    depth = np.ptp(gap, axis=1) + np.abs(bent).max() + abs(free) * np.ptp(x) + 1e-150
+    most, total = max(force.max(), 1e-150), max(force.sum(), 1e-150)
     out = {"tension": max(0.0, -force.min()) / most}
     if skin is None:
         out["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
@@ -372,9 +375,8 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
 
 def _state(skin, weight, x, offsets, force, opening, delta, theta, count, checks) -> StripsState:
     load, moment, roll_moment = float(force.sum()), float((force @ x).sum()), float(force.sum(axis=1) @ offsets)
-    touch, stiffness = load > 0, None
-    if skin is not None:
-        stiffness = frozen_array(np.where(force > 0, skin.stiffness(opening), 0.0) if touch else force)
+    touch = load > 0
+    stiffness = None if skin is None else frozen_array(skin.stiffness(opening) * (force > 0) if touch else force)
     share = float(((force > 0) * weight).sum() / (weight.sum() * offsets.size))
     centre = (moment / load, roll_moment / load) if touch else (0.0, 0.0)
     return StripsState(frozen_array(force), frozen_array(force / weight), frozen_array(opening), stiffness,
