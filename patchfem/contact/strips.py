@@ -125,8 +125,10 @@ def _bordered(c, gap, rigid, target, spring, active) -> tuple:
     motion = np.linalg.solve(system + spring, side)
     for strips, nodes, lift, free in parts:
         force[np.ix_(strips, nodes)] = lift @ motion - free.T
-    motion[0] += nearest
-    return force, motion
+    rest = np.linalg.solve(system + spring, target - rigid.T @ force.sum(axis=0) - spring @ motion)
+    for strips, nodes, lift, _ in parts:  # round-off of a rotation that closes far less than it turns
+        force[np.ix_(strips, nodes)] += lift @ rest
+    return force, motion + rest + nearest * np.eye(1, target.size)[0]
 
 
 def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple | None:
@@ -164,11 +166,7 @@ def _tangent_step(c, rigid, target, spring, slope, missing, lack) -> tuple:
 
 
 def _newton(skin, c, weight, gap, rigid, target, spring, s, q, limit: int = 60) -> tuple | None:
-    """Forces, separations, motion, steps of a smooth skin from (s, q); None where it does not settle.
-
-    The steps of `skin`: a node that gains force moves along log P, one that loses force along s, one of negligible
-    force may rise at once to 1 % of the mean pressure.
-    """
+    """Forces, separations, motion, steps of a smooth skin from (s, q) by the steps of `skin`; None: not settled."""
     mean = target[0] / (weight.sum() * len(gap))
     faint = skin.separation(np.array(0.01 * mean))
     for count in range(1, limit + 1):

@@ -405,7 +405,8 @@ def test_exact_start_of_a_neighbour_leads_to_the_same():
                       for roll in (4e-5, 5e-5))
         warm = press_strips(c, x, weight, y, 2e-5 * x, 5e-5, LOAD, 0.0, rotation=0.1, skin=skin, start=near)
         assert np.abs(warm.force - cold.force).max() <= 1e-11 * LOAD
-        assert warm.iterations <= cold.iterations
+        again = press_strips(c, x, weight, y, 2e-5 * x, 5e-5, LOAD, 0.0, rotation=0.1, skin=skin, start=cold)
+        assert again.iterations <= 2 and warm.iterations <= cold.iterations
 
 
 # ---------------------------------------------------------------------------------------------------------- stiffnesses
