@@ -1,0 +1,463 @@
+"""Strips side by side: one patch without roll, one dense problem, wedges in closed form, mirrors and hard cases."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
+
+from patchfem.closed_contact import wedge_linear, wedge_opening, wedge_skin
+from patchfem.contact import skin as skins
+from patchfem.contact import strips
+from patchfem.contact.skin import ExponentialSkin, HertzSkin, LinearSkin
+from patchfem.contact.slip import normal_stiffness, tangential_stiffness
+from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
+from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces
+from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
+
+AREA = LENGTH * WIDTH
+MEAN = LOAD / AREA
+SKINS = {"bare": None, "linear": LinearSkin(1e13), "exponential": ExponentialSkin(0.5e-6),
+         "hertz": HertzSkin(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)}
+each_skin = pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS.keys())
+CONTROLS = {"held": {}, "moment": {"moment": 2e-3 * LOAD}, "spring": {"moment": -1e-3 * LOAD, "spring": 3e3}}
+each_control = pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
+
+
+def real(count, cells=60):
+    """(normal, x, weight, offsets) of strips of the coated pair."""
+    pair = coated_pair(cells)
+    c, _, weight = one_strip(pair, count)
+    return c, pair.interface.x, weight, strip_offsets(WIDTH, count)
+
+
+def rigid(count, cells=1, length=LENGTH, width=WIDTH):
+    """The same of rigid bodies, nodes in the middle of equal cells: exact for wedges."""
+    x = (np.arange(cells) + 0.5) * (length / cells) - length / 2
+    weight = np.full(cells, length * width / cells / count)
+    return np.zeros((cells, cells)), x, weight, strip_offsets(width, count)
+
+
+def softer(skin, c, weight):
+    """A linear skin in series with the bodies."""
+    return c if skin is None else c + np.diag(1 / (skin.k * weight))
+
+
+def whole(skin, cells, gap, moment=None, spring=0.0, load=LOAD):
+    """(nodal forces, delta, theta) of the undivided patch."""
+    pair = coated_pair(cells)
+    x, weight = pair.interface.x, pair.interface.weight
+    if skin is None or isinstance(skin, LinearSkin):
+        pair = Compliance(pair.interface, softer(skin, pair.normal, weight), pair.tangential)
+        state = press(pair, gap, load, moment, spring=spring)
+        return state.sigma_n * weight, state.approach, state.rotation
+    state = skins.solve(skin, pair.normal, x, weight, gap, load, moment)
+    return state.force, state.delta, state.theta
+
+
+def random_gaps(rng, x, count, size):
+    """One smooth random gap per strip (count, m) [m]."""
+    return np.array([rough(rng, x, size) for _ in range(count)])
+
+
+# ------------------------------------------------------------------------------------------------- against one patch
+@each_skin
+@each_control
+@pytest.mark.parametrize("angle", [0.0, 1e-4])
+def test_exact_strips_without_roll_are_one_patch(skin, control, angle):
+    c, x, weight, y = real(8)
+    state = press_strips(c, x, weight, y, angle * x, load=LOAD, skin=skin, **control)
+    if isinstance(skin, ExponentialSkin | HertzSkin) and "spring" in control:  # an undivided one knows no spring
+        control = {"moment": control["moment"] + control["spring"] * state.theta}
+    force, delta, theta = whole(skin, 60, angle * x, **control)
+    assert np.abs(8 * state.force - force).max() <= 1e-12 * LOAD
+    assert state.delta == pytest.approx(delta, rel=1e-12, abs=1e-19)
+    assert state.theta == pytest.approx(theta, rel=1e-11, abs=1e-17)
+    assert abs(state.roll_moment) <= 1e-13 * LOAD * WIDTH
+    assert state.fraction == pytest.approx(weight[force > 0].sum() * 8 / AREA, rel=1e-12)
+
+
+@each_skin
+def test_exact_one_strip_does_not_feel_the_roll(skin):
+    c, x, weight, y = real(1)
+    flat, rolled = (press_strips(c, x, weight, y, 1e-5 * x, roll, load=LOAD, skin=skin) for roll in (0.0, 1e-3))
+    assert y.tolist() == [0.0] and rolled.centre_y == 0.0
+    assert np.array_equal(flat.force, rolled.force) and flat.delta == rolled.delta
+
+
+# ------------------------------------------------------------------------------- against one dense problem of all nodes
+def dense_cases(number):
+    rng = np.random.default_rng(20)
+    for k in range(number):
+        count = int(rng.integers(2, 6))
+        c, x, weight, y = real(count, 30)
+        gap = random_gaps(rng, x, count, 10**rng.uniform(-8, -6))
+        roll, load = 10**rng.uniform(-6, -3) * rng.choice([-1, 1]), LOAD * 10**rng.uniform(-1, 1)
+        moment = None if k % 3 == 0 else load * LENGTH / 2 * rng.uniform(-0.8, 0.8)
+        yield c, x, weight, y, gap, roll, load, moment, 0.0 if k % 3 < 2 else 10**rng.uniform(1, 5)
+
+
+@pytest.mark.parametrize("skin", [None, LinearSkin(1e12), LinearSkin(1e15)])
+def test_exact_answer_is_that_of_one_block_diagonal_operator(skin):
+    for c, x, weight, y, gap, roll, load, moment, spring in dense_cases(12):
+        state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring, skin=skin)
+        target = np.array([load] if moment is None else [load, moment])
+        force, motion, _ = solve_forces(np.kron(np.eye(y.size), softer(skin, c, weight)), np.tile(x, y.size),
+                                        (gap + roll * y[:, None]).ravel(), target, spring=spring)
+        assert np.abs(state.force.ravel() - force).max() <= 1e-10 * load
+        assert state.delta == pytest.approx(motion[0], rel=1e-10)
+        assert state.theta == pytest.approx(-motion[1] if moment is not None else 0.0, rel=1e-8, abs=1e-16)
+
+
+@pytest.mark.parametrize("skin", [ExponentialSkin(2e-7), SKINS["hertz"]], ids=["exponential", "hertz"])
+def test_exact_smooth_skins_answer_is_that_of_one_block_diagonal_operator(skin):
+    for c, x, weight, y, gap, roll, load, moment, spring in dense_cases(9):
+        if spring == 0:
+            state = press_strips(c, x, weight, y, gap, roll, load, moment, skin=skin)
+            other = skins.solve(skin, np.kron(np.eye(y.size), c), np.tile(x, y.size), np.tile(weight, y.size),
+                                (gap + roll * y[:, None]).ravel(), load, moment)
+            assert np.abs(state.force.ravel() - other.force).max() <= 1e-10 * load
+            assert np.abs(state.gap.ravel() - other.separation).max() <= 1e-9 * np.ptp(other.separation)
+
+
+# ------------------------------------------------------------------------------------------------ wedges in closed form
+@pytest.mark.parametrize("count", [2, 3, 8, 64])
+def test_exact_rigid_pad_in_full_contact_has_the_centre_of_the_wedge_less_one_over_count_squared(count):
+    c, x, weight, y = rigid(count)
+    roll = 0.7 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    state = press_strips(c, x, weight, y, np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
+    _, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)
+    assert state.centre_y == pytest.approx(centre * (1 - 1 / count**2), rel=1e-12) and centre < 0
+
+
+@pytest.mark.parametrize("count", [2, 8, 64, 256])
+def test_exact_rigid_pad_that_is_half_open(count):
+    """Rolled to f = 1/2 the edge lies between strips; n of them under a triangle have their centre n/3 + 1/(6 n) strips
+    from the closed edge, so that of the pad is short by 1/count^2 again."""
+    roll = 4 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    fraction, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)
+    assert fraction == pytest.approx(0.5, rel=1e-14)
+    state = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
+    assert state.fraction == 0.5
+    assert state.centre_y == pytest.approx(centre * (1 - 1 / count**2), rel=1e-10)
+
+
+def test_order_two_rigid_pad_of_any_opening():
+    """The edge lies a third into a strip at every count: one strip more than a multiple of three, f = 1/3."""
+    roll = 9 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    off = []
+    for count in (4, 16, 64, 256):
+        state = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
+        off.append(abs(state.centre_y / wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1] - 1))
+    assert off[-1] < 2e-5
+    assert all(np.log(a / b) / np.log(4) == pytest.approx(2, abs=0.1) for a, b in pairwise(off[1:]))
+
+
+@pytest.mark.parametrize("ratio", [0.1, 2.0, 30.0])
+def test_exact_rolled_pad_on_the_exponential_skin(ratio):
+    """Centre L(1/2 - 1/B + 1/(exp(B) - 1)), B = roll L/u0; the sum over the middles of the strips is geometric."""
+    count, u0 = 200, 2.5e-6
+    roll = ratio * u0 / WIDTH
+    state = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=ExponentialSkin(u0))
+    half = ratio / count / 2
+    finite = -WIDTH * (0.5 - 1 / np.tanh(half) / 2 / count + 1 / np.expm1(ratio))
+    assert state.centre_y == pytest.approx(finite, rel=1e-9)
+    assert state.centre_y == pytest.approx(wedge_skin(roll, WIDTH, u0)[1], abs=1.01 * WIDTH * ratio / 12 / count**2)
+
+
+@pytest.mark.parametrize(("roll", "yaw"), [(1e-5, 33.3), (1e-4, 157.5), (1e-3, 208.4)])
+def test_figure_yaw_moment_of_a_rolled_pad_on_a_linear_skin(roll, yaw):
+    """10 x 10 mm, 116 N, 1e13 Pa/m, mu 0.4 [N mm]: the closed forms, and 4000 strips."""
+    centre = wedge_linear(roll, 116.0, 0.01, 0.01, 1e13)[1]
+    assert -0.4 * 116 * centre * 1e3 == pytest.approx(yaw, abs=0.05)
+    c, x, weight, y = rigid(4000, length=0.01, width=0.01)
+    state = press_strips(c, x, weight, y, np.zeros(1), roll, load=116.0, skin=LinearSkin(1e13))
+    assert -state.yaw_moment(0.4) * 1e3 == pytest.approx(yaw, abs=0.05)
+    assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
+
+
+@pytest.mark.parametrize("roll", [1e-5, 1e-4, 1e-3])
+def test_exact_flat_pieces_are_a_rigid_pad_on_their_own_stiffness(roll):
+    """Without tilt a strip touches all along or not at all: a foundation of dN/d(approach) per area, and its wedge."""
+    stiffness = normal_stiffness(coated_pair(60).normal, np.ones(61, bool)) / AREA
+    fraction, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, stiffness)
+    for count in (7, 16, 256):
+        c, x, weight, y = real(count)
+        state = press_strips(c, x, weight, y, np.zeros(61), roll, load=LOAD)
+        pad = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=LinearSkin(stiffness))
+        assert state.centre_y == pytest.approx(pad.centre_y, rel=1e-10)
+        assert state.delta == pytest.approx(pad.delta, rel=1e-10)
+        assert state.fraction == pytest.approx(pad.fraction, rel=1e-12)
+    assert abs(state.centre_y - centre) <= 3e-5 * WIDTH and fraction < 1
+
+
+def test_order_two_centre_of_tilted_and_rolled_pieces():
+    """Against 243 strips the error of the centre falls by nine for strips a third as wide."""
+    def centre(count):
+        c, x, weight, y = real(count)
+        return press_strips(c, x, weight, y, 3e-5 * x, 2e-5, load=LOAD).centre_y
+
+    best = centre(243)
+    off = [abs(centre(count) - best) for count in (3, 9, 27)]
+    assert off[-1] <= 2e-3 * abs(best)
+    assert np.log(off[0] / off[2]) / np.log(9) == pytest.approx(2, abs=0.25)
+
+
+# ------------------------------------------------------------------------------------------------------------- mirrors
+@each_skin
+@each_control
+def test_exact_mirrors(skin, control):
+    c, x, weight, y = real(5, 30)
+    c = (c + c[::-1, ::-1]) / 2
+    gap = random_gaps(np.random.default_rng(4), x, 5, 3e-7)
+    state = press_strips(c, x, weight, y, gap, 3e-5, LOAD, skin=skin, **control)
+    over = press_strips(c, x, weight, y, gap[::-1], -3e-5, LOAD, skin=skin, **control)
+    assert np.abs(over.force[::-1] - state.force).max() <= 1e-11 * LOAD
+    assert over.centre_y == pytest.approx(-state.centre_y, rel=1e-10)
+    back = control | {"moment": -control["moment"]} if control else control
+    turned = press_strips(c, x, weight[::-1], y, gap[:, ::-1], 3e-5, LOAD, skin=skin, **back)
+    assert np.abs(turned.force[:, ::-1] - state.force).max() <= 1e-11 * LOAD
+    assert turned.centre_x == pytest.approx(-state.centre_x, rel=1e-9)
+    assert turned.theta == pytest.approx(-state.theta, rel=1e-9, abs=1e-18)
+
+
+@each_skin
+def test_always_roll_to_plus_y_moves_the_centre_to_minus_y(skin):
+    centres = [press_strips(*real(8), np.zeros(61), roll, LOAD, skin=skin).centre_y
+               for roll in (1e-6, 1e-5, 1e-4, 1e-3)]
+    assert 0 > centres[0] and all(a > b for a, b in pairwise(centres)) and centres[-1] >= -WIDTH / 2
+
+
+# ------------------------------------------------------------------------------------------- the definitions themselves
+def law_of(skin, weight, opening, load, count):
+    """Nodal force that the skin gives at a separation."""
+    if isinstance(skin, ExponentialSkin) and skin.reference is None:
+        skin = ExponentialSkin(skin.u0, load / (weight.sum() * count))
+    return weight * skin.pressure(opening)
+
+
+def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, free=None):
+    """Every definition with its own arithmetic."""
+    free = state.theta if free is None else free
+    force, y = state.force, state.offsets
+    assert max(state.residuals.values()) <= LIMIT
+    assert force.sum() == pytest.approx(load, rel=1e-9)
+    if moment is not None:
+        assert abs((force * x).sum() - moment - spring * free) <= 1e-9 * (load * LENGTH + abs(spring * free))
+    bent = np.array([c @ row for row in force])
+    opening = gap + roll * y[:, None] + free * x - state.delta + bent
+    depth = np.ptp(gap) + bent.max() + abs(free) * LENGTH
+    if skin is None:
+        assert opening.min() >= -1e-9 * depth and force.min() >= 0
+        assert (force * np.abs(opening)).sum() <= 1e-9 * load * depth
+        assert np.abs(state.gap - opening).max() <= 1e-9 * depth
+    elif isinstance(skin, LinearSkin):
+        rest = force / (skin.k * weight)
+        assert np.all(np.abs(opening + rest)[force > 0] <= 1e-9 * (depth + rest.max()))
+        assert opening[force == 0].min(initial=0.0) >= -1e-9 * depth
+    else:
+        assert np.abs(force - law_of(skin, weight, opening, load, y.size)).max() <= 1e-8 * force.max()
+    assert state.load == pytest.approx(force.sum(), rel=1e-14)
+    assert state.centre_x * load == pytest.approx((force * x).sum(), rel=1e-9, abs=1e-12 * load * LENGTH)
+    assert state.centre_y * load == pytest.approx((force.T * y).sum(), rel=1e-9, abs=1e-12 * load * LENGTH)
+    assert not state.force.flags.writeable and not state.pressure.flags.writeable
+
+
+@each_skin
+@each_control
+def test_exact_balances_of_a_rolled_pair(skin, control):
+    c, x, weight, y = real(8)
+    gap = 2e-5 * x + rough(np.random.default_rng(5), x, 2e-7)
+    state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, rotation=0.25, skin=skin, **control)
+    free = state.theta - 0.25
+    assert state.outcome is Outcome.DONE and (control or free == 0)
+    check(state, skin, c, x, weight, gap, 1e-4, LOAD, free=free, **control)
+
+
+@settings(max_examples=40, deadline=None)
+@given(count=st.integers(1, 8), size=st.floats(-9, -5), roll=st.floats(-7, -2), load=st.floats(-3, 2),
+       where=st.one_of(st.none(), st.floats(-0.97, 0.97)), spring=st.one_of(st.just(0.0), st.floats(1.0, 1e6)),
+       skin=st.sampled_from([*SKINS.values(), LinearSkin(1e16), ExponentialSkin(2e-8)]), seed=st.integers(0, 2**32 - 1))
+def test_always_any_gap_in_every_strip_is_solved(count, size, roll, load, where, spring, skin, seed):
+    rng = np.random.default_rng(seed)
+    c, x, weight, y = real(count, 24)
+    gap = random_gaps(rng, x, count, 10**size) + rng.choice([0, 1]) * 10**size * rng.normal(size=(count, x.size))
+    roll, load = 10**roll * rng.choice([-1, 0, 1]), LOAD * 10**load
+    moment = None if where is None else where * load * LENGTH / 2
+    state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring if where is not None else 0.0,
+                         skin=skin)
+    check(state, skin, c, x, weight, gap, roll, load, moment, spring)
+
+
+@pytest.mark.slow
+def test_always_a_thousand_random_strips_are_solved():
+    rng = np.random.default_rng(77)
+    for _ in range(1000):
+        count = int(rng.integers(1, 17))
+        c, x, weight, y = real(count, 40)
+        gap = random_gaps(rng, x, count, 10**rng.uniform(-9, -5)) + 10**rng.uniform(-9, -6) * rng.normal(size=x.size)
+        roll, load = 10**rng.uniform(-7, -2) * rng.choice([-1, 1]), LOAD * 10**rng.uniform(-3, 2)
+        moment = None if rng.random() < 0.3 else load * LENGTH / 2 * rng.uniform(-0.99, 0.99)
+        spring = 0.0 if rng.random() < 0.5 or moment is None else 10**rng.uniform(0, 6)
+        skin = [None, LinearSkin(10**rng.uniform(10, 17)), ExponentialSkin(10**rng.uniform(-8, -5.5)),
+                HertzSkin(10e-6, 10**rng.uniform(8, 11), 10**rng.uniform(-7.3, -5.5), 1.3e11)][rng.integers(4)]
+        state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring, skin=skin)
+        check(state, skin, c, x, weight, gap, roll, load, moment, spring)
+
+
+@each_skin
+@each_control
+def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypatch):
+    c, x, weight, y = real(4, 24)
+    gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
+    state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
+    first = strips._linearised(*_smooth_case(skin, c, x, weight, gap + 1e-4 * y[:, None], control)) \
+        if isinstance(skin, ExponentialSkin | HertzSkin) else None
+    monkeypatch.setattr(strips, "_active_set", lambda *a: None)
+    monkeypatch.setattr(strips, "_newton", lambda *a: None)
+    monkeypatch.setattr(strips, "_linearised", lambda *a: first)
+    other = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
+    assert np.abs(other.force - state.force).max() <= 1e-10 * LOAD
+    assert other.delta == pytest.approx(state.delta, rel=1e-9)
+    assert other.theta == pytest.approx(state.theta, rel=1e-8, abs=1e-16)
+
+
+def _smooth_case(skin, c, x, weight, gap, control):
+    if isinstance(skin, ExponentialSkin):
+        skin = ExponentialSkin(skin.u0, MEAN)
+    target = np.array([LOAD] + ([control["moment"]] if control else []))
+    motions, spring, scale = strips._holder(x, target.size, control.get("spring", 0.0))
+    return skin, c, x, weight, gap, motions, target / scale, spring
+
+
+# ---------------------------------------------------------------------------------------------------------- hard cases
+@pytest.mark.parametrize("skin", [None, LinearSkin(1e13)])
+def test_exact_a_great_roll_presses_the_edge_strip_alone(skin):
+    c, x, weight, y = real(8)
+    state = press_strips(c, x, weight, y, 1e-5 * x, 2e-2, load=LOAD, skin=skin)
+    alone = press(Compliance(Interface(x, weight, WIDTH / 8), softer(skin, c, weight), c), 1e-5 * x, LOAD)
+    assert not state.force[1:].any()
+    assert np.abs(state.pressure[0] - alone.sigma_n).max() <= 1e-10 * alone.sigma_n.max()
+    assert state.centre_y == pytest.approx(y[0], rel=1e-12)
+    assert state.fraction == pytest.approx(weight[alone.sigma_n > 0].sum() / AREA, rel=1e-12)
+
+
+def test_exact_strips_that_never_touch_do_not_count():
+    c, x, weight, y = real(4)
+    gap = np.array([[0.0], [1.0], [0.0], [1.0]]) + np.zeros((4, x.size))
+    state = press_strips(c, x, weight, y, gap, load=LOAD, moment=1e-3 * LOAD)
+    two = press_strips(c, x, weight, y[::2], np.zeros(x.size), load=LOAD, moment=1e-3 * LOAD)
+    assert not state.force[1::2].any()
+    assert np.abs(state.force[::2] - two.force).max() <= 1e-13 * LOAD
+
+
+@each_skin
+def test_exact_zero_load_touches_and_carries_nothing(skin):
+    c, x, weight, y = real(4)
+    state = press_strips(c, x, weight, y, 1e-5 * x + 3e-6, 1e-4, load=0.0, moment=0.0, skin=skin)
+    assert state.outcome is Outcome.NO_CONTACT and not state.force.any()
+    assert (state.load, state.moment, state.roll_moment, state.centre_y, state.fraction) == (0, 0, 0, 0, 0)
+    assert state.delta == pytest.approx(3e-6 - 1e-5 * LENGTH / 2 - 1e-4 * WIDTH * 3 / 8, rel=1e-12)
+    assert strips_tangent(c, weight, state) == 0.0
+
+
+def test_exact_approach_presses_every_strip_for_itself():
+    c, x, weight, y = real(6)
+    state = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, approach=1e-7)
+    pair = Compliance(Interface(x, weight, WIDTH / 6), c, c)
+    for strip, place in enumerate(y):
+        alone = press_by(pair, 2e-5 * x + 1e-4 * place, 1e-7)
+        assert np.abs(state.pressure[strip] - alone.sigma_n).max() <= 1e-12 * (alone.sigma_n.max() + 1)
+        assert np.abs(state.gap[strip] - alone.gap).max() <= 1e-18
+    apart = press_strips(c, x, weight, y, np.zeros(x.size), 1e-4, approach=-1e-4 * WIDTH)
+    assert apart.outcome is Outcome.NO_CONTACT and apart.gap.min() > 0
+
+
+@each_skin
+def test_exact_approach_of_a_load_gives_the_load_back(skin):
+    c, x, weight, y = real(6)
+    if isinstance(skin, ExponentialSkin):
+        skin = ExponentialSkin(skin.u0, MEAN)
+    loaded = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, load=LOAD, skin=skin)
+    by = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, approach=loaded.delta, skin=skin)
+    assert by.load == pytest.approx(LOAD, rel=1e-9)
+    assert np.abs(by.force - loaded.force).max() <= 1e-9 * LOAD
+
+
+@each_skin
+@pytest.mark.parametrize("roll", [0.0, 1e-5, 1e-4, 1e-3])
+def test_always_few_steps_on_the_test_piece(skin, roll):
+    c, x, weight, y = real(8, 200)
+    state = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, skin=skin)
+    again = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, skin=skin, start=state)
+    assert state.iterations <= 12 and again.iterations <= 2
+    assert np.abs(again.force - state.force).max() <= 1e-12 * LOAD
+
+
+def test_exact_start_of_a_neighbour_leads_to_the_same():
+    for skin in SKINS.values():
+        c, x, weight, y = real(4, 30)
+        near, cold = (press_strips(c, x, weight, y, 2e-5 * x, roll, LOAD, 0.0, rotation=0.1, skin=skin)
+                      for roll in (4e-5, 5e-5))
+        warm = press_strips(c, x, weight, y, 2e-5 * x, 5e-5, LOAD, 0.0, rotation=0.1, skin=skin, start=near)
+        assert np.abs(warm.force - cold.force).max() <= 1e-11 * LOAD
+        again = press_strips(c, x, weight, y, 2e-5 * x, 5e-5, LOAD, 0.0, rotation=0.1, skin=skin, start=cold)
+        assert again.iterations <= 2 and warm.iterations <= cold.iterations
+
+
+# ---------------------------------------------------------------------------------------------------------- stiffnesses
+@each_skin
+def test_order_two_tangent_is_the_difference_of_loads(skin):
+    c, x, weight, y = real(5, 30)
+    if isinstance(skin, ExponentialSkin):
+        skin = ExponentialSkin(skin.u0, MEAN)
+    state = press_strips(c, x, weight, y, 2e-5 * x, 3e-5, load=LOAD, skin=skin)
+    step = 1e-5 * LOAD / strips_tangent(c, weight, state)
+    more, less = (press_strips(c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, skin=skin).load
+                  for h in (step, -step))
+    assert (more - less) / (2 * step) == pytest.approx(strips_tangent(c, weight, state), rel=1e-6)
+
+
+def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
+    pair = coated_pair(60)
+    c, tangential, weight = one_strip(pair, 8)
+    y, gap = strip_offsets(WIDTH, 8), 1e-4 * pair.interface.x
+    bare = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD)
+    active = bare.force[0] > 0
+    assert strips_tangent(c, weight, bare) == pytest.approx(normal_stiffness(pair.normal, active), rel=1e-12)
+    assert strips_tangent(tangential, weight, bare) == pytest.approx(tangential_stiffness(pair.tangential, active),
+                                                                     rel=1e-12)
+    skin = SKINS["hertz"]
+    rough_one = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, skin=skin)
+    one = skins.tangent(pair.tangential, pair.interface.weight, 0.8 * rough_one.stiffness[0])
+    assert strips_tangent(tangential, weight, rough_one, 0.8) == pytest.approx(one, rel=1e-12)
+    stiff = strips_tangent(tangential, weight, rough_one, np.inf)
+    assert stiff == pytest.approx(tangential_stiffness(pair.tangential, np.ones(61, bool)), rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+def test_refuses_what_has_no_answer():
+    c, x, weight, y = real(4, 30)
+    flat = np.zeros(x.size)
+    for wrong in ({}, {"load": 1.0, "approach": 1e-6}, {"approach": 1e-6, "moment": 0.0}, {"load": -1.0},
+                  {"load": np.nan}, {"load": 1.0, "roll": np.inf}, {"approach": 1e-6, "skin": ExponentialSkin(1e-6)}):
+        with pytest.raises(PatchfemError, match="contact"):
+            press_strips(c, x, weight, y, flat, **wrong)
+    with pytest.raises(PatchfemError, match=r"contact\.load_line: .* tips over"):
+        press_strips(c, x, weight, y, flat, load=1.0, moment=0.51 * LENGTH)
+    held = press_strips(c, x, weight, y, flat, load=1.0, moment=0.51 * LENGTH, spring=1e3)
+    assert held.moment == pytest.approx(0.51 * LENGTH + 1e3 * held.theta, rel=1e-9)
+    with pytest.raises(PatchfemError, match=r"contact\.strips\.count"):
+        strip_offsets(WIDTH, 0)
+
+
+def test_refuses_a_rotation_that_the_contact_set_leaves_open():
+    c, x, weight, y = real(4, 30)
+    with pytest.raises(NotConverged, match="does not determine the rotation"):
+        press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0)
+    state = press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0, spring=1e3)
+    assert (state.force > 0).sum() == 4 and abs(state.theta) <= 1e-15
