@@ -71,14 +71,17 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
     if min(grids["lower"].size, grids["upper"].size) < 3:
         raise PatchfemError(f"contact.mesh: the pieces share {end - begin:.6g} m of interface only, less than two "
                             "cells; shift or refine them")
-    soft = softness(x_upper, upper[0], grids["lower"]) / softness(x_lower, lower[0], grids["lower"])
-    grids["both"] = common_grid(grids["lower"], grids["upper"], soft)
+    soft = (softness(x, own[0], grids[key]) for key, x, own in (("lower", x_lower, lower), ("upper", x_upper, upper)))
+    grids["both"] = common_grid(grids["lower"], grids["upper"], *soft)
     pair = (lower, x_lower), (upper, x_upper)
     name, note = side or _name(grids), ""
     found = _judged(grids, name, pair)
     if found.ripple > RIPPLE:
-        others = [_judged(grids, other, pair) for other in dict.fromkeys((_name(grids), "lower", "upper"))]
-        best = next((one for one in others if one.ripple <= RIPPLE), min(others, key=lambda one: one.ripple))
+        common = found if name == _name(grids) else _judged(grids, _name(grids), pair)
+        best = common
+        if common.ripple > RIPPLE:  # equal ones by place, so that bodies swapped give the same answer
+            others = [common] + [_judged(grids, other, pair) for other in ("lower", "upper") if other != common.side]
+            best = min(others, key=lambda one: (float(f"{one.ripple:.2e}"), tuple(one.x)))
         if best.ripple > WORST:
             raise PatchfemError(f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both "
                                 "pieces interface cells of like size that grow gradually")
@@ -143,21 +146,20 @@ def clipped(x, begin: float, end: float) -> np.ndarray:
     return np.concatenate([[begin], inner, [end]])
 
 
-def common_grid(x_lower, x_upper, soft) -> np.ndarray:
+def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
     """(m,) nodes of both pieces of the same ends, from left to right always on to the farther of the two next ones.
 
-    Where one piece is the coarser everywhere these are its nodes. soft: (m_l,) how many times the upper piece is
-    softer at x_lower; beyond SOFTER the softer piece's nodes alone.
+    Where one piece is the coarser everywhere these are its nodes. soft_lower, soft_upper: `softness` of each piece at
+    its nodes; where one is SOFTER times softer, its nodes alone.
     """
-    at, end = x_lower[0], min(x_lower[-1], x_upper[-1])
+    at, end, out = x_lower[0], x_lower[-1], [x_lower[0]]
     close = CLOSE * (end - at)
-    out = [at]
     while at < end - close:
         low, high = (x[min(int(np.searchsorted(x, at + close, "right")), x.size - 1)] for x in (x_lower, x_upper))
-        ratio = np.interp(at, x_lower, soft)
+        ratio = np.interp(at, x_upper, soft_upper) / np.interp(at, x_lower, soft_lower)
         at = low if ratio < 1 / SOFTER else high if ratio > SOFTER else max(low, high)
         out.append(at)
-    out[-1] = x_lower[-1]
+    out[-1] = end
     return np.array(out)
 
 

@@ -62,7 +62,7 @@ def test_always_any_nodes_between_the_same_ends_are_read(cells, shift, tmp_path_
     x = (x - 0.5) * 2e-3
     x[-1] = 1e-3
     m = unlike(drawn("quads"), drawn("mixed", TensorGrid(x, GRID.depth, 0)))
-    m.points = m.points + [shift, 0.0]
+    m.points = np.add(m.points, [shift, 0.0])
     pair = stored(m, tmp_path_factory.mktemp("unlike"))
     assert np.abs(pair.upper.x - x).max() <= 1e-15 and np.abs(pair.lower.x - GRID.x).max() <= 1e-15
 
