@@ -69,6 +69,11 @@ def forced(low, x_low, high, x_high, x):
     return one @ low[0] @ one.T + other @ high[0] @ other.T
 
 
+def rounding(nn):
+    """What the rounding of an ill-conditioned operator leaves: a side that would be refused."""
+    return 200 * np.finfo(float).eps * np.linalg.cond(nn)
+
+
 def pressed(x, nn, gap, load=LOAD):
     return press(Compliance(Interface(x, mortar.tributary(x), 1.0), nn, nn), gap, load)
 
@@ -107,9 +112,10 @@ def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stif
     x_low, x_high = nodes(one), nodes(other)
     low, high = column(x_low, HEIGHT, YOUNG, 0.0, plane), column(x_high, 0.7 * HEIGHT, stiff * YOUNG, 0.0, plane)
     soft = softness(x_low, low[0], x_low), softness(x_high, high[0], x_high)
-    for x in (x_low, x_high, common_grid(x_low, x_high, *soft)):
-        state = pressed(x, forced(low, x_low, high, x_high, x), np.zeros(x.size))
-        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=1e-12)
+    for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
+        nn = forced(low, x_low, high, x_high, x)
+        state = pressed(x, nn, np.zeros(x.size))
+        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=limit or rounding(nn))
         closing = LOAD / LENGTH * (HEIGHT / YOUNG + 0.7 * HEIGHT / (stiff * YOUNG))
         assert state.approach == pytest.approx(closing, rel=1e-12)
 
@@ -133,10 +139,11 @@ def rolling(x, height, young, poisson):
 def test_exact_patch_test_on_rollers_with_unlike_spreading(one, other, stiff):
     x_low, x_high = nodes(one), nodes(other)
     low, high = rolling(x_low, HEIGHT, YOUNG, 0.32), rolling(x_high, HEIGHT, stiff * YOUNG, 0.2)
-    for x in (x_low, x_high):
+    soft = softness(x_low, low, x_low), softness(x_high, high, x_high)
+    for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
         nn = forced((low,), x_low, (high,), x_high, x)
         state = pressed(x, (nn + nn.T) / 2, np.zeros(x.size))
-        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=1e-12)
+        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=limit or rounding(nn))
         assert state.approach == pytest.approx(LOAD / LENGTH * HEIGHT / YOUNG * (1 + 1 / stiff), rel=1e-12)
 
 
@@ -325,7 +332,7 @@ def test_always_pieces_that_overhang_touch_where_both_are(one, other, left, righ
     for own in (x_low, x_high):
         x = clipped(own, begin, end)
         assert (x[0], x[-1]) == pytest.approx((begin, end), abs=1e-9 * LENGTH) and np.all(np.diff(x) > 0)
-        assert np.diff(x).min() >= 0.04 * np.diff(own).min() or x.size == 2
+        assert np.diff(x).min() >= 0.49 * np.diff(own).min() or x.size == 2
         for body in (x_low, x_high):
             share = transfer(x, body)
             assert np.abs(share.sum(axis=1) - 1).max() <= 1e-12
