@@ -14,7 +14,7 @@ A caller condenses each piece as before, calls `mortar` instead of `substructure
 `forces` for the nodal forces of each piece before it recovers the fields inside.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array
@@ -66,30 +66,40 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
     _plain(upper, x_upper, "upper")
     if side not in (None, "lower", "upper"):
         raise PatchfemError(f"contact.mesh: the pressure lies on the lower or the upper piece, not on {side!r}")
+    pair = (lower, x_lower), (upper, x_upper)
+    grids = _grids(pair)
+    found = _judged(grids, side or _name(grids), pair)
+    if found.ripple <= RIPPLE:
+        return found
+    best = _steadiest(grids, pair)
+    if best.ripple > WORST:
+        raise PatchfemError(f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both pieces "
+                            "interface cells of like size that grow gradually")
+    if side in (None, best.side):
+        return best
+    return replace(best, reason=f"asked for on the {side} piece, but {found.reason}; instead {best.reason}")
+
+
+def _grids(pair) -> dict:
+    """The grids to choose from on the stretch that both pieces cover."""
+    (lower, x_lower), (upper, x_upper) = pair
     begin, end = overlap(x_lower, x_upper)
-    grids = {"lower": clipped(x_lower, begin, end), "upper": clipped(x_upper, begin, end)}
-    if min(grids["lower"].size, grids["upper"].size) < 3:
+    low, high = clipped(x_lower, begin, end), clipped(x_upper, begin, end)
+    if min(low.size, high.size) < 3:
         raise PatchfemError(f"contact.mesh: the pieces share {end - begin:.6g} m of interface only, less than two "
                             "cells; shift or refine them")
-    soft = (softness(x, own[0], grids[key]) for key, x, own in (("lower", x_lower, lower), ("upper", x_upper, upper)))
-    grids["both"] = common_grid(grids["lower"], grids["upper"], *soft)
-    pair = (lower, x_lower), (upper, x_upper)
-    name, note = side or _name(grids), ""
-    found = _judged(grids, name, pair)
-    if found.ripple > RIPPLE:
-        common = found if name == _name(grids) else _judged(grids, _name(grids), pair)
-        best = common
-        if common.ripple > RIPPLE:  # equal ones by place, so that bodies swapped give the same answer
-            others = [common] + [_judged(grids, other, pair) for other in ("lower", "upper") if other != common.side]
-            best = min(others, key=lambda one: (float(f"{one.ripple:.2e}"), tuple(one.x)))
-        if best.ripple > WORST:
-            raise PatchfemError(f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both "
-                                "pieces interface cells of like size that grow gradually")
-        if side is not None and best.side != side:
-            note = f"asked for on the {side} piece, but {found.reason}; instead "
-        found = best
-    return Mortar(found.side, found.x, found.tributary, found.to_lower, found.to_upper, found.nn, found.tt, found.nt,
-                  found.ripple, note + found.reason)
+    both = common_grid(low, high, softness(x_lower, lower[0], low), softness(x_upper, upper[0], high))
+    return {"lower": low, "upper": high, "both": both}
+
+
+def _steadiest(grids, pair) -> Mortar:
+    """The pair on the common grid, or on that of the least ripple where the common one is not steady."""
+    common = _judged(grids, _name(grids), pair)
+    if common.ripple <= RIPPLE:
+        return common
+    every = [common] + [_judged(grids, other, pair) for other in ("lower", "upper") if other != common.side]
+    # equal ones by place, so that swapped bodies give the same answer
+    return min(every, key=lambda one: (float(f"{one.ripple:.2e}"), tuple(one.x)))
 
 
 def transfer(x, own) -> csr_array:
