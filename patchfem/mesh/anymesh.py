@@ -74,17 +74,23 @@ class PieceMesh:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PairMesh:
-    """Two pieces that share no node and whose interface nodes lie at the same x."""
+    """Two pieces that share no node and whose interfaces have the same ends; their nodes between may differ."""
 
     lower: PieceMesh
     upper: PieceMesh
+
+    @property
+    def matching(self) -> bool:
+        """Whether both pieces have their interface nodes at the same x."""
+        a, b = self.lower.x, self.upper.x
+        return a.size == b.size and bool(np.abs(a - b).max() <= CLOSE * self.lower.length)
 
 
 def pieces(raw: Tagged, where) -> PairMesh:
     """Both pieces of a tagged mesh; `where` begins every message.
 
     PatchfemError names missing and unknown tags, node numbers that do not exist, twisted or empty cells, nodes and
-    cells that lie on one another, loose parts, an interface off y = 0 or with a hole, interfaces that do not match.
+    cells that lie on one another, loose parts, an interface off y = 0 or with a hole, interfaces with other ends.
     """
     _tags(raw, where)
     _numbers(raw, where)
@@ -98,12 +104,11 @@ def pieces(raw: Tagged, where) -> PairMesh:
     if shared:
         raise PatchfemError(f"{where}: the two pieces share {shared} nodes; each needs interface nodes of its own")
     lower, upper = _piece(raw, "lower", *owned["lower"], where), _piece(raw, "upper", *owned["upper"], where)
-    same = lower.x.size == upper.x.size
-    apart = np.abs(lower.x - upper.x).max() if same else np.inf
+    apart = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
     if apart > CLOSE * lower.length:
-        fault = f"nodes up to {apart:.6g} m apart" if same else f"{lower.x.size} and {upper.x.size} nodes"
-        raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault}); non-matching "
-                            "interfaces are not yet built: give both the same x")
+        fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, ends up to {apart:.6g} m apart"
+        raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault}); pieces that "
+                            "overhang are not yet built: give both the same ends (the nodes between may differ)")
     return PairMesh(_centred(lower, lower.x), _centred(upper, lower.x))
 
 

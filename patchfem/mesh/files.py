@@ -73,9 +73,10 @@ def write_mesh(grid: TensorGrid, path: Path) -> None:
 
 
 def read_pieces(path: Path) -> PairMesh:
-    """Both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv; the interfaces must match.
+    """Both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv.
 
-    PatchfemError names what is missing or wrong, `mesh.anymesh.pieces` lists it.
+    The interfaces need the same ends, their nodes between may differ (`PairMesh.matching`). PatchfemError names what is
+    missing or wrong, `mesh.anymesh.pieces` lists it.
     """
     path = Path(path)
     if not path.is_file():

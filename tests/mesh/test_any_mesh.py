@@ -268,7 +268,7 @@ def share(m):
 SPOILT = {
     "off the line": (lambda m: move(m, interface_node(m), (0, 2e-5)), "upper_interface is not the straight line y = 0"),
     "shifted": (lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)), "do not match .* not yet built"),
-    "one node aside": (lambda m: move(m, interface_node(m), (1e-7, 0)), "do not match .* 1e-07 m apart"),
+    "end node aside": (lambda m: move(m, interface_node(m, k=-1), (1e-7, 0)), "do not match .* 1e-07 m apart"),
     "double node": (lambda m: double(m, m.quads[20, 0], 20), "lie on one another, the first at .*merge"),
     "double interface node": (lambda m: twin(m, interface_node(m)), "upper_interface has two nodes at x = .*; merge"),
     "loose coating": (loosen, "9 pairs of nodes of the upper piece lie on one another"),

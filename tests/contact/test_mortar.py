@@ -1,0 +1,374 @@
+"""Unlike interface nodes: transfer by independent quadrature, patch tests, Hertz, ripple of a wrong side, balances."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import HEIGHT, LENGTH, TITANIUM, bare, refined_middle
+from skfem import Basis, ElementQuad1, ElementVector, MeshQuad
+from skfem.models.elasticity import linear_elasticity
+
+from patchfem.contact import elasticity, mortar, substructure
+from patchfem.contact.gaps import crown
+from patchfem.contact.mortar import clipped, common_grid, softness, transfer
+from patchfem.contact.unilateral import press
+from patchfem.core import Compliance, Interface, PatchfemError
+from patchfem.mesh.anymesh import PieceMesh
+from patchfem.mesh.tensor import graded_rows
+
+A = 0.1e-3  # half width of the Hertz contact [m]
+LOAD = 9107.0  # per metre of width [N/m]
+PEAK = 2 * LOAD / (np.pi * A)
+YOUNG = TITANIUM[0]
+cells = st.lists(st.floats(0.1, 1.0), min_size=2, max_size=30)  # ratio up to 10 from cell to cell
+
+
+def nodes(sizes, length=LENGTH):
+    """Rising places of a mesh of these cell sizes over the length, 0 in the middle."""
+    x = np.concatenate([[0.0], np.cumsum(sizes)])
+    x = (x / x[-1] - 0.5) * length
+    x[0], x[-1] = -length / 2, length / 2
+    return x
+
+
+def hat(own, j, place):
+    """Value of the hat function of node j at places within the mesh."""
+    return np.interp(place, own, np.eye(own.size)[j])
+
+
+def dual(x, i, place):
+    """Value of the biorthogonal function of node i of the grid at places that are no nodes."""
+    cell = np.searchsorted(x, place) - 1
+    mine = np.where(cell == i, 1, np.where(cell == i - 1, 0, -1))
+    other = np.where(mine == 1, i + 1, i - 1).clip(0, x.size - 1)
+    values = np.array([2 * hat(x, i, p) - hat(x, k, p) for p, k in zip(place, other)])
+    return np.where(mine >= 0, values, 0.0)
+
+
+def quadrature(x, own, points=3):
+    """Places and weights exact for products of piecewise linears of both meshes, on the stretch of x."""
+    cuts = np.unique(np.concatenate([x, own[(own > x[0]) & (own < x[-1])]]))
+    gauss, weight = np.polynomial.legendre.leggauss(points)
+    half = np.diff(cuts)[:, None] / 2
+    return ((cuts[:-1] + cuts[1:])[:, None] / 2 + half * gauss).ravel(), (half * weight).ravel()
+
+
+def column(x, height, young, poisson=TITANIUM[1], plane="strain", growth=1.4):
+    """(nn, tt, nt) of a block of uniform material on these columns, its rows growing downwards."""
+    depth = np.concatenate([[0.0], np.cumsum(graded_rows(np.diff(x).min(), height, growth))])
+    return elasticity.interface_compliance(elasticity.assemble(x, depth, 0, bare((young, poisson), plane)))
+
+
+def forced(low, x_low, high, x_high, x):
+    """nn of the pair on a given grid, without any judgement of it."""
+    one, other = transfer(x, x_low).toarray(), transfer(x, x_high).toarray()
+    return one @ low[0] @ one.T + other @ high[0] @ other.T
+
+
+def rounding(nn):
+    """What the rounding of an ill-conditioned operator leaves: a side that would be refused."""
+    return 200 * np.finfo(float).eps * np.linalg.cond(nn)
+
+
+def pressed(x, nn, gap, load=LOAD):
+    return press(Compliance(Interface(x, mortar.tributary(x), 1.0), nn, nn), gap, load)
+
+
+@settings(max_examples=30, deadline=None)
+@given(one=cells, other=cells)
+def test_exact_transfer_is_the_mortar_integral(one, other):
+    x, own = nodes(one, 2.0), nodes(other, 2.0)
+    place, weight = quadrature(x, own)
+    found = transfer(x, own).toarray()
+    for i in range(x.size):
+        psi = dual(x, i, place) * weight
+        assert psi @ hat(x, i, place) == pytest.approx(mortar.tributary(x)[i], rel=1e-12)  # biorthogonal, D = lengths
+        wanted = [psi @ hat(own, j, place) for j in range(own.size)]
+        assert np.abs(found[i] * mortar.tributary(x)[i] - wanted).max() <= 1e-13
+
+
+@settings(max_examples=100, deadline=None)
+@given(one=cells, other=cells, seed=st.integers(0, 99))
+def test_always_constants_lines_force_and_moment_pass_exactly(one, other, seed):
+    x, own = nodes(one), nodes(other)
+    share = transfer(x, own)
+    assert np.abs(share.sum(axis=1) - 1).max() <= 1e-13
+    assert np.abs(share @ own - x).max() <= 1e-13 * LENGTH
+    force = np.random.default_rng(seed).normal(size=x.size)
+    passed, scale = force @ share, np.abs(force).sum()
+    assert abs(passed.sum() - force.sum()) <= 1e-13 * scale
+    assert abs(passed @ own - force @ x) <= 1e-13 * scale * LENGTH
+    uniform = mortar.tributary(x) @ share  # a uniform pressure: the consistent loads of the other mesh
+    assert uniform == pytest.approx(mortar.tributary(own), rel=1e-12)
+
+
+@settings(max_examples=30, deadline=None)
+@given(one=cells, other=cells, stiff=st.sampled_from([0.01, 1.0, 100.0]), plane=st.sampled_from(["strain", "stress"]))
+def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stiff, plane):
+    x_low, x_high = nodes(one), nodes(other)
+    low, high = column(x_low, HEIGHT, YOUNG, 0.0, plane), column(x_high, 0.7 * HEIGHT, stiff * YOUNG, 0.0, plane)
+    soft = softness(x_low, low[0], x_low), softness(x_high, high[0], x_high)
+    for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
+        nn = forced(low, x_low, high, x_high, x)
+        state = pressed(x, nn, np.zeros(x.size))
+        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=limit or rounding(nn))
+        closing = LOAD / LENGTH * (HEIGHT / YOUNG + 0.7 * HEIGHT / (stiff * YOUNG))
+        assert state.approach == pytest.approx(closing, rel=1e-12)
+
+
+def rolling(x, height, young, poisson):
+    """(m, m) compliance of a plane-stress block on a smooth far face, free to spread; assembled by scikit-fem alone."""
+    mesh = MeshQuad.init_tensor(x, np.linspace(0, height, 5))
+    basis = Basis(mesh, ElementVector(ElementQuad1()))
+    stiff = linear_elasticity(young * poisson / (1 - poisson**2), young / 2 / (1 + poisson)).assemble(basis).toarray()
+    far = np.flatnonzero(mesh.p[1] == height)
+    held = np.append(basis.nodal_dofs[1, far], basis.nodal_dofs[0, far[0]])
+    free = np.setdiff1d(np.arange(stiff.shape[0]), held)
+    face = np.flatnonzero(mesh.p[1] == 0)
+    face = basis.nodal_dofs[1, face[np.argsort(mesh.p[0, face])]]
+    pick = np.searchsorted(free, face)
+    return np.linalg.inv(stiff[np.ix_(free, free)])[np.ix_(pick, pick)]
+
+
+@settings(max_examples=15, deadline=None)
+@given(one=cells, other=cells, stiff=st.sampled_from([0.01, 1.0, 100.0]))
+def test_exact_patch_test_on_rollers_with_unlike_spreading(one, other, stiff):
+    x_low, x_high = nodes(one), nodes(other)
+    low, high = rolling(x_low, HEIGHT, YOUNG, 0.32), rolling(x_high, HEIGHT, stiff * YOUNG, 0.2)
+    soft = softness(x_low, low, x_low), softness(x_high, high, x_high)
+    for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
+        nn = forced((low,), x_low, (high,), x_high, x)
+        state = pressed(x, (nn + nn.T) / 2, np.zeros(x.size))
+        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=limit or rounding(nn))
+        assert state.approach == pytest.approx(LOAD / LENGTH * HEIGHT / YOUNG * (1 + 1 / stiff), rel=1e-12)
+
+
+def crooked(sizes, seed):
+    """A block as any mesh: these columns, half the quads cut in two, inner nodes moved at random."""
+    x, depth = nodes(sizes), np.linspace(0, HEIGHT, 7)
+    node = np.arange(x.size * depth.size).reshape(x.size, depth.size)
+    points = np.stack([np.repeat(x, depth.size), np.tile(depth, x.size)], axis=1)
+    rng = np.random.default_rng(seed)
+    inner = node[1:-1, 1:-1].ravel()
+    points[inner] += rng.uniform(-0.2, 0.2, (inner.size, 2)) * [np.diff(x).min(), depth[1]]
+    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
+    cut = rng.random(len(quads)) < 0.5
+    triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return PieceMesh(points, triangles, quads[~cut], np.zeros(len(triangles) + (~cut).sum(), bool), node[:, 0],
+                     node[:, -1])
+
+
+def two_crooked(poisson=0.0, stiff=100.0):
+    """Two crooked blocks of 12 and 9 columns, the upper one `stiff` times as stiff, assembled and condensed."""
+    rng = np.random.default_rng(4)
+    pair = [substructure.assemble(crooked(rng.uniform(0.5, 1.0, count), count), bare((young, poisson)))
+            for count, young in ((12, YOUNG), (9, stiff * YOUNG))]
+    return pair, [substructure.condense(piece) for piece in pair]
+
+
+@pytest.mark.parametrize("stiff", [0.01, 1.0, 100.0])
+def test_exact_patch_test_reaches_the_inside_of_both_bodies(stiff):
+    pair, (low, high) = two_crooked(0.0, stiff)
+    joined = mortar.mortar(low, pair[0].mesh.x, high, pair[1].mesh.x)
+    state = pressed(joined.x, joined.nn, np.zeros(joined.x.size))
+    for piece, force in zip(pair, joined.forces(state.sigma_n * joined.tributary)):
+        assert force == pytest.approx(piece.mesh.tributary() * LOAD / LENGTH, rel=1e-12)
+        u = substructure.displacement(piece, 0 * force, force)
+        stress, _ = substructure.cell_stress(piece, u)
+        assert np.abs(stress - [0, -LOAD / LENGTH, 0, 0]).max() <= 1e-11 * LOAD / LENGTH
+
+
+@pytest.mark.parametrize("side", [None, "lower", "upper"])
+def test_exact_compliance_is_the_weighted_motion_of_both_bodies(side):
+    pair, (low, high) = two_crooked(0.3, 2.0)
+    joined = mortar.mortar(low, pair[0].mesh.x, high, pair[1].mesh.x, side)
+    x, rng = joined.x, np.random.default_rng(8)
+    normal, shear = rng.normal(size=(2, x.size))
+    closing, slide = np.zeros(x.size), np.zeros(x.size)
+    for piece, sign in zip(pair, (1, -1)):  # +x on the lower piece, -x on the upper one
+        own = piece.mesh.x
+        place, weight = quadrature(x, own)
+        psi = np.array([dual(x, i, place) * weight for i in range(x.size)]) / mortar.tributary(x)[:, None]
+        load = psi @ np.array([hat(own, j, place) for j in range(own.size)]).T
+        u = substructure.displacement(piece, sign * shear @ load, normal @ load)[0, piece.mesh.interface]
+        closing += load @ u[:, 1]
+        slide += sign * load @ u[:, 0]
+    assert np.abs(joined.nn @ normal + joined.nt @ shear - closing).max() <= 1e-11 * np.abs(closing).max()
+    assert np.abs(joined.tt @ shear + joined.nt.T @ normal - slide).max() <= 1e-11 * np.abs(slide).max()
+
+
+@settings(max_examples=25, deadline=None)
+@given(one=cells, other=cells, stiff=st.floats(0.01, 100.0), seed=st.integers(0, 99))
+def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swapped(one, other, stiff, seed):
+    x_low, x_high = nodes(one), nodes(other)
+    low, high = column(x_low, HEIGHT, YOUNG), column(x_high, 0.5 * HEIGHT, stiff * YOUNG, 0.2)
+    try:
+        joined = mortar.mortar(low, x_low, high, x_high)
+    except PatchfemError as error:
+        assert "expected to ripple" in str(error)
+        return
+    assert np.array_equal(joined.nn, joined.nn.T) and np.array_equal(joined.tt, joined.tt.T)
+    both = np.block([[joined.nn, joined.nt], [joined.nt.T, joined.tt]])
+    assert np.linalg.eigvalsh(both).min() > 0
+    assert joined.tributary.sum() == pytest.approx(LENGTH, rel=1e-13)
+    force = np.random.default_rng(seed).uniform(0, 1, (3, joined.x.size))
+    for passed, own in zip(joined.forces(force), (x_low, x_high)):
+        assert passed.sum(axis=1) == pytest.approx(force.sum(axis=1), rel=1e-13)
+        assert np.abs(passed @ own - force @ joined.x).max() <= 1e-13 * force.sum() * LENGTH
+    turned = mortar.mortar(high, x_high, low, x_low)
+    alike = x_low.size == x_high.size and np.abs(x_low - x_high).max() <= 1e-12 * LENGTH
+    assert alike or {joined.side, turned.side} in ({"both"}, {"lower", "upper"})
+    assert turned.x == pytest.approx(joined.x, abs=1e-15)
+    scale = 1e-12 * joined.nn.max()
+    for mine, theirs in ((turned.nn, joined.nn), (turned.tt, joined.tt), (turned.nt, -joined.nt)):
+        assert np.abs(mine - theirs).max() <= scale
+    tilted = [pressed(part.x, part.nn, 1e-6 * part.x).sigma_n for part in (joined, turned)]
+    assert np.abs(tilted[0] - tilted[1]).max() <= 1e-9 * tilted[0].max()
+
+
+@pytest.mark.parametrize("side", [None, "lower", "upper"])
+def test_exact_matching_nodes_give_the_joined_operator(side):
+    x = nodes(np.random.default_rng(1).uniform(0.1, 1, 40))
+    low, high = column(x, HEIGHT, YOUNG), column(x, 0.5 * HEIGHT, 0.01 * YOUNG)
+    found = mortar.mortar(low, x, high, x, side)
+    for mine, theirs in zip((found.nn, found.tt, found.nt), substructure.joined(low, high)):
+        assert np.abs(mine - theirs).max() <= 1e-14 * np.abs(theirs).max()
+        assert not mine.flags.writeable
+    assert np.array_equal(found.x, x) and found.ripple == 0 and found.side == (side or "lower")
+    near = mortar.mortar(low, x, high, x * (1 + 1e-12), side)  # as a text file rounds them
+    assert np.abs(near.nn - found.nn).max() <= 1e-8 * found.nn.max()
+
+
+@cache
+def _block(per_half_width):
+    grid = refined_middle(1.5 * A, A / per_half_width, LENGTH, 6e-3, 1.1)
+    return grid.x, elasticity.interface_compliance(elasticity.assemble(grid.x, grid.depth, 0, bare(TITANIUM)))
+
+
+def block(per_half_width, young=YOUNG):
+    """(x, compliance) of the block of the Hertz pair, a / per_half_width at the contact."""
+    x, parts = _block(per_half_width)
+    return x, tuple(part * (YOUNG / young) for part in parts)
+
+
+def hertz(x, nn, young_low, young_high):
+    """(largest error inside 0.8 a, of the peak, state) in shares of the peak."""
+    modulus = 1 / ((1 - TITANIUM[1]**2) * (1 / young_low + 1 / young_high))
+    state = pressed(x, nn, crown(x, np.pi * modulus * A**2 / (4 * LOAD)))
+    inside = np.abs(x) < 0.8 * A
+    error = state.sigma_n[inside] - PEAK * np.sqrt(1 - (x[inside] / A)**2)
+    return np.abs(error).max() / PEAK, abs(state.sigma_n.max() / PEAK - 1), state
+
+
+@pytest.mark.parametrize("young_low, young_high", [(1, 1), (1, 100), (100, 1), (1, 5)])
+@pytest.mark.parametrize("fine", [17, 24, 40, pytest.param(160, marks=pytest.mark.slow)])
+def test_exact_hertz_on_unlike_meshes_within_four_in_a_thousand(fine, young_low, young_high):
+    (x_low, low), (x_high, high) = block(16, young_low * YOUNG), block(fine, young_high * YOUNG)
+    joined = mortar.mortar(low, x_low, high, x_high)
+    ripple, peak, _ = hertz(joined.x, joined.nn, young_low * YOUNG, young_high * YOUNG)
+    assert ripple <= 4e-3 and peak <= 1e-3
+    assert joined.ripple <= 5e-3
+
+
+def test_order_hertz_pressure_on_unlike_meshes_in_the_mean_square_is_one():
+    errors, counts = [], np.array([8, 16, 32])
+    for count in counts:
+        (x_low, low), (x_high, high) = block(int(count)), block(int(count * 3) // 2)
+        joined = mortar.mortar(low, x_low, high, x_high)
+        state = hertz(joined.x, joined.nn, YOUNG, YOUNG)[2]
+        wanted = PEAK * np.sqrt(np.maximum(1 - (joined.x / A)**2, 0))
+        errors.append(np.sqrt(joined.tributary @ (state.sigma_n - wanted)**2 / (joined.tributary @ wanted**2)))
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
+    assert errors[-1] <= 1.3e-2
+
+
+@pytest.mark.parametrize("fine, stiff, low, high", [(32, 1, 0.01, 0.05), (64, 1, 0.02, 0.06), (32, 10, 0.1, 0.4),
+                                                    (64, 10, 0.2, 0.5), (64, 100, 0.9, 4.0)])
+def test_exact_a_wrong_side_ripples_as_foretold_and_is_swapped_with_its_reason(fine, stiff, low, high):
+    (x_low, soft), (x_high, hard) = block(16), block(fine, stiff * YOUNG)
+    measured = hertz(x_high, forced(soft, x_low, hard, x_high, x_high), YOUNG, stiff * YOUNG)[0]
+    assert low <= measured <= high
+    joined = mortar.mortar(soft, x_low, hard, x_high, "upper")
+    assert joined.side != "upper" and np.array_equal(joined.x, mortar.mortar(soft, x_low, hard, x_high).x)
+    foretold = float(joined.reason.split("expected to ripple by ")[1].split(" %")[0]) / 100
+    assert joined.reason.startswith("asked for on the upper piece, but pressure on the nodes of the upper piece")
+    assert 0.3 <= measured / foretold <= 1.3
+    assert hertz(joined.x, joined.nn, YOUNG, stiff * YOUNG)[0] <= 3e-3
+
+
+def test_exact_a_fine_side_that_is_much_softer_keeps_its_nodes():
+    (x_low, hard), (x_high, soft) = block(8, 100 * YOUNG), block(64)
+    joined = mortar.mortar(hard, x_low, soft, x_high)
+    assert joined.side == "upper" and joined.reason.startswith("pressure on the nodes of the upper piece (")
+    assert hertz(joined.x, joined.nn, 100 * YOUNG, YOUNG)[0] <= 1e-3
+    named = mortar.mortar(hard, x_low, soft, x_high, "lower")
+    assert named.side == "lower" and 3e-3 <= hertz(named.x, named.nn, 100 * YOUNG, YOUNG)[0] <= 1e-2
+
+
+@pytest.mark.parametrize("stiff", [1.0, 0.1, 0.01])
+def test_exact_where_the_coarser_side_changes_the_grid_changes_over(stiff):
+    coarse, fine = (refined_middle(1.5 * A, A / count, LENGTH, 6e-3, 1.1).x for count in (16, 40))
+    x_low = np.concatenate([fine[fine < 0], coarse[coarse >= 0]])
+    x_high = -x_low[::-1]
+    low = column(x_low, 6e-3, YOUNG, growth=1.1)
+    high = column(x_high, 6e-3, stiff * YOUNG, growth=1.1)
+    joined = mortar.mortar(low, x_low, high, x_high)
+    assert joined.side == ("both" if stiff > 0.05 else "upper")
+    assert hertz(joined.x, joined.nn, YOUNG, stiff * YOUNG)[0] <= 4e-3
+    assert hertz(x_low, forced(low, x_low, high, x_high, x_low), YOUNG, stiff * YOUNG)[0] >= 2e-2
+    assert mortar.mortar(low, x_low, high, x_high, "lower").side == joined.side
+
+
+@settings(max_examples=30, deadline=None)
+@given(one=cells, other=cells, left=st.floats(-0.3, 0.3), right=st.floats(-0.3, 0.3))
+def test_always_pieces_that_overhang_touch_where_both_are(one, other, left, right):
+    x_low = nodes(one)
+    x_high = x_low[0] + left * LENGTH + (nodes(other) - nodes(other)[0]) * (1 + right - left)
+    begin, end = max(x_low[0], x_high[0]), min(x_low[-1], x_high[-1])
+    for own in (x_low, x_high):
+        x = clipped(own, begin, end)
+        assert (x[0], x[-1]) == pytest.approx((begin, end), abs=1e-9 * LENGTH) and np.all(np.diff(x) > 0)
+        assert np.diff(x).min() >= 0.49 * np.diff(own).min() or x.size == 2
+        for body in (x_low, x_high):
+            share = transfer(x, body)
+            assert np.abs(share.sum(axis=1) - 1).max() <= 1e-12
+            assert np.abs(share @ body - x).max() <= 1e-12 * LENGTH
+            # a uniform pressure on the common stretch loads every node with the integral of its hat over it
+            place, weight = quadrature(x, body)
+            wanted = np.array([weight @ hat(body, j, place) for j in range(body.size)])
+            assert np.abs(mortar.tributary(x) @ share - wanted).max() <= 1e-12 * LENGTH
+
+
+def test_exact_patch_test_of_a_short_block_on_a_long_one():
+    x_low, x_high = nodes([1.0] * 23), nodes([1.0] * 10, 0.6 * LENGTH) + 0.1 * LENGTH
+    joined = mortar.mortar(column(x_low, HEIGHT, YOUNG), x_low, column(x_high, HEIGHT, YOUNG), x_high)
+    assert (joined.x[0], joined.x[-1]) == pytest.approx((x_high[0], x_high[-1]))
+    assert joined.tributary.sum() == pytest.approx(0.6 * LENGTH, rel=1e-13)
+    low, high = joined.forces(joined.tributary)
+    assert high == pytest.approx(mortar.tributary(x_high), rel=1e-12)
+    assert np.all(low[x_low < x_high[0] - LENGTH / 23] == 0) and low.sum() == pytest.approx(0.6 * LENGTH)
+    assert low @ x_low == pytest.approx(high @ x_high, rel=1e-12)
+    assert np.linalg.eigvalsh(joined.nn).min() > 0
+
+
+def test_refuses_by_name_what_cannot_be_joined():
+    x, other = nodes([1.0] * 8), nodes([1.0] * 5)
+    low, high = column(x, HEIGHT, YOUNG), column(other, HEIGHT, YOUNG)
+    for arguments, message in (((low, x[::-1], high, other), "the lower interface needs three nodes .* by rising x"),
+                               ((low, x, low, other), "the upper interface needs .* compliance"),
+                               ((low, x, high, other, "left"), "not on 'left'"),
+                               ((low, x, high, other + LENGTH), "do not face one another: the lower one runs from"),
+                               ((low, x, high, other + 0.99 * LENGTH), "share 0.000127 m of interface only")):
+        with pytest.raises(PatchfemError, match=r"contact\.mesh: .*" + message):
+            mortar.mortar(*arguments)
+
+
+def test_refuses_meshes_on_which_every_choice_ripples():
+    rng = np.random.default_rng(2)
+    x, other = (nodes(50.0 ** -rng.uniform(0, 1, count)) for count in (40, 30))
+    with pytest.raises(PatchfemError, match=r"expected to ripple by \d+ % near .* cells of like size that grow"):
+        mortar.mortar(column(x, HEIGHT, YOUNG), x, column(other, HEIGHT, YOUNG), other)
