@@ -6,14 +6,15 @@ Read the package in the order of the physics; each stage imports `core` and itse
 2. `scene`       a TOML file becomes SI values, every mistake named at once (`quantities`: the unit table)
 3. `effects`     which table of a scene needs which stage
 4. `mesh`        two coated pieces as one tagged mesh
-5. `contact`     elasticity condensed to the interface, unilateral contact, partial slip
-6. `friction`    local laws and the nonlocal quadrature over the path
-7. `structure`   the modes of the rig
-8. `dynamics`    exact events and the march in time
-9. `response`    measures of a run and their errors
-10. `export`     summary, netCDF, VTK, report
-11. `closed_forms` exact answers that tests, studies and users share
-12. `simulate`   the page where the stages meet
+5. `surface`     measured or made height profiles as a share of the gap
+6. `contact`     elasticity condensed to the interface, unilateral contact, partial slip
+7. `friction`    local laws and the nonlocal quadrature over the path
+8. `structure`   the modes of the rig
+9. `dynamics`    exact events and the march in time
+10. `response`    measures of a run and their errors
+11. `export`     summary, netCDF, VTK, report
+12. `closed_forms` exact answers that tests, studies and users share
+13. `simulate`   the page where the stages meet
 """
 
 __version__ = "0.1.0"

@@ -18,9 +18,10 @@ LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on
 class Pair:
     """Two pieces condensed to their interface; everything about them that no load and no shape changes.
 
-    grid, piece: the lower piece (its columns are the interface), upper_grid, upper: the other one, the same objects
-    where the pieces are alike; TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all
-    pairs together; closing (m, m): normal closing per shear force on the interface [m/N], zero for like pieces.
+    grid, piece: the lower piece, upper_grid, upper: the other one, the same objects where the pieces are alike;
+    TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all pairs together; closing
+    (m, m): normal closing per shear force on the interface [m/N], zero for like pieces. joint: the Mortar of pieces
+    whose interface nodes do not match, else None.
     """
 
     grid: object
@@ -29,12 +30,20 @@ class Pair:
     upper: object
     compliance: Compliance
     closing: np.ndarray
+    joint: object
     seconds: dict
 
     @property
     def coupling(self) -> float:
         """The largest normal closing per shear force over the largest slide per shear force."""
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
+
+    def forces(self, nodal) -> tuple:
+        """(on the lower, on the upper piece): nodal forces (..., m) of the interface carried to each piece's nodes."""
+        if self.joint is None:
+            return nodal, nodal
+        rows = np.atleast_2d(nodal)
+        return self.joint.to_lower.T.dot(rows.T).T, self.joint.to_upper.T.dot(rows.T).T
 
 
 def piece_of(contact, side: str) -> tuple:
@@ -124,15 +133,21 @@ def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
     """Assemble and condense the pieces of a scene: bodies of `bodies_of`, the upper None where it is alike."""
     contact = scene.contact
     width = contact.width * contact.pairs
-    interface = Interface(grid.x, frozen_array(grid.tributary() * width), width)
     start = perf_counter()
     piece = finite_elements(grid, layers_of(contact, "lower"))
     upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(contact, "upper"))
     assembled = perf_counter()
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
-    # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
-    parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])
+    joint, x, share = None, grid.x, grid.tributary()
+    if upper_grid is not None and (upper_grid.x.size != x.size or np.abs(upper_grid.x - x).max() > 1e-9 * contact.length):
+        from .contact.mortar import mortar
+
+        joint = mortar(low, x, high, upper_grid.x)
+        x, share, parts = joint.x, joint.tributary, (joint.nn, joint.tt, joint.nt)
+    else:  # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
+        parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
+    interface = Interface(frozen_array(x), frozen_array(share * width), width)
     seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
-    return Pair(grid, upper_grid or grid, piece, upper, Compliance(interface, normal, tangential), closing, seconds)
+    return Pair(grid, upper_grid or grid, piece, upper, Compliance(interface, normal, tangential), closing, joint, seconds)

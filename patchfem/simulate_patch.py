@@ -21,7 +21,8 @@ class Patch:
 
     pieces: compliance of the pieces and of their skin, linearised at the operating point where the skin is smooth;
     giving: (m, m) [m/N] the tangential part that the scene names, without [contact.shear] that of the skin alone; gap
-    (m,) [m] of the unloaded surfaces; skin: SkinState of a smooth skin, else None.
+    (m,) [m] of the unloaded surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in
+    strips, whose means over the width then stand in `pressure`, else None; notes: sentences for the warnings.
     """
 
     pair: Pair
@@ -30,6 +31,8 @@ class Patch:
     gap: np.ndarray
     pressure: Pressure
     skin: object
+    strips: object
+    notes: tuple
     seconds: dict
 
     @property
@@ -46,7 +49,7 @@ class Patch:
 
 def shape_side(contact) -> str:
     """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
-    sides = {part.on for part in (contact.tilt, contact.crown, contact.step) if part is not None}
+    sides = {part.on for part in (contact.tilt, contact.crown, contact.step, contact.profile) if part is not None}
     if len(sides) > 1:
         raise PatchfemError("contact: the shapes lie on different pieces (key `on`); not yet built: put all on one")
     return sides.pop() if sides else "upper"
@@ -57,15 +60,22 @@ SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: 
 
 
 def gap_of(scene, x) -> tuple:
-    """((m,) gap of the unloaded surfaces [m], seconds by shape): the sum of what the scene names."""
-    gap, seconds = np.zeros(x.size), {}
+    """((m,) gap of the unloaded surfaces [m], notes, seconds by shape): the sum of what the scene names."""
+    gap, seconds, notes = np.zeros(x.size), {}, ()
     for name, shape in SHAPES.items():
         part = getattr(scene.contact, name)
         if part is not None:
             begin = perf_counter()
             gap = gap + shape(x, part)
             seconds[name] = perf_counter() - begin
-    return gap, seconds
+    if scene.contact.profile is not None:
+        from .simulate_profile import profile_gap
+
+        begin = perf_counter()
+        heights, notes = profile_gap(scene, x)
+        gap = gap + heights
+        seconds["profile"] = perf_counter() - begin
+    return gap, notes, seconds
 
 
 def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
@@ -76,10 +86,14 @@ def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
 def pressed(scene, pair: Pair) -> Patch:
     """The pair under the shapes, the load and the holder of a scene; the pair serves any number of them."""
     contact, pieces = scene.contact, pair.compliance
-    gap, seconds = gap_of(scene, pieces.interface.x)
+    gap, notes, seconds = gap_of(scene, pieces.interface.x)
     angle = contact.tilt.angle if contact.tilt is not None and contact.tilt.on == "upper" else 0.0
-    begin, skin = perf_counter(), None
-    if contact.asperities is not None and contact.asperities.law != "linear":
+    begin, skin, strips = perf_counter(), None, None
+    if contact.strips is not None:
+        from .simulate_strips import in_strips
+
+        pieces, pressure, skin, strips = in_strips(contact, pieces, gap, angle, moment_of(contact), spring_of(contact))
+    elif contact.asperities is not None and contact.asperities.law != "linear":
         from .simulate_skin import behind_skin
 
         pieces, pressure, skin = behind_skin(contact, pieces, gap, angle, moment_of(contact), spring_of(contact))
@@ -94,7 +108,7 @@ def pressed(scene, pair: Pair) -> Patch:
     giving = pieces.tangential
     if contact.shear is None:
         giving = frozen_array(giving - pair.compliance.tangential)
-    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, pair.seconds | seconds)
+    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, notes, pair.seconds | seconds)
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
@@ -134,12 +148,14 @@ def moment_of(contact) -> float | None:
 def solve_all(scene, estimate: bool = True, fresh: bool = False) -> tuple:
     """(Patch on the asked mesh, on a mesh twice and four times as coarse); None where none is wanted or possible.
 
-    A static patch whose element size is not pinned gets the mesh that its tolerance asks for. A mesh of any cells has
+    A static patch whose element size is neither pinned nor decided by a profile gets the mesh that its tolerance asks for.
+    A mesh of any cells has
     no coarser one: its second patch is on the mesh with every edge halved. fresh: condense anew, whatever is kept on
     disk.
     """
     contact = scene.contact
-    if estimate and scene.kind == "patch" and contact.element_size is None and contact.mesh is None:
+    free = contact.element_size is None and contact.mesh is None and contact.profile is None
+    if estimate and scene.kind == "patch" and free:
         from .simulate_grading import solve_graded
 
         return solve_graded(scene, fresh)

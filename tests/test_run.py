@@ -435,8 +435,7 @@ def test_refuses_verbs_not_yet_built(verb):
 
 
 @pytest.mark.parametrize("sets", [
-    ("contact.asperities.law=exponential", "contact.asperities.decay_length=1 um"),
-    ("contact.strips.count=8",), ("contact.profile.file=before.csv",),
+    ("friction.temperature.surface=393 K", "friction.temperature.reference=293 K"), ("friction.breakaway=0.5",),
     ("contact.holder.tangential_stiffness=1e4 N/m",), ("friction.law=tanh", "friction.reference_speed=1 mm/s"),
     ("friction.spread=5 um",), ("structure.bonded.stiffness=4.6e6 N/m",), ("structure.stiffening.cubic=1e12 N/m^3",),
     ("wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"), ("accuracy.method=harmonic",),

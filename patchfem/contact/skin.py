@@ -278,7 +278,7 @@ def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarra
                      Outcome.DONE if touch else Outcome.NO_CONTACT, MappingProxyType(checks))
 
 
-def _refuse(skin, x, gap, load, moment, approach, spring) -> None:
+def _refuse(skin, x, gap, load, moment, approach, spring: float = 0.0) -> None:
     """PatchfemError for controls without an answer."""
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")

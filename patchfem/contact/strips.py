@@ -17,8 +17,9 @@ from scipy.linalg import cho_factor, cho_solve
 from threadpoolctl import threadpool_limits
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
-from .skin import ExponentialSkin, LinearSkin, _refuse
+from .skin import _refuse
 from .skin import solve as solve_skin
+from .skin_laws import ExponentialSkin, LinearSkin
 from .unilateral import LIMIT, _hull_start, solve_forces
 
 NEGLECTED = "the strips over the width do not feel each other: the shear between them is neglected"

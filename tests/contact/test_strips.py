@@ -13,7 +13,7 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from patchfem.closed_contact import wedge_linear, wedge_opening, wedge_skin
 from patchfem.contact import skin as skins
 from patchfem.contact import strips
-from patchfem.contact.skin import ExponentialSkin, HertzSkin, LinearSkin
+from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.slip import normal_stiffness, tangential_stiffness
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces

@@ -1,0 +1,59 @@
+"""A patch in strips over its width: one holder presses them all, and may roll."""
+
+import numpy as np
+
+from .contact.strips import press_strips, strip_offsets, strips_tangent
+from .core import Compliance, Pressure, frozen_array
+
+
+def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
+    """(Compliance of all strips, Pressure of their means over the width, skin or None, StripsState).
+
+    The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
+    """
+    count, interface = contact.strips.count, pieces.interface
+    skin = law_of(contact)
+    by = contact.approach.distance if contact.approach is not None else None
+    state = press_strips(pieces.normal * count, interface.x, interface.weight / count,
+                         strip_offsets(contact.width, count), gap, contact.strips.roll,
+                         contact.load if by is None else None, moment if by is None else None, by, angle,
+                         spring if by is None else 0.0, skin)
+    mean = state.pressure.mean(axis=0)
+    answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
+                      state.moment, state.outcome, state.iterations, state.residuals)
+    return pieces, answer, skin if _smooth(skin) else None, state
+
+
+def law_of(contact):
+    """The skin between the strips, None where they are bare."""
+    if contact.asperities is None:
+        return None
+    if contact.asperities.law == "linear":
+        from .contact.skin_laws import LinearSkin
+
+        return LinearSkin(contact.asperities.normal_stiffness)
+    from .simulate_skin import skin_law
+
+    return skin_law(contact)
+
+
+def _smooth(skin) -> bool:
+    return skin is not None and hasattr(skin, "log_pressure")
+
+
+def strip_values(contact, patch, peak_of) -> dict:
+    """name -> value of what strips change: peak of any strip, share of the area, stiffnesses, and the lateral place of
+    the pressure with its roll moment. peak_of: largest pressure of one strip from (x, pressure)."""
+    state, count, pieces = patch.strips, contact.strips.count, patch.pair.compliance
+    weight = pieces.interface.weight / count
+    out = {"contact_fraction": state.fraction, "pressure_centre_lateral": state.centre_y,
+           "roll_moment": state.roll_moment}
+    out["pressure_peak"] = max(peak_of(patch.x, row) for row in state.pressure)
+    if not state.load > 0:
+        return out | {"loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0}
+    out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])
+    ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
+    out["normal_stiffness"] = strips_tangent(pieces.normal * count, weight, state)
+    out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state,
+                                                 np.inf if ratio is None else ratio)
+    return out
