@@ -6,18 +6,20 @@ holders, normal forces f, shear forces t (resistance to slip > 0) and the gap g 
     0 <= f, w = g + theta x - delta + C_nn f + C_nt t >= 0, f.w = 0;
     e = q - C_tt t - C_nt^T f - s, |t| <= mu f, e.t >= 0, e = 0 where |t| < mu f; s := s + e.
 
-An open node follows the pieces and so forgets. An increment is exact while no node enters or leaves the contact and no
-slip zone shrinks within it (any stroke at constant load and gap); `slip_path.load_path` cuts it at the nodes that enter.
+An open node follows the pieces and so forgets. An increment is exact while no node enters or leaves the contact and
+no slip zone shrinks within it (any stroke at constant load and gap); `slip_path.load_path` cuts it where nodes enter.
 """
 
 from dataclasses import dataclass, field
+from functools import cache
 from types import MappingProxyType
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ..core import Compliance, NotConverged, PatchfemError, frozen_array
-from .slip_sets import Kept, bounded_shear, coupled_forces, press_forces
+from .slip_sets import Kept, bounded_shear, press_forces
+from .slip_unlike import coupled_forces
 from .unilateral import residuals
 
 LIMIT = 1e-10  # largest relative residual that still counts as solved
@@ -134,7 +136,7 @@ def advance(state: SlipState, operators: Operators, step: Step, friction: float)
         return _parted(state, gap, step, friction)
     if step.load is not None:
         _held(step.shear, friction * step.load)
-    with threadpool_limits(1, "blas"):
+    with _threads().limit(limits=1, user_api="blas"):
         solve = _alike if operators.coupling is None or friction == 0 else _unlike
         normal, motion, shear, slide, sign, count = solve(state, operators, gap, step, friction)
     approach = float(motion[0]) if step.approach is None else step.approach
@@ -147,10 +149,16 @@ def advance(state: SlipState, operators: Operators, step: Step, friction: float)
     checks = slip_residuals(operators, state.slip, gap, normal, shear, approach, rotation, slide, step, friction)
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact: partial slip: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; take smaller steps")
+        raise NotConverged(f"contact: slip: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}: take smaller steps")
     lost = float(shear @ (slip - state.slip))
     return _state(normal, shear, slip, sign, gap, approach, rotation, slide, friction, state.dissipated + lost, count,
                   checks)
+
+
+@cache
+def _threads() -> ThreadpoolController:
+    """Found once: a search takes longer than an increment."""
+    return ThreadpoolController()
 
 
 def _meant(step: Step, operators: Operators, friction: float) -> None:

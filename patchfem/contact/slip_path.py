@@ -10,14 +10,16 @@ CUTS = 4  # cuts of one leg allowed per node of the interface
 AHEAD = 1e-9  # share of the rest of a leg at which the next contact set is looked up
 
 
-def load_path(state: SlipState, operators: Operators, steps, friction: float, follow: bool = False) -> tuple:
-    """The states at the end of each of `steps`, one increment each.
+def load_path(state: SlipState, operators: Operators, steps, friction: float,
+              follow: bool | None = None) -> tuple:
+    """The states at the end of each of `steps`, between which loads, motions and gap run straight.
 
-    follow: loads, motions and gap run straight from one step to the next and an increment ends wherever a node of
-    alike pieces enters or leaves the contact, so that it starts its slip from there; without it what an entering node
-    slips before it touches counts as slip, an error of the first order in the step. PatchfemError for `follow` with
-    unlike pieces (take small steps), else as `advance`.
+    follow (None: for alike pieces): an increment ends wherever a node enters or leaves the contact, so that it starts
+    its slip from there. Without it there is one increment to a step, and what an entering node moves before it touches
+    counts as slip: an error of the first order in the step. PatchfemError for `follow` with unlike pieces, else as
+    `advance`.
     """
+    follow = operators.coupling is None if follow is None else follow
     if follow and operators.coupling is not None:
         raise PatchfemError("contact: a path is followed from node to node for alike pieces only; take small steps")
     out = []
