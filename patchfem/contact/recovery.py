@@ -1,8 +1,8 @@
-"""Stress inside a pressed piece, recovered node by node, how wrong it is, and what the coating hands to its substrate.
+"""Stress inside a pressed piece, recovered node by node, how wrong it is, and where it is largest.
 
 Recovery: a plane is fitted to the stresses at the cell middles around a node (Zienkiewicz and Zhu, Int. J. Numer.
 Meth. Eng. 33, 1992, 1331), coating and substrate apart, because stress jumps between them. The recovered field less
-the computed one estimates the error (Zienkiewicz and Zhu 1987). Bond-line forces are nodal forces, so they balance.
+the computed one estimates the error (Zienkiewicz and Zhu 1987).
 """
 
 from dataclasses import dataclass
@@ -150,7 +150,7 @@ def quadratures(cells: Cells) -> list:
     return out
 
 
-def _stresses(cells: Cells, rules: list, u) -> list:
+def stresses(cells: Cells, rules: list, u) -> list:
     """Plane stresses (c, g, 3) as xx, yy, xy [Pa] at the points of integration of each block."""
     out, first = [], 0
     for rule in rules:
@@ -175,11 +175,11 @@ class Indicator:
         """(frames,) estimated error over the whole, both in energy norm [1]; 0 where nothing is loaded."""
         return self.shares()[1]
 
-    def shares(self, energy=0.0) -> tuple:
-        """((frames, t) error of each cell, (frames,) of all of them) over the energy norm of the whole [1]; `energy`
-        [J/m] is that of other pieces of the same body of work. The squares of the cells add up to that of all."""
+    def shares(self, *others) -> tuple:
+        """((frames, t) error of each cell, (frames,) of all of them) over the energy norm of the whole [1], `others`
+        the Indicators of the pieces pressed together with this one. The squares of the cells add up to that of all."""
         total = self.error.sum(axis=1)
-        whole = self.energy + total + energy
+        whole = sum((one.energy + one.error.sum(axis=1) for one in (self, *others)), np.zeros(total.size))
         whole = np.where(whole > 0, whole, 1.0)
         return np.sqrt(self.error / whole[:, None]), np.sqrt(total / whole)
 
@@ -198,7 +198,7 @@ def indicator(found: Recovery, u, stress) -> Indicator:
     for motion, middle in zip(u, stress):
         smooth = found(middle)[:, [0, 1, 3]][found.place]
         parts, energy, corner, cell = [], 0.0, 0, 0
-        for rule, rough in zip(rules, _stresses(cells, rules, motion)):
+        for rule, rough in zip(rules, stresses(cells, rules, motion)):
             count, nodes = rule.block.shape
             mine = slice(cell, cell + count)
             best = np.einsum("gn,cnk->cgk", rule.shape, smooth[corner:corner + count * nodes].reshape(count, nodes, 3))
@@ -215,67 +215,6 @@ def _complementary(stress, lam, mu) -> np.ndarray:
     xx, yy, xy = np.moveaxis(stress, -1, 0)
     lam, mu = lam[:, None], mu[:, None]
     return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy)**2) / (2 * mu)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Bond:
-    """The lower boundary of the coating. node: (b,) by rising x; length: (b,) of the line that belongs to each node
-    [m]; force: (frames, b, 2) of the coating on its substrate along x and inward, per unit width [N/m]; shear, normal:
-    (frames, b) force along the line and across it, compression > 0, per length [Pa]."""
-
-    node: np.ndarray
-    length: np.ndarray
-    force: np.ndarray
-    shear: np.ndarray
-    normal: np.ndarray
-
-
-def bond_line(cells: Cells, u) -> Bond | None:
-    """What the coating hands to its substrate, u (frames, N, 2) [m]; None without a coating.
-
-    Nodal forces of the coating's own stress, so they carry exactly the load on the coating's face.
-    """
-    edge, aside = _bond_edges(cells)
-    if not len(edge):
-        return None
-    node, where = np.unique(edge, return_inverse=True)
-    order = np.lexsort((cells.points[node, 1], cells.points[node, 0]))
-    node, where = node[order], np.argsort(order)[where.reshape(edge.shape)]
-    across, length = np.zeros((node.size, 2)), np.zeros(node.size)
-    for end in where.T:
-        np.add.at(across, end, aside / 2)
-        np.add.at(length, end, np.hypot(*aside.T) / 2)
-    across /= np.hypot(*across.T)[:, None]
-    along = across[:, ::-1] * [1.0, -1.0]
-    rules = quadratures(cells)
-    force = np.stack([-_coating_forces(cells, rules, motion)[node] for motion in u])
-    shear, normal = ((force * way).sum(axis=2) / length for way in (along, across))
-    return Bond(node, length, force, shear, normal)
-
-
-def _bond_edges(cells: Cells) -> tuple:
-    """(e, 2) edges of coating cells that a substrate cell shares, (e, 2) their normals into the substrate, as long."""
-    ends = np.concatenate([np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
-                           for block in cells.blocks])
-    coat = cells.is_coating[cells.owner()]
-    key = ends.min(axis=1) * len(cells.points) + ends.max(axis=1)
-    mine = ends[coat & np.isin(key, key[~coat])]
-    way = cells.points[mine[:, 1]] - cells.points[mine[:, 0]]
-    return mine, way[:, ::-1] * [1.0, -1.0]
-
-
-def _coating_forces(cells: Cells, rules: list, u) -> np.ndarray:
-    """(N, 2) nodal forces that the stress of the coating balances [N/m]."""
-    out, first = np.zeros((len(cells.points), 2)), 0
-    for rule, stress in zip(rules, _stresses(cells, rules, u)):
-        coat = cells.is_coating[first:first + len(rule.block)]
-        first += len(rule.block)
-        xx, yy, xy = np.moveaxis(stress[coat] * rule.weight[coat][..., None], -1, 0)
-        slope = rule.slope[coat]
-        force = np.stack([np.einsum("cg,cgn->cn", xx, slope[..., 0]) + np.einsum("cg,cgn->cn", xy, slope[..., 1]),
-                          np.einsum("cg,cgn->cn", xy, slope[..., 0]) + np.einsum("cg,cgn->cn", yy, slope[..., 1])], -1)
-        np.add.at(out, rule.block[coat], force)
-    return out
 
 
 @dataclass(frozen=True, eq=False, slots=True)
