@@ -81,12 +81,12 @@ def _window(one: Frame, head: str, magnify) -> None:
     _plotter(one, head, magnify, False).show(title=f"patchfem: {head}")
 
 
-def no_opengl(seconds: float = SECONDS) -> str | None:
+def no_opengl() -> str | None:
     """Why nothing can be drawn with OpenGL here, None where it can; a child process draws a tiny picture."""
     try:
-        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=seconds)
+        done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
-        return f"a tiny picture took more than {seconds:g} s"
+        return f"a tiny picture took more than {SECONDS:g} s"
     if done.returncode == 0:
         return None
     if done.returncode < 0:
