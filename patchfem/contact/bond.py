@@ -33,7 +33,7 @@ def bond_line(cells: Cells, u) -> Bond | None:
     node, where = node[order], np.argsort(order)[where.reshape(edge.shape)]
     across, length = np.zeros((node.size, 2)), np.zeros(node.size)
     for end in where.T:
-        np.add.at(across, end, aside / 2)
+        np.add.at(across, end, aside)
         np.add.at(length, end, np.hypot(*aside.T) / 2)
     across /= np.hypot(*across.T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]

@@ -97,19 +97,21 @@ def recovery(cells: Cells) -> Recovery:
 def _planes(near, at, middle) -> tuple:
     """(weights of the cells of every patch, whether the patch is too thin for a plane); least squares, equal shares."""
     near = near.tocsr()
-    row = np.repeat(np.arange(near.shape[0]), np.diff(near.indptr))
+    starts, counts = near.indptr[:-1], np.diff(near.indptr)
+    row = np.repeat(np.arange(counts.size), counts)
     offset = middle[near.indices] - at[row]
-    size = np.maximum.reduceat(np.abs(offset), near.indptr[:-1])
-    terms = np.column_stack([np.ones(row.size), offset / np.where(size > 0, size, 1.0)[row]])
-    gram = np.add.reduceat(terms[:, :, None] * terms[:, None], near.indptr[:-1])
+    size = np.maximum.reduceat(np.abs(offset), starts)
+    offset /= np.where(size > 0, size, 1.0)[row]
+    terms = np.column_stack([np.ones(row.size), offset])
+    gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
     scale = np.sqrt(np.einsum("sii->si", gram))
     scale = np.where(scale > 0, scale, 1.0)
-    alike = gram / (scale[:, :, None] * scale[:, None])
-    thin = np.linalg.det(alike) < SPREAD
-    first = np.empty((len(gram), 3))
-    first[~thin] = np.linalg.inv(alike[~thin])[:, 0]
-    first[thin] = np.linalg.pinv(alike[thin], rcond=1e-8, hermitian=True)[:, 0]
-    share = np.einsum("ni,ni->n", terms / scale[row], first[row]) / scale[row, 0]
+    thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < SPREAD
+    mean = gram[:, 0, 1:] / counts[:, None]
+    apart = offset - mean[row]
+    spread = np.add.reduceat(apart[:, :, None] * apart[:, None], starts)
+    slope = np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=1e-8, hermitian=True), -mean)
+    share = 1 / counts[row] + np.einsum("ni,ni->n", apart, slope[row])
     return csr_matrix((share, near.indices, near.indptr), shape=near.shape), thin
 
 

@@ -62,6 +62,17 @@ def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind,
     assert found.node.size == len(cells.points) + np.intersect1d(both, other).size
 
 
+def test_exact_a_coating_of_one_row_is_fitted_along_itself():
+    grid = TensorGrid(np.linspace(-1e-3, 1e-3, 9), np.array([0.0, 1e-4, 3e-4, 6e-4, 1e-3]), 1)
+    found = recovery(cells_of(tensor(grid)))
+    middles = found.cells.middles()
+    back = found(np.column_stack([np.ones(len(middles)), middles]))
+    coat = found.coating
+    wanted = np.column_stack([np.ones(found.node.size), found.cells.points[found.node]])
+    wanted[coat, 2] = 0.5e-4  # nothing is known across the row, so its middle stands for it
+    assert np.abs(back - wanted).max() <= 1e-12
+
+
 @given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
 @settings(max_examples=15, deadline=None)
 def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(seed, plane):
@@ -213,6 +224,42 @@ def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
     assert depth == pytest.approx(COATING, rel=1e-12) and (np.diff(at) > 0).all()
     assert (bond.normal * bond.length).sum(axis=1) == pytest.approx(normal.sum(axis=1), abs=1e-10 * size)
     assert (bond.shear * bond.length).sum(axis=1) == pytest.approx(shear.sum(axis=1), abs=1e-10 * size)
+
+
+@given(seed=st.integers(0, 2**32 - 1), slope=st.floats(-0.5, 0.5))
+@settings(max_examples=15, deadline=None)
+def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
+    """Any even strain of one material: the traction is sigma n on every inner node of the slanted line."""
+    mesh = of_grid(SMALL, 0.5, seed=2)
+    points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
+    cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, bare(TITANIUM))
+    strain = np.random.default_rng(seed).normal(size=(2, 2))
+    bond = bond_line(cells, (points @ strain.T)[None])
+    (exx, exy), (eyx, eyy) = strain
+    (xx, yy, _, xy), _ = hooke(exx, eyy, (exy + eyx) / 2, np.array(0), bare(TITANIUM))
+    into, along = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
+    traction = -np.array([[xx, xy], [xy, yy]]) @ into
+    scale = np.abs([xx, yy, xy]).max()
+    assert bond.length.sum() == pytest.approx(2e-3 * np.hypot(1, slope), rel=1e-12)
+    assert np.abs(bond.normal[0, 1:-1] - traction @ into).max() <= 1e-10 * scale
+    assert np.abs(bond.shear[0, 1:-1] - traction @ along).max() <= 1e-10 * scale
+
+
+@given(x=st.floats(-4e-4, 4e-4), depth=st.floats(3.5e-4, 6e-4), bend=st.floats(0.5, 2))
+@settings(max_examples=20, deadline=None)
+def test_exact_peak_of_a_paraboloid_is_found_between_the_nodes(x, depth, bend):
+    cells = cells_of(tensor(graded_grid(2e-3, 1e-3, 1e-4, COATING)))
+    at = cells.middles()
+    stress = np.zeros((len(at), 4))
+    stress[:, :2] = at - [x, depth]
+    top = peak(recovery(cells), stress, lambda s: 5.0 - 1e6 * (s[..., 0]**2 + bend * s[..., 1]**2))
+    assert (top.value, top.x, top.depth) == (pytest.approx(5.0, abs=1e-9), pytest.approx(x, abs=1e-9),
+                                             pytest.approx(depth, abs=1e-9))
+    assert not top.coating
+    at_face = peak(recovery(cells), stress, lambda s: -s[..., 1])
+    assert at_face.depth == 0 and at_face.coating and at_face.value == pytest.approx(depth, rel=1e-9)
+    below = peak(recovery(cells), stress, lambda s: -s[..., 1], least_depth=COATING * 1.01)
+    assert below.depth > COATING and not below.coating
 
 
 def test_exact_no_coating_no_bond_line():
