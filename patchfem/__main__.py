@@ -19,7 +19,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
 Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
-NOT_BUILT = ("sweep", "cost", "fit", "profile", "compare", "report", "view", "import", "export", "demo", "new",
+NOT_BUILT = ("sweep", "cost", "fit", "profile", "compare", "report", "import", "demo", "new",
              "schema", "doctor", "cite")
 
 
@@ -169,6 +169,23 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")
 
 
+@app.command
+def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
+    """Write the fields of a results folder as .pvd (series), .vtu or .csv (last or --frame), or .vtkhdf."""
+    from .export.vtu import export as write
+
+    print(write(folder, out, frame))
+
+
+@app.command
+def view(folder: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None,
+         frame: int | None = None, magnify: float | None = None):
+    """Show the pressed pieces of a results folder in a window, or draw them into -o PICTURE.png."""
+    from .export.view import view as show
+
+    show(folder, out, frame, magnify, say)
+
+
 class NotReached(Exception):
     """The run is on disk and marked not_converged, exit code 3."""
 
@@ -190,7 +207,8 @@ def _guarded(words: list) -> int:
         return 130
     try:
         if words and words[0] in NOT_BUILT:
-            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, mesh")
+            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, mesh, "
+                          "export, view")
         app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return 0

@@ -137,9 +137,12 @@ def _write_fields(result: Result, path: Path) -> dict:
     times = fields["time"]
     interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
     low, high = _body(patch, fields, "lower"), _body(patch, fields, "upper")
+    for one, other in ((low, high), (high, low)):
+        one["stress_error"] = one["error"].shares(other["error"])[0]
     points, blocks, point_data, cell_data = bodies(low, high, interface)
     units = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "part": "1", "material": "1",
-             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1"}
+             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1",
+             "stress_error": "1", "normal_bond": "Pa", "shear_bond": "Pa"}
     used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
     write_series(path, points, blocks, times, point_data, cell_data, used)
     if not isinstance(patch.pair.piece, Piece):
@@ -151,7 +154,9 @@ def _write_fields(result: Result, path: Path) -> dict:
 
 def _body(patch, fields: dict, side: str) -> dict:
     """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface."""
+    from .contact import bond
     from .contact.elasticity import von_mises
+    from .contact.recovery import cells_of, indicator, recovery
 
     lower = side == "lower"
     piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
@@ -162,8 +167,12 @@ def _body(patch, fields: dict, side: str) -> dict:
     normal = np.zeros_like(shear)
     normal[0] = patch.pressure.sigma_n * force
     points, blocks, interface, u, stress = _inside(piece, grid, shear, normal)
-    move = (u[:1] + u[1:]) * [1.0, sign]
-    stress = (stress[:1] + stress[1:]) * np.array([1.0, 1.0, 1.0, sign])
+    u, stress, cells = u[:1] + u[1:], stress[:1] + stress[1:], cells_of(piece)
+    error = indicator(recovery(cells), u, stress)
+    bonded = bond.at(cells, bond.bond_line(cells, u), grid.x)
+    if bonded:
+        bonded["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
+    move, stress = u * [1.0, sign], stress * np.array([1.0, 1.0, 1.0, sign])
     if not lower:
         p = patch.pressure
         move[..., 0] += fields.get("holder_slide", np.zeros(len(tau)))[:, None] - p.rotation * points[:, 1]
@@ -171,7 +180,7 @@ def _body(patch, fields: dict, side: str) -> dict:
     blocks = [block if not lower else block[:, ::-1] for block in blocks]
     return {"points": points * [1.0, sign], "blocks": blocks, "interface": interface, "displacement": move,
             "material": grid.is_coating if hasattr(grid, "is_coating") else piece.is_coating, "stress": stress,
-            "mises": von_mises(stress)}
+            "mises": von_mises(stress), "error": error, "bond": bonded}
 
 
 def _inside(piece, grid, shear, normal) -> tuple:

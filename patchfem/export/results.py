@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ..core import Missing, PatchfemError
 
-FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml")
+FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml", "fields.pvd",
+         "fields_frames")
 LOCK = ".writer"
 
 

@@ -1,0 +1,80 @@
+"""What a coating hands to its substrate: nodal forces along the coating's lower boundary, so they balance exactly."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .recovery import Cells, quadratures, stresses
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Bond:
+    """The lower boundary of the coating. node: (b,) by rising x; length: (b,) of the line that belongs to each node
+    [m]; force: (frames, b, 2) of the coating on its substrate along x and inward, per unit width [N/m]; shear, normal:
+    (frames, b) force along the line and across it, compression > 0, per length [Pa]."""
+
+    node: np.ndarray
+    length: np.ndarray
+    force: np.ndarray
+    shear: np.ndarray
+    normal: np.ndarray
+
+
+def bond_line(cells: Cells, u) -> Bond | None:
+    """What the coating hands to its substrate, u (frames, N, 2) [m]; None without a coating.
+
+    Nodal forces of the coating's own stress, so they carry exactly the load on the coating's face.
+    """
+    edge, aside = _bond_edges(cells)
+    if not len(edge):
+        return None
+    node, where = np.unique(edge, return_inverse=True)
+    order = np.lexsort((cells.points[node, 1], cells.points[node, 0]))
+    node, where = node[order], np.argsort(order)[where.reshape(edge.shape)]
+    across, length = np.zeros((node.size, 2)), np.zeros(node.size)
+    for end in where.T:
+        np.add.at(across, end, aside)
+        np.add.at(length, end, np.hypot(*aside.T) / 2)
+    across /= np.hypot(*across.T)[:, None]
+    along = across[:, ::-1] * [1.0, -1.0]
+    rules = quadratures(cells)
+    force = np.stack([-_coating_forces(cells, rules, motion)[node] for motion in u])
+    shear, normal = ((force * way).sum(axis=2) / length for way in (along, across))
+    return Bond(node, length, force, shear, normal)
+
+
+def _bond_edges(cells: Cells) -> tuple:
+    """(e, 2) edges of coating cells that a substrate cell shares, (e, 2) their normals into the substrate, as long."""
+    ends = np.concatenate([np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
+                           for block in cells.blocks])
+    coat = cells.is_coating[cells.owner()]
+    key = ends.min(axis=1) * len(cells.points) + ends.max(axis=1)
+    mine = ends[coat & np.isin(key, key[~coat])]
+    way = cells.points[mine[:, 1]] - cells.points[mine[:, 0]]
+    return mine, way[:, ::-1] * [1.0, -1.0]
+
+
+def _coating_forces(cells: Cells, rules: list, u) -> np.ndarray:
+    """(N, 2) nodal forces that the stress of the coating balances [N/m]."""
+    out, first = np.zeros((len(cells.points), 2)), 0
+    for rule, stress in zip(rules, stresses(cells, rules, u)):
+        coat = cells.is_coating[first:first + len(rule.block)]
+        first += len(rule.block)
+        xx, yy, xy = np.moveaxis(stress[coat] * rule.weight[coat][..., None], -1, 0)
+        slope = rule.slope[coat]
+        force = np.stack([np.einsum("cg,cgn->cn", xx, slope[..., 0]) + np.einsum("cg,cgn->cn", xy, slope[..., 1]),
+                          np.einsum("cg,cgn->cn", xy, slope[..., 0]) + np.einsum("cg,cgn->cn", yy, slope[..., 1])], -1)
+        np.add.at(out, rule.block[coat], force)
+    return out
+
+
+def at(cells: Cells, bond: Bond | None, x) -> dict:
+    """{"normal_bond", "shear_bond"} (frames, m) [Pa] of `bond_line` at the places x (m,) [m] of the interface, NaN
+    beyond the coating's ends; {} without a coating."""
+    if bond is None:
+        return {}
+    own = cells.points[bond.node, 0]
+    close = 1e-9 * np.ptp(own)
+    outside = (x < own[0] - close) | (x > own[-1] + close)
+    return {name: np.where(outside, np.nan, np.stack([np.interp(x, own, row) for row in values]))
+            for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear))}

@@ -1,0 +1,263 @@
+"""Stress inside a pressed piece, recovered node by node, how wrong it is, and where it is largest.
+
+Recovery: a plane is fitted to the stresses at the cell middles around a node (Zienkiewicz and Zhu, Int. J. Numer.
+Meth. Eng. 33, 1992, 1331), coating and substrate apart, because stress jumps between them. The recovered field less
+the computed one estimates the error (Zienkiewicz and Zhu 1987).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..core import frozen_array
+from .elasticity import Layers, hooke, lame, von_mises
+
+SPREAD = 0.1  # determinant of the correlations of (1, x, y) over a patch below which it takes in its neighbours
+GAUSS = 1 / np.sqrt(3)
+CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cells:
+    """The cells of one piece. points: (N, 2) as x and depth [m]; blocks: arrays (c, 3 or 4) of node numbers, in the
+    order of the cell stresses; is_coating: (t,); layers: the two materials."""
+
+    points: np.ndarray
+    blocks: tuple
+    is_coating: np.ndarray
+    layers: Layers
+
+    def owner(self) -> np.ndarray:
+        """(corners,) cell of every corner, block after block."""
+        sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in self.blocks])
+        return np.repeat(np.arange(sizes.size), sizes)
+
+    def corners(self) -> np.ndarray:
+        """(corners,) node of every corner, block after block."""
+        return np.concatenate([block.ravel() for block in self.blocks])
+
+    def middles(self) -> np.ndarray:
+        """(t, 2) middles of the cells [m]."""
+        return np.concatenate([self.points[block].mean(axis=1) for block in self.blocks])
+
+
+def cells_of(piece) -> Cells:
+    """The cells of an assembled piece: elasticity.Piece or substructure.Substructure."""
+    if hasattr(piece, "mesh"):
+        mesh = piece.mesh
+        blocks = tuple(block for block in (mesh.triangles, mesh.quads) if len(block))
+        return Cells(mesh.points, blocks, mesh.is_coating, piece.layers)
+    points = np.stack([np.repeat(piece.x, piece.depth.size), np.tile(piece.depth, piece.x.size)], axis=1)
+    return Cells(points, (piece.cells,), piece.is_coating, piece.layers)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Recovery:
+    """Linear map from cell middles to places: a node has one in each material it touches.
+
+    node, coating: (s,) node number and material of each place; fit: (s, t) sparse, rows sum to one; place: (corners,)
+    of every corner of every cell, in the order of Cells.corners.
+    """
+
+    cells: Cells
+    node: np.ndarray
+    coating: np.ndarray
+    place: np.ndarray
+    fit: csr_matrix
+
+    def __call__(self, values) -> np.ndarray:
+        """(..., s, k) at the places from (..., t, k) at the cell middles; linear fields are recovered exactly."""
+        values = np.asarray(values)
+        flat = np.moveaxis(values, -2, 0)
+        out = self.fit @ flat.reshape(len(flat), -1)
+        return np.moveaxis(out.reshape(-1, *flat.shape[1:]), 0, -2)
+
+
+def recovery(cells: Cells) -> Recovery:
+    """Fits of a plane to the cell middles around every node, per material; patches too thin for a plane (edges,
+    corners) take in their neighbours, and one that stays thin is fitted along itself alone."""
+    owner, corners = cells.owner(), cells.corners()
+    key, place = np.unique(2 * corners + cells.is_coating[owner], return_inverse=True)
+    shape = (key.size, cells.is_coating.size)
+    near = csr_matrix((np.ones(owner.size), (place, owner)), shape=shape)
+    node, middle = key // 2, cells.middles()
+    fit, thin = _planes(near, cells.points[node], middle)
+    if thin.any():
+        wide = (near[thin] @ near.T @ near).tocsr()
+        wide.sum_duplicates()
+        pick = np.flatnonzero(thin)
+        more, _ = _planes(wide, cells.points[node[pick]], middle)
+        keep = csr_matrix((np.where(thin, 0.0, 1.0), (np.arange(key.size),) * 2), shape=(key.size,) * 2)
+        put = csr_matrix((np.ones(pick.size), (pick, np.arange(pick.size))), shape=(key.size, pick.size))
+        fit = (keep @ fit + put @ more).tocsr()
+    return Recovery(cells, node, key % 2 == 1, place, fit)
+
+
+def _planes(near, at, middle) -> tuple:
+    """(weights of the cells of every patch, whether the patch is too thin for a plane); least squares, equal shares."""
+    near = near.tocsr()
+    starts, counts = near.indptr[:-1], np.diff(near.indptr)
+    row = np.repeat(np.arange(counts.size), counts)
+    offset = middle[near.indices] - at[row]
+    size = np.maximum.reduceat(np.abs(offset), starts)
+    offset /= np.where(size > 0, size, 1.0)[row]
+    terms = np.column_stack([np.ones(row.size), offset])
+    gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
+    scale = np.sqrt(np.einsum("sii->si", gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < SPREAD
+    mean = gram[:, 0, 1:] / counts[:, None]
+    apart = offset - mean[row]
+    spread = np.add.reduceat(apart[:, :, None] * apart[:, None], starts)
+    slope = np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=1e-8, hermitian=True), -mean)
+    share = 1 / counts[row] + np.einsum("ni,ni->n", apart, slope[row])
+    return csr_matrix((share, near.indices, near.indptr), shape=near.shape), thin
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Quadrature:
+    """Points of integration in one block of cells. block: its nodes (c, n); shape: (g, n); slope: (c, g, n, 2) [1/m];
+    weight: (c, g) [m2]."""
+
+    block: np.ndarray
+    shape: np.ndarray
+    slope: np.ndarray
+    weight: np.ndarray
+
+    def strain(self, u) -> tuple:
+        """Plane strains (exx, eyy, exy), each (c, g), of displacements u (N, 2)."""
+        slope = np.einsum("cgnj,cni->cgij", self.slope, u[self.block], optimize=True)
+        return slope[..., 0, 0], slope[..., 1, 1], (slope[..., 0, 1] + slope[..., 1, 0]) / 2
+
+
+def quadratures(cells: Cells) -> list:
+    """One Quadrature per block: 2 x 2 Gauss points in quads, the points the stiffness is built with, 3 in triangles."""
+    out = []
+    for block in cells.blocks:
+        if block.shape[1] == 3:
+            at = np.array([[4, 1], [1, 4], [1, 1]]) / 6
+            shape = np.column_stack([1 - at.sum(axis=1), at])
+            local = np.broadcast_to(np.array([[-1, -1], [1, 0], [0, 1]]), (3, 3, 2))
+            weight = 1 / 6
+        else:
+            at = GAUSS * CORNERS
+            both = 1 + at[:, None] * CORNERS
+            shape = both.prod(axis=2) / 4
+            local = CORNERS * both[..., ::-1] / 4
+            weight = 1.0
+        jacobian = np.einsum("gni,cnj->cgij", local, cells.points[block], optimize=True)
+        slope = np.einsum("gni,cgji->cgnj", local, np.linalg.inv(jacobian), optimize=True)
+        out.append(Quadrature(block, shape, slope, weight * np.linalg.det(jacobian)))
+    return out
+
+
+def stresses(cells: Cells, rules: list, u) -> list:
+    """Plane stresses (c, g, 3) as xx, yy, xy [Pa] at the points of integration of each block."""
+    out, first = [], 0
+    for rule in rules:
+        coat = cells.is_coating[first:first + len(rule.block)]
+        first += len(rule.block)
+        exx, eyy, exy = (part.T for part in rule.strain(u))  # cells last: the materials stand there
+        stress, _ = hooke(exx, eyy, exy, coat, cells.layers)
+        out.append(np.swapaxes(stress, 0, 1)[..., [0, 1, 3]])
+    return out
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Indicator:
+    """Estimated error of the stress. error: (frames, t) squared energy norm of every cell [J/m]; energy: (frames,)
+    squared energy norm of the computed stress, twice the stored energy [J/m]."""
+
+    error: np.ndarray
+    energy: np.ndarray
+
+    @property
+    def relative(self) -> np.ndarray:
+        """(frames,) estimated error over the whole, both in energy norm [1]; 0 where nothing is loaded."""
+        return self.shares()[1]
+
+    def shares(self, *others) -> tuple:
+        """((frames, t) error of each cell, (frames,) of all of them) over the energy norm of the whole [1], `others`
+        the Indicators of the pieces pressed together with this one. The squares of the cells add up to that of all."""
+        total = self.error.sum(axis=1)
+        whole = sum((one.energy + one.error.sum(axis=1) for one in (self, *others)), np.zeros(total.size))
+        whole = np.where(whole > 0, whole, 1.0)
+        return np.sqrt(self.error / whole[:, None]), np.sqrt(total / whole)
+
+
+def indicator(found: Recovery, u, stress) -> Indicator:
+    """Zienkiewicz-Zhu indicator of displacements u (frames, N, 2) [m] with stress (frames, t, 4) at the cell middles.
+
+    ||sigma* - sigma||^2 = integral of (sigma* - sigma) : C^-1 : (sigma* - sigma), sigma* the recovered stress carried
+    by the shape functions; per metre of width.
+    """
+    cells, rules = found.cells, quadratures(found.cells)
+    layers = cells.layers
+    pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
+    lam, mu = pairs[cells.is_coating.astype(int)].T
+    errors, energies = [], []
+    for motion, middle in zip(u, stress):
+        smooth = found(middle)[:, [0, 1, 3]][found.place]
+        parts, energy, corner, cell = [], 0.0, 0, 0
+        for rule, rough in zip(rules, stresses(cells, rules, motion)):
+            count, nodes = rule.block.shape
+            mine = slice(cell, cell + count)
+            best = np.einsum("gn,cnk->cgk", rule.shape, smooth[corner:corner + count * nodes].reshape(count, nodes, 3))
+            parts.append((rule.weight * _complementary(best - rough, lam[mine], mu[mine])).sum(axis=1))
+            energy += (rule.weight * _complementary(rough, lam[mine], mu[mine])).sum()
+            corner, cell = corner + count * nodes, cell + count
+        errors.append(np.concatenate(parts))
+        energies.append(energy)
+    return Indicator(frozen_array(errors), frozen_array(energies))
+
+
+def _complementary(stress, lam, mu) -> np.ndarray:
+    """s : C^-1 : s (c, g) [Pa] of plane stresses (c, g, 3), lam and mu (c,)."""
+    xx, yy, xy = np.moveaxis(stress, -1, 0)
+    lam, mu = lam[:, None], mu[:, None]
+    return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy)**2) / (2 * mu)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Peak:
+    """The largest value inside a piece and where it lies: x, depth [m]."""
+
+    value: float
+    x: float
+    depth: float
+    coating: bool
+
+
+def peak(found: Recovery, stress, of=von_mises, least_depth: float = 0.0) -> Peak:
+    """Largest value of `of` (von Mises) of one frame of cell stresses (t, 4) [Pa] deeper than `least_depth` [m]: the
+    top of the paraboloid through the recovered values around the largest of them, if it has one there."""
+    value = of(found(stress))
+    at = found.cells.points[found.node]
+    top = int(np.argmax(np.where(at[:, 1] >= least_depth, value, -np.inf)))
+    owner = found.cells.owner()
+    near = owner[np.isin(found.place, np.unique(found.place[np.isin(owner, owner[found.place == top])]))]
+    around = np.unique(found.place[np.isin(owner, near)])
+    around = around[found.coating[around] == found.coating[top]]
+    found_at, best = _vertex(at[around] - at[top], value[around])
+    if best is None or (at[top] + found_at)[1] < least_depth:
+        found_at, best = np.zeros(2), value[top]
+    x, depth = at[top] + found_at
+    return Peak(float(best), float(x), float(depth), bool(found.coating[top]))
+
+
+def _vertex(offset, value) -> tuple:
+    """(place, value) of the top of the paraboloid through values (k,) at offsets (k, 2); (zero, None) without one in
+    the middle half of the points."""
+    reach = np.abs(offset).max(axis=0)
+    if len(value) < 6 or not reach.all():
+        return np.zeros(2), None
+    x, y = (offset / reach).T
+    c = np.linalg.lstsq(np.column_stack([np.ones(x.size), x, y, x * x, x * y, y * y]), value, rcond=None)[0]
+    bend = np.array([[2 * c[3], c[4]], [c[4], 2 * c[5]]])
+    if np.linalg.eigvalsh(bend).max() >= 0:
+        return np.zeros(2), None
+    top = np.linalg.solve(bend, -c[1:3])
+    if np.abs(top).max() > 0.5:
+        return np.zeros(2), None
+    return top * reach, float(c[0] + c[1:3] @ top / 2)

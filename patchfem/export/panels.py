@@ -1,0 +1,165 @@
+"""What a picture of the pressed pieces shows, as numbers: places drawn, how much magnified, which part, which scale."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .pictures import axis_unit
+from .vtkhdf import Frame
+
+VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap in it takes
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Panel:
+    """One view of both pieces. places (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion;
+    window: (left, right, bottom, top) [mm] of what is drawn; top: stress [Pa] at the upper end of the colours; over:
+    whether some cell exceeds it."""
+
+    places: np.ndarray
+    cells: np.ndarray
+    factor: float
+    window: tuple
+    top: float
+    over: bool
+
+    def title(self) -> str:
+        """How the panel is drawn, for its head."""
+        text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
+        unit, scale = axis_unit([self.top], "Pa")
+        return text + (f", top colour {self.top * scale:.3g} {unit} and more" if self.over else "")
+
+    def ticks(self) -> tuple:
+        """Round numbers (along x, along y) [mm] for the axes of the window, about five on the longer side."""
+        left, right, bottom, top = self.window
+        step = rounded(max(right - left, top - bottom) / 4, 0.0)
+        return tuple(step * np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1)
+                     for low, high in ((left, right), (bottom, top)))
+
+
+def panels(frame: Frame, magnify: float | None = None) -> tuple:
+    """(Panel of both pieces whole, Panel of where they touch), each with a factor of its own unless `magnify` is given.
+
+    The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
+    """
+    move = moved(frame)
+    used = np.unique(np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)]))
+    x, y = frame.points[used, :2].T * 1e3
+    whole = (x.min(), x.max(), y.min(), y.max())
+    return tuple(_panel(frame, move, window, share, magnify) for window, share in ((whole, 0.995), (near(frame), 1.0)))
+
+
+def _panel(frame: Frame, move, window: tuple, share: float, magnify: float | None) -> Panel:
+    left, right, bottom, top = window
+    x, y = frame.points[:, :2].T * 1e3
+    mine = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+    if magnify is None:
+        largest = np.abs(move[mine, 1]).max(initial=0.0) * 1e3
+        magnify = rounded(VISIBLE * (top - bottom) / largest) if largest > 0 else 0.0
+    cells, mises = middles(frame), frame.cell_data["von_mises"]
+    here = (cells[:, 0] >= left) & (cells[:, 0] <= right) & (cells[:, 1] >= bottom) & (cells[:, 1] <= top)
+    here &= np.isfinite(mises)
+    largest = float(mises[here].max(initial=0.0))
+    limit = min(largest, float(_exceeded(mises[here], areas(frame)[here], share)))
+    places = (frame.points[:, :2] + magnify * move) * 1e3
+    drawn = places[np.unique(frame.connectivity[np.repeat(here, np.diff(frame.offsets))])]
+    low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
+    return Panel(places, here, float(magnify), (low[0], high[0], low[1], high[1]), limit, largest > limit * (1 + 1e-6))
+
+
+def _exceeded(values, weight, share: float) -> float:
+    """The value below which `share` of the weight lies."""
+    if not values.size:
+        return 0.0
+    order = np.argsort(values)
+    heap = np.cumsum(weight[order])
+    return values[order][min(np.searchsorted(heap, share * heap[-1]), values.size - 1)]
+
+
+def moved(frame: Frame) -> np.ndarray:
+    """(N, 2) displacement [m], that of the upper piece with the shape of its surface, fading towards its far face, so
+    that the drawn gap is the gap."""
+    move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
+    line = frame.interface()
+    x = frame.points[line, 0]
+    upper = np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
+    height = frame.points[upper, 1].max()
+    face = upper[frame.points[upper, 1] <= 1e-9 * height]
+    face = face[np.argsort(frame.points[face, 0], kind="stable")]
+    shape = move[line, 1] + frame.point_data["gap"][line] - np.interp(x, frame.points[face, 0], move[face, 1])
+    move[upper, 1] += np.interp(frame.points[upper, 0], x, shape) * (1 - frame.points[upper, 1] / height)
+    return move
+
+
+def rounded(factor: float, least: float = 1.0) -> float:
+    """The next lower of 1, 2, 5 times a power of ten, `least` at least; factor > 0."""
+    if factor < least:
+        return least
+    power = 10.0**np.floor(np.log10(factor))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)))
+
+
+def near(frame: Frame) -> tuple:
+    """Window [mm] around the contact, or around its most stressed quarter where it is longer than that."""
+    line = frame.interface()
+    x, sigma = frame.points[line, 0] * 1e3, frame.point_data["normal_stress"][line]
+    length, touching = np.ptp(x), x[sigma > 0]
+    cell = np.diff(x).max()
+    if not touching.size:
+        middle, half = x.mean(), length / 8
+    elif np.ptp(touching) > length / 4:
+        middle, half = x[np.argmax(sigma)], length / 8
+    else:
+        middle, half = (touching[0] + touching[-1]) / 2, max(np.ptp(touching), 4 * cell)
+    left = max(x[0], min(middle - half, x[-1] - 2 * half))
+    right = min(x[-1], left + 2 * half)
+    return (left, right, -0.3 * (right - left), 0.3 * (right - left))
+
+
+def middles(frame: Frame) -> np.ndarray:
+    """(cells, 2) middles of the cells [mm]."""
+    sums = np.add.reduceat(frame.points[frame.connectivity, :2], frame.offsets[:-1])
+    return sums / np.diff(frame.offsets)[:, None] * 1e3
+
+
+def areas(frame: Frame) -> np.ndarray:
+    """(cells,) areas [m2], 0 of lines."""
+    size, out = np.diff(frame.offsets), np.zeros(len(frame.types))
+    for count in np.unique(size[size > 2]):
+        mine = size == count
+        corner = frame.points[frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)], :2]
+        after = np.roll(corner, -1, axis=1)
+        out[mine] = np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
+    return out
+
+
+def curves(frame: Frame) -> tuple:
+    """(x [mm], ((label, values in the unit), ...), unit) of the stresses along the interface."""
+    line = frame.interface()
+    shown = [("normal stress", frame.point_data["normal_stress"][line])]
+    if "shear_stress" in frame.point_data:
+        shown.append(("shear stress", frame.point_data["shear_stress"][line]))
+    unit, scale = axis_unit(np.concatenate([values for _, values in shown]), "Pa")
+    return frame.points[line, 0] * 1e3, tuple((label, values * scale) for label, values in shown), unit
+
+
+def borders(frame: Frame, cells) -> tuple:
+    """((e, 2) outer edges of both pieces, (e, 2) edges between coating and substrate) that the `cells` (bool) have."""
+    outer, inner = [], []
+    size, material = np.diff(frame.offsets), frame.cell_data["material"]
+    for part in (0, 1):
+        ends, coat, shown = [], [], []
+        for count in (3, 4):
+            mine = (frame.cell_data["part"] == part) & (size == count)
+            block = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
+            ends.append(np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2))
+            coat.append(np.repeat(material[mine], count))
+            shown.append(np.repeat(cells[mine], count))
+        ends, coat = np.sort(np.concatenate(ends), axis=1), np.concatenate(coat)
+        pairs, number = np.unique(ends, axis=0, return_inverse=True)
+        times = np.bincount(number.ravel())
+        coats = np.bincount(number.ravel(), coat > 0)
+        seen = np.bincount(number.ravel(), np.concatenate(shown)) > 0
+        outer.append(pairs[(times == 1) & seen])
+        inner.append(pairs[(times == 2) & (coats == 1) & seen])
+    return np.concatenate(outer), np.concatenate(inner)

@@ -1,0 +1,325 @@
+"""Recovered stress, its error and the bond line: linear fields, Hertz under the surface, finer meshes, balance."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
+from test_substructure import cloud, of_grid
+
+from patchfem.contact import elasticity, substructure
+from patchfem.contact.bond import bond_line
+from patchfem.contact.elasticity import Layers, hooke, lame
+from patchfem.contact.gaps import crown
+from patchfem.contact.recovery import Cells, cells_of, indicator, peak, quadratures, recovery
+from patchfem.contact.unilateral import press
+from patchfem.core import Compliance, Interface
+from patchfem.mesh.anymesh import halved
+from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
+
+A, LOAD = 0.1e-3, 9107.0
+P0 = 2 * LOAD / (np.pi * A)
+TOUGH = (121e9, 0.3)
+SMALL = graded_grid(2e-3, 1e-3, 2e-4, COATING)
+
+
+def any_cells(mesh, layers=COATED) -> Cells:
+    return Cells(mesh.points, tuple(b for b in (mesh.triangles, mesh.quads) if len(b)), mesh.is_coating, layers)
+
+
+def tensor(grid, layers=COATED):
+    return elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers)
+
+
+@cache
+def meshes():
+    """Cells of a tensor grid, of quads and triangles in any order, and of triangles alone, all coated."""
+    triangles = cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+    return cells_of(tensor(SMALL)), any_cells(of_grid(SMALL, 0.5, seed=2)), any_cells(triangles)
+
+
+@pytest.mark.parametrize("kind", range(3))
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=10, deadline=None)
+def test_exact_a_linear_stress_in_each_material_is_recovered_at_every_node(kind, seed):
+    found = recovery(meshes()[kind])
+    slopes = np.random.default_rng(seed).normal(size=(2, 3, 4)) * 1e8  # the materials share nothing
+    slopes[:, 1:] *= 1e3
+
+    def field(at, coat):
+        return np.einsum("ni,nik->nk", np.column_stack([np.ones(len(at)), at]), slopes[coat.astype(int)])
+
+    cells = found.cells
+    back = found(field(cells.middles(), cells.is_coating))
+    assert np.abs(back - field(cells.points[found.node], found.coating)).max() <= 1e-12 * np.abs(slopes[:, 0]).max() \
+        + 1e-12 * np.abs(slopes[:, 1:]).max() * 1e-3
+    both = np.unique(cells.corners()[cells.is_coating[cells.owner()]])
+    other = np.unique(cells.corners()[~cells.is_coating[cells.owner()]])
+    assert found.node.size == len(cells.points) + np.intersect1d(both, other).size
+
+
+def test_exact_a_coating_of_one_row_is_fitted_along_itself():
+    grid = TensorGrid(np.linspace(-1e-3, 1e-3, 9), np.array([0.0, 1e-4, 3e-4, 6e-4, 1e-3]), 1)
+    found = recovery(cells_of(tensor(grid)))
+    middles = found.cells.middles()
+    back = found(np.column_stack([np.ones(len(middles)), middles]))
+    coat = found.coating
+    wanted = np.column_stack([np.ones(found.node.size), found.cells.points[found.node]])
+    wanted[coat, 2] = 0.5e-4  # nothing is known across the row, so its middle stands for it
+    assert np.abs(back - wanted).max() <= 1e-12
+
+
+@given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
+@settings(max_examples=15, deadline=None)
+def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(seed, plane):
+    """Quadratic motion of one material: the middles of rectangles have the exact stress, the cells miss the rest."""
+    layers = bare(TITANIUM, plane)
+    piece = tensor(SMALL, layers)
+    a, b = np.random.default_rng(seed).normal(size=(2, 3))
+    cells = cells_of(piece)
+    x, y = cells.points.T
+    u = np.stack([a[0] * x**2 + a[1] * x * y + a[2] * y**2, b[0] * x**2 + b[1] * x * y + b[2] * y**2], axis=1)[None]
+    stress, _ = elasticity.cell_stress(piece, u)
+    found = recovery(cells)
+    x, y = cells.points[found.node].T
+    exact, _ = hooke(2 * a[0] * x + a[1] * y, b[1] * x + 2 * b[2] * y,
+                     (a[1] * x + 2 * a[2] * y + 2 * b[0] * x + b[1] * y) / 2, found.coating, layers)
+    assert np.abs(found(stress)[0] - exact).max() <= 1e-11 * np.abs(exact).max()
+    corner = cells.points[piece.cells]
+    wide, tall = corner[:, 1, 0] - corner[:, 0, 0], corner[:, 3, 1] - corner[:, 0, 1]
+    # a bilinear cell has the terms in x y; it misses a0 x^2 and b0 x^2 along x, a2 y^2 and b2 y^2 along y
+    lam, mu = lame(*TITANIUM, plane)
+    missed = wide * tall / 3 * (wide**2 * ((lam + 2 * mu) * a[0]**2 + mu * b[0]**2)
+                                + tall**2 * ((lam + 2 * mu) * b[2]**2 + mu * a[2]**2))
+    error = indicator(found, u, stress).error[0]
+    assert np.abs(error / missed - 1).max() <= 1e-9
+
+
+@pytest.mark.parametrize("split", [None, 0.5])
+def test_exact_energy_is_the_work_of_the_load_and_shares_add_up(split):
+    force = np.random.default_rng(4).normal(size=(2, 3, SMALL.x.size)) * 1e3
+    if split is None:
+        piece, module = tensor(SMALL), elasticity
+        face = np.arange(SMALL.x.size) * SMALL.depth.size
+    else:
+        mesh = of_grid(SMALL, split, seed=2)
+        piece, module, face = substructure.assemble(mesh, COATED), substructure, mesh.interface
+    u = module.displacement(piece, *force)
+    found = indicator(recovery(cells_of(piece)), u, module.cell_stress(piece, u)[0])
+    work = (force.transpose(1, 2, 0) * u[:, face]).sum(axis=(1, 2))
+    area = sum(rule.weight.sum() for rule in quadratures(cells_of(piece)))
+    assert area == pytest.approx(2e-3 * 1e-3, rel=1e-12)
+    assert found.energy == pytest.approx(work, rel=1e-9)
+    each, whole = found.shares(found)
+    assert (each**2).sum(axis=1) == pytest.approx(whole**2, rel=1e-12)
+    assert whole**2 == pytest.approx(found.relative**2 / 2, rel=1e-12)
+    assert (found.relative < 1).all() and (found.relative > whole).all()
+
+
+def hertz_axis(depth):
+    """Stresses (n, 4) under the middle of Hertz's pressure, z = depth/a (Johnson 1985, 4.46), plane strain."""
+    z = depth / A
+    root = np.sqrt(1 + z**2)
+    xx, yy = -P0 * ((1 + 2 * z**2) / root - 2 * z), -P0 / root
+    return np.stack([xx, yy, TOUGH[1] * (xx + yy), 0 * z], axis=-1)
+
+
+def hertz_inside(x, depth):
+    """(yy, xy) under Hertz's pressure (McEwen 1949, Johnson 1985, 4.49)."""
+    one = A**2 - x**2 + depth**2
+    root = np.sqrt(one**2 + 4 * x**2 * depth**2)
+    m, n = np.sqrt((root + one) / 2), np.sqrt((root - one) / 2) * np.sign(x)
+    share = (depth**2 + n**2) / (m**2 + n**2)
+    return -P0 / A * m * (1 - share), -P0 / A * n * (m**2 - depth**2) / (m**2 + n**2)
+
+
+def greatest_shear(stress):
+    return np.hypot((stress[..., 0] - stress[..., 1]) / 2, stress[..., 3])
+
+
+@cache
+def under_hertz(per_half_width, coating=0.0):
+    """A big block of one material under Hertz's pressure; a `coating` of that same material marks a line in it."""
+    grid = refined_middle(1.5 * A, A / per_half_width, 150e-3, 70e-3, 1.1)
+    even = np.arange(0, 2 * per_half_width + 1) * A / per_half_width
+    depth = np.concatenate([even, 2 * A + np.cumsum(graded_rows(1.1 * A / per_half_width, 70e-3 - 2 * A))])
+    rows = round(coating / A * per_half_width)
+    piece = tensor(TensorGrid(grid.x, depth, rows), bare(TOUGH))
+    fine = np.linspace(-A, A, 20001)
+    p = P0 * np.sqrt(np.maximum(1 - (fine / A)**2, 0)) * (fine[1] - fine[0])
+    cell = np.searchsorted(grid.x, fine, side="right") - 1
+    along = (fine - grid.x[cell]) / (grid.x[cell + 1] - grid.x[cell])
+    force = np.bincount(cell, p * (1 - along), grid.x.size) + np.bincount(cell + 1, p * along, grid.x.size)
+    u = elasticity.displacement(piece, 0 * force[None], force[None])
+    return piece, force, u, elasticity.cell_stress(piece, u)[0]
+
+
+def test_exact_hertz_stress_peaks_under_the_surface():
+    """0.300 p0 at 0.786 a for the shear, 0.558 p0 at 0.704 a for von Mises with nu = 0.3."""
+    depth = np.linspace(0.2, 2, 200001) * A
+    axis = hertz_axis(depth)
+    piece, _, _, stress = under_hertz(16)
+    found = recovery(cells_of(piece))
+    for of, known, place in ((greatest_shear, 0.300, 0.786), (elasticity.von_mises, 0.558, 0.704)):
+        values = of(axis)
+        assert values.max() / P0 == pytest.approx(known, abs=5e-4)
+        assert depth[values.argmax()] / A == pytest.approx(place, abs=5e-4)
+        top = peak(found, stress[0], of)
+        assert top.value == pytest.approx(values.max(), rel=5e-3)
+        assert top.depth == pytest.approx(depth[values.argmax()], abs=0.03 * A)
+        assert abs(top.x) <= 1e-9 * A and not top.coating
+
+
+def test_order_recovered_stress_under_hertz_is_two():
+    errors = []
+    for count in (4, 8, 16):
+        piece, _, _, stress = under_hertz(count)
+        found = recovery(cells_of(piece))
+        x, depth = found.cells.points[found.node].T
+        mine = (np.abs(x) < 1e-9 * A) & (depth > 0.4 * A) & (depth < 1.6 * A)
+        exact = hertz_axis(depth[mine])
+        errors.append(np.abs(found(stress[0])[mine] - exact).max() / P0)
+    assert np.log2(errors[0] / errors[-1]) / 2 == pytest.approx(2.0, abs=0.3)
+    assert errors[-1] <= 4e-3
+
+
+def test_exact_bond_line_is_the_stress_at_its_depth():
+    piece, _, u, _ = under_hertz(16, 0.5 * A)
+    cells = cells_of(piece)
+    bond = bond_line(cells, u)
+    depth = cells.points[bond.node, 1]
+    assert np.ptp(depth) == 0 and depth[0] == pytest.approx(0.5 * A, rel=1e-12)
+    x = cells.points[bond.node, 0]
+    near = np.abs(x) <= 1.4 * A
+    yy, xy = hertz_inside(x, depth)
+    assert np.abs(bond.normal[0] + yy)[near].max() <= 6e-3 * P0
+    assert np.abs(bond.shear[0] + xy)[near].max() <= 6e-3 * P0
+
+
+@pytest.mark.parametrize("kind", ["tensor", "mixed", "triangles"])
+@given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
+@settings(max_examples=8, deadline=None)
+def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
+    layers = Layers(CARBIDE, TITANIUM, plane)
+    if kind == "tensor":
+        piece, module, x = tensor(SMALL, layers), elasticity, SMALL.x
+    else:
+        mesh = of_grid(SMALL, 0.5, seed=2) if kind == "mixed" else \
+            cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+        piece, module, x = substructure.assemble(mesh, layers), substructure, mesh.x
+    shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
+    cells = cells_of(piece)
+    bond = bond_line(cells, module.displacement(piece, shear, normal))
+    size = np.abs(shear).sum() + np.abs(normal).sum()
+    assert np.abs(bond.force.sum(axis=1) - np.stack([shear.sum(axis=1), normal.sum(axis=1)], axis=1)).max() \
+        <= 1e-10 * size
+    at, depth = cells.points[bond.node].T
+    moment = (bond.force[..., 1] * at - bond.force[..., 0] * depth).sum(axis=1)
+    assert np.abs(moment - normal @ x).max() <= 1e-10 * size * np.ptp(x)
+    assert bond.length.sum() == pytest.approx(2e-3, rel=1e-12)
+    assert depth == pytest.approx(COATING, rel=1e-12) and (np.diff(at) > 0).all()
+    assert (bond.normal * bond.length).sum(axis=1) == pytest.approx(normal.sum(axis=1), abs=1e-10 * size)
+    assert (bond.shear * bond.length).sum(axis=1) == pytest.approx(shear.sum(axis=1), abs=1e-10 * size)
+
+
+@given(seed=st.integers(0, 2**32 - 1), slope=st.floats(-0.5, 0.5))
+@settings(max_examples=15, deadline=None)
+def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
+    """Any even strain of one material: the traction is sigma n on every inner node of the slanted line."""
+    mesh = of_grid(SMALL, 0.5, seed=2)
+    points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
+    cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, bare(TITANIUM))
+    strain = np.random.default_rng(seed).normal(size=(2, 2))
+    bond = bond_line(cells, (points @ strain.T)[None])
+    (exx, exy), (eyx, eyy) = strain
+    (xx, yy, _, xy), _ = hooke(exx, eyy, (exy + eyx) / 2, np.array(0), bare(TITANIUM))
+    into, along = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
+    traction = -np.array([[xx, xy], [xy, yy]]) @ into
+    scale = np.abs([xx, yy, xy]).max()
+    assert bond.length.sum() == pytest.approx(2e-3 * np.hypot(1, slope), rel=1e-12)
+    assert np.abs(bond.normal[0, 1:-1] - traction @ into).max() <= 1e-10 * scale
+    assert np.abs(bond.shear[0, 1:-1] - traction @ along).max() <= 1e-10 * scale
+
+
+@given(x=st.floats(-4e-4, 4e-4), depth=st.floats(3.5e-4, 6e-4), bend=st.floats(0.5, 2))
+@settings(max_examples=20, deadline=None)
+def test_exact_peak_of_a_paraboloid_is_found_between_the_nodes(x, depth, bend):
+    cells = cells_of(tensor(graded_grid(2e-3, 1e-3, 1e-4, COATING)))
+    at = cells.middles()
+    stress = np.zeros((len(at), 4))
+    stress[:, :2] = at - [x, depth]
+    top = peak(recovery(cells), stress, lambda s: 5.0 - 1e6 * (s[..., 0]**2 + bend * s[..., 1]**2))
+    assert (top.value, top.x, top.depth) == (pytest.approx(5.0, abs=1e-9), pytest.approx(x, abs=1e-9),
+                                             pytest.approx(depth, abs=1e-9))
+    assert not top.coating
+    at_face = peak(recovery(cells), stress, lambda s: -s[..., 1])
+    assert at_face.depth == 0 and at_face.coating and at_face.value == pytest.approx(depth, rel=1e-9)
+    below = peak(recovery(cells), stress, lambda s: -s[..., 1], least_depth=COATING * 1.01)
+    assert below.depth > COATING and not below.coating
+
+
+def test_exact_no_coating_no_bond_line():
+    piece = tensor(graded_grid(2e-3, 1e-3, 2e-4), bare(TITANIUM))
+    assert bond_line(cells_of(piece), np.zeros((1, len(cells_of(piece).points), 2))) is None
+
+
+def cut(points, parts):
+    """Every interval in `parts` alike pieces."""
+    return np.append((points[:-1, None] + np.diff(points)[:, None] * np.arange(parts) / parts).ravel(), points[-1])
+
+
+@pytest.mark.parametrize("per_half_width, coating", [(4, 0.0), (4, 1.5 * A), (8, 1.5 * A)])
+def test_exact_indicator_is_the_distance_to_a_finer_mesh_of_a_hertz_pair(per_half_width, coating):
+    layers = COATED if coating else bare(TITANIUM)
+    grid = refined_middle(1.5 * A, A / per_half_width, 12.7e-3, 6e-3, 1.2)
+    rows = graded_rows(A / per_half_width, coating, 1.1, 1) if coating else np.empty(0)
+    under = graded_rows(rows[-1] if coating else A / per_half_width, 6e-3 - coating, 1.2)
+    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
+
+    def solved(x, y, coating_rows):
+        piece = elasticity.assemble(x, y, coating_rows, layers)
+        nn = elasticity.interface_compliance(piece)[0]
+        half = TITANIUM[0] / (1 - TITANIUM[1]**2)
+        face = Interface(x, TensorGrid(x, y, 0).tributary(), 1.0)
+        state = press(Compliance(face, 2 * nn, 2 * nn), crown(x, np.pi * half / 2 * A**2 / (4 * LOAD)), LOAD)
+        force = (state.sigma_n * face.weight)[None]
+        return piece, elasticity.displacement(piece, 0 * force, force)
+
+    piece, u = solved(grid.x, depth, rows.size)
+    parts = 2
+    fine, v = solved(cut(grid.x, parts), cut(depth, parts), parts * rows.size)
+    found = indicator(recovery(cells_of(piece)), u, elasticity.cell_stress(piece, u)[0])
+    # the coarse field on the fine mesh: bilinear cells are reproduced by the bilinear cells inside them
+    coarse = u[0].reshape(grid.x.size, -1, 2)
+    along = np.stack([np.stack([np.interp(fine.x, grid.x, column) for column in part.T], axis=1)
+                      for part in np.moveaxis(coarse, 2, 0)], axis=2)
+    both = np.stack([np.stack([np.interp(fine.depth, depth, row) for row in part.T], axis=0)
+                     for part in np.moveaxis(along, 2, 0).swapaxes(1, 2)], axis=2)
+    apart = (v[0].reshape(both.shape) - both)[:, :-1].ravel()
+    true = apart @ (fine.matrix @ apart) * parts**2 / (parts**2 - 1)  # the finer mesh has its own error, order 1
+    assert 0.8 <= np.sqrt(found.error.sum() / true) <= 1.3
+
+
+@pytest.mark.parametrize("split", [0.0, 0.5, 1.0, None])
+def test_exact_indicator_of_any_mesh_is_the_energy_a_finer_mesh_adds(split):
+    """The load is the same pressure, so the error squared is the difference of the energies (Galerkin)."""
+    mesh = of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2) if split is not None else \
+        cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+    finest = halved(halved(mesh))
+    pressure = 1e8 * np.maximum(1 - (finest.x / 0.6e-3)**2, 0)
+    step = np.diff(finest.x)
+    force = np.zeros(finest.x.size)
+    force[:-1] += step * (2 * pressure[:-1] + pressure[1:]) / 6
+    force[1:] += step * (2 * pressure[1:] + pressure[:-1]) / 6
+    hats = np.array([np.interp(finest.x, mesh.x, unit) for unit in np.eye(mesh.x.size)])
+    fine = substructure.assemble(finest, COATED)
+    energy = force @ substructure.displacement(fine, 0 * force, force)[0, finest.interface, 1]
+    piece, load = substructure.assemble(mesh, COATED), hats @ force
+    u = substructure.displacement(piece, 0 * load, load)
+    true = (energy - load @ u[0, mesh.interface, 1]) * 16 / 15
+    found = indicator(recovery(cells_of(piece)), u, substructure.cell_stress(piece, u)[0])
+    assert 0.8 <= np.sqrt(found.error.sum() / true) <= 1.3

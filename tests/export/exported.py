@@ -1,0 +1,91 @@
+"""Shared by the export tests: a small series of any cells with random numbers, and the scene of a small run."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from patchfem.__main__ import main
+from patchfem.export.vtkhdf import NAME, bodies, write_series
+
+UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "part": "1", "material": "1",
+         "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond": "Pa"}
+BENCH = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+element_size = "0.5 mm"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.coating]
+material = "WC-Co"
+thickness = "6 mil"
+[contact.crown]
+radius = "80 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "triangle"
+amplitude = "0.4 um"
+speed = "0.2 mm/s"
+[accuracy]
+steps_per_cycle = 40
+"""
+POINT = """\
+[normal]
+load = "26 lbf"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "triangle"
+amplitude = "10 um"
+speed = "5 mm/s"
+"""
+
+
+def cli(*words) -> SimpleNamespace:
+    """Exit code, stdout and stderr of the command line."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return SimpleNamespace(code=end.value.code or 0, out=out.getvalue(), err=err.getvalue())
+
+
+def body(sign: float, frames: int, rng) -> dict:
+    """Three columns of two quads, one of them cut in two; node 3 * column + row."""
+    x, depth = np.meshgrid([-1e-3, -0.2e-3, 0.3e-3, 1e-3], [0.0, 1e-4, 1e-3], indexing="ij")
+    node = np.arange(12).reshape(4, 3)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    triangles = np.stack([quads[2, [0, 1, 2]], quads[2, [0, 2, 3]]])
+    return {"points": np.stack([x.ravel(), sign * depth.ravel()], axis=1),
+            "blocks": [triangles, np.delete(quads, 2, 0)], "interface": node[:, 0],
+            "material": np.array([1, 1, 1, 0, 0, 1, 0]) > 0,
+            "displacement": rng.normal(size=(frames, 12, 2)) * 1e-6, "stress": rng.normal(size=(frames, 7, 4)) * 1e7,
+            "mises": rng.random((frames, 7)) * 1e7, "stress_error": rng.random((frames, 7)),
+            "bond": {"normal_bond": rng.normal(size=(frames, 4)) * 1e6}}
+
+
+def write_small(folder, frames: int = 3, seed: int = 0):
+    """A results folder with only fields.vtkhdf; (times, point data, cell data) as given to the writer."""
+    rng = np.random.default_rng(seed)
+    gap = rng.random((frames, 4)) * 1e-6
+    interface = {"normal_stress": rng.random((frames, 4)) * 1e7, "gap": gap,
+                 "status": rng.integers(0, 3, (frames, 4))}
+    points, blocks, at_points, in_cells = bodies(body(-1.0, frames, rng), body(1.0, frames, rng), interface)
+    times = np.cumsum(rng.random(frames))
+    folder.mkdir(exist_ok=True)
+    write_series(folder / NAME, points, blocks, times, at_points, in_cells, UNITS)
+    return SimpleNamespace(points=points, blocks=blocks, times=times, point_data=at_points, cell_data=in_cells)
+
+
+def at(values, frame: int):
+    """One frame of an array that may be constant."""
+    return values[frame if len(values) > 1 else 0]

@@ -1,0 +1,126 @@
+"""Pictures of the pressed pieces: what is drawn is what was computed, with OpenGL and without, or a named refusal."""
+
+from __future__ import annotations
+
+import matplotlib.image
+import numpy as np
+import pytest
+from exported import at, cli, write_small
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.export import view
+from patchfem.export.panels import areas, borders, curves, panels, rounded
+from patchfem.export.vtkhdf import Series
+
+ABORTS, HANGS, FAILS = "import os; os.abort()", "import time; time.sleep(60)", "raise RuntimeError('no device')"
+
+
+def frame_of(folder, number=-1):
+    with Series(folder) as series:
+        return series.frame(number)
+
+
+@pytest.mark.parametrize("magnify", [None, 0.0, 1.0, 2500.0])
+def test_exact_the_drawn_gap_is_the_gap_times_the_factor(bench, magnify):
+    frame = frame_of(bench)
+    line = frame.interface()
+    upper = np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
+    face = upper[frame.points[upper, 1] == 0]
+    for panel in panels(frame, magnify):
+        assert magnify is None or panel.factor == magnify
+        drawn = panel.places[face, 1] - panel.places[line, 1]
+        wanted = panel.factor * 1e3 * frame.point_data["gap"][line]
+        assert np.abs(drawn - wanted).max() <= 1e-6 * (wanted.max() + 1e-3 * panel.factor)
+        far = frame.points[:, 1] == frame.points[:, 1].max()
+        move = frame.point_data["displacement"][far, :2]
+        assert panel.places[far] == pytest.approx(1e3 * (frame.points[far, :2] + panel.factor * move), rel=1e-6)
+        assert f"{panel.factor:g} times" in panel.title() or panel.factor == 0
+
+
+def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
+    frame = frame_of(bench)
+    whole, close = panels(frame)
+    mises = frame.cell_data["von_mises"]
+    assert whole.cells.sum() == (frame.cell_data["part"] < 2).sum() and close.cells.sum() < whole.cells.sum()
+    assert close.top == mises[close.cells].max() and not close.over
+    size = areas(frame)
+    assert size.sum() == pytest.approx(2 * 12.7e-3 * 6.35e-3, rel=1e-9)
+    above = size[whole.cells & (mises > whole.top)].sum()
+    assert whole.over and 0 < above <= 0.005 * size.sum() and "and more" in whole.title()
+    outer, inner = borders(frame, whole.cells)
+    reach = np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum()
+    assert reach == pytest.approx(4 * (12.7e-3 + 6.35e-3), rel=1e-9)
+    assert np.abs(np.abs(frame.points[inner][..., 1]) - 152.4e-6).max() <= 1e-12
+    assert np.linalg.norm(np.diff(frame.points[inner], axis=1), axis=2).sum() == pytest.approx(2 * 12.7e-3, rel=1e-9)
+    x, shown, unit = curves(frame)
+    assert unit == "MPa" and [label for label, _ in shown] == ["normal stress", "shear stress"]
+    share = np.convolve(np.diff(x), [0.5, 0.5])
+    assert share @ shown[0][1] * 12.7 == pytest.approx(26 * 4.4482216152605, rel=1e-6)  # MPa mm mm = N
+
+
+def test_exact_any_cells_are_drawn_whole(tmp_path):
+    given_ = write_small(tmp_path / "out")
+    frame = frame_of(tmp_path / "out")
+    assert areas(frame).sum() == pytest.approx(2 * 2e-3 * 1e-3, rel=1e-9)
+    outer, _ = borders(frame, panels(frame)[0].cells)
+    assert np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum() == pytest.approx(4 * 3e-3, rel=1e-9)
+    assert np.array_equal(frame.cell_data["von_mises"], at(given_.cell_data["von_mises"], 2), equal_nan=True)
+
+
+@given(st.floats(1e-3, 1e12))
+def test_always_the_factor_is_round_and_just_below(factor):
+    found = rounded(factor, 0.0)
+    assert factor / 2.5 * (1 - 1e-9) <= found <= factor * (1 + 1e-9)
+    lead = found / 10.0**np.floor(np.log10(found * (1 + 1e-9)))
+    assert min(abs(lead - step) for step in (1, 2, 5)) <= 1e-9
+    assert rounded(factor) == max(1.0, rounded(factor))
+
+
+def colours(path):
+    """(shape, share of the picture that is neither white, grey nor black)."""
+    picture = matplotlib.image.imread(path)[..., :3]
+    return picture.shape, (np.ptp(picture, axis=2) > 0.1).mean()
+
+
+def test_exact_picture_with_whatever_draws_here(bench, tmp_path, monkeypatch):
+    why = view.no_opengl()
+    monkeypatch.setattr(view, "no_opengl", lambda: why)
+    answer = cli("view", bench, "-o", tmp_path / "a.png")
+    assert answer.code == 0, answer.err
+    shape, share = colours(tmp_path / "a.png")
+    assert shape == (1000, 1800, 3) and share > 0.2
+    assert ("matplotlib" in answer.err) == (why is not None)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+
+
+@pytest.mark.parametrize("probe, says", [(ABORTS, "signal 6"), (FAILS, "no device"), (HANGS, "more than 1 s")])
+def test_exact_without_opengl_matplotlib_draws_and_it_is_said(bench, tmp_path, monkeypatch, probe, says):
+    monkeypatch.setattr(view, "PROBE", probe)
+    monkeypatch.setattr(view, "SECONDS", 1 if probe == HANGS else 60)
+    answer = cli("view", bench, "-o", tmp_path / "a.png", "--frame", 0)
+    assert answer.code == 0 and "no working OpenGL" in answer.err and says in answer.err and "matplotlib" in answer.err
+    assert colours(tmp_path / "a.png")[1] > 0.2
+
+
+def test_refuses_a_window_without_a_screen_or_opengl(bench, monkeypatch):
+    monkeypatch.setattr(view.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    answer = cli("view", bench)
+    assert answer.code == 4 and "no screen" in answer.err and "-o FILE.png" in answer.err
+    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setattr(view, "PROBE", ABORTS)
+    answer = cli("view", bench)
+    assert answer.code == 4 and "no working OpenGL" in answer.err and "-o FILE.png" in answer.err
+
+
+@pytest.mark.parametrize("words, code, says", [
+    (["-o", "a.bmp"], 2, ".png, .svg, .pdf"), (["-o", "a.svg", "--frame", "999"], 2, "--frame"),
+    (["-o", "a.svg", "--magnify", "-1"], 2, "--magnify"), (["-o", "a.svg", "--magnify", "nan"], 2, "--magnify"),
+    (["-o", "nowhere/a.svg"], 4, "cannot be written")])
+def test_refuses_pictures_by_name(bench, tmp_path, monkeypatch, words, code, says):
+    monkeypatch.chdir(tmp_path)
+    answer = cli("view", bench, *words)
+    assert answer.code == code and says in answer.err
+    assert not list(tmp_path.iterdir())
