@@ -33,6 +33,8 @@ EFFECTS = {
     "contact.tilt": Effect("patchfem.contact.gaps", "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect("patchfem.contact.gaps", "g += x^2/(2 radius)"),
+    "contact.profile": Effect("patchfem.surface.nodes", "g += z(x), levelled, averaged over each node's cells"),
+    "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R q - g - roll y_j per strip, one holder q"),
     "contact.shear": Effect("patchfem.contact.slip", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "friction.law=coulomb": Effect("patchfem.dynamics.events", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
@@ -57,7 +59,6 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "contact.profile", "contact.strips",
     "friction.law=tanh", "friction.law=convolution", "friction.temperature", "slide.kind=dwell", "slide.kind=file",
     "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
     "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",

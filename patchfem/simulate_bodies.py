@@ -42,8 +42,7 @@ class Pair:
         """(on the lower, on the upper piece): nodal forces (..., m) of the interface carried to each piece's nodes."""
         if self.joint is None:
             return nodal, nodal
-        rows = np.atleast_2d(nodal)
-        return self.joint.to_lower.T.dot(rows.T).T, self.joint.to_upper.T.dot(rows.T).T
+        return self.joint.forces(nodal)
 
 
 def piece_of(contact, side: str) -> tuple:
@@ -140,7 +139,7 @@ def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary()
-    if upper_grid is not None and (upper_grid.x.size != x.size or np.abs(upper_grid.x - x).max() > 1e-9 * contact.length):
+    if upper_grid is not None and not _match(x, upper_grid.x):
         from .contact.mortar import mortar
 
         joint = mortar(low, x, high, upper_grid.x)
@@ -150,4 +149,9 @@ def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
     seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
-    return Pair(grid, upper_grid or grid, piece, upper, Compliance(interface, normal, tangential), closing, joint, seconds)
+    pieces = Compliance(interface, normal, tangential)
+    return Pair(grid, upper_grid or grid, piece, upper, pieces, closing, joint, seconds)
+
+
+def _match(x, other) -> bool:
+    return other.size == x.size and np.abs(other - x).max() <= 1e-9 * np.ptp(x)

@@ -10,7 +10,8 @@ from .simulate_patch import Patch, solve
 
 UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "moment": "N m", "rotation": "rad",
          "approach": "m", "contact_half_width": "m", "pressure_centre": "m", "loaded_fraction": "1",
-         "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1"}
+         "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1", "pressure_centre_lateral": "m",
+         "roll_moment": "N m"}
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
 BANDED = ("approach", "pressure_peak", "normal_stiffness", "tangential_stiffness")
 
@@ -77,6 +78,10 @@ def values(patch: Patch) -> dict:
     out["loaded_fraction"] = p.load / (area * peak) if touching else 0.0
     out["normal_stiffness"] = normal_stiffness(patch.pieces.normal, patch.active) if touching else 0.0
     out["tangential_stiffness"] = tangential_stiffness(patch.pieces.tangential, patch.active) if touching else 0.0
+    if patch.strips is not None:
+        from .simulate_strips import strip_values
+
+        out |= strip_values(patch, peak_pressure)
     return out
 
 
@@ -121,7 +126,8 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
     cell = float(max(cells.max(), cells.sum() / 2)) if cells.size else 0.0
     length = fine.pieces.interface.length
     floors = {"contact_fraction": max(cell, np.diff(fine.x).min()) / length, "contact_half_width": 1e-12,
-              "pressure_centre": 1e-12, "rotation": 1e-12, "moment": 1e-10, "approach": 1e-13}
+              "pressure_centre": 1e-12, "pressure_centre_lateral": 1e-12, "roll_moment": 1e-10, "rotation": 1e-12,
+              "moment": 1e-10, "approach": 1e-13}
     snap = cell / max(2 * cell, mine["contact_fraction"] * length) if cell else 0.0
     least = {"contact_fraction": cell / length, "normal_load": 1e-10 * mine["normal_load"],
              "contact_half_width": cell / 2, "normal_stiffness": snap / 4 * mine["normal_stiffness"],

@@ -12,6 +12,7 @@ from .mesh.tensor import TensorGrid, coarser
 from .simulate_bodies import Pair, bodies_of, condensed
 
 SHEAR_MODES = 8  # modes a shear reduction starts from
+RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
 BEARING = 1e-9  # share of the largest nodal force from which a node of a smooth skin counts as bearing
 
 
@@ -22,7 +23,8 @@ class Patch:
     pieces: compliance of the pieces and of their skin, linearised at the operating point where the skin is smooth;
     giving: (m, m) [m/N] the tangential part that the scene names, without [contact.shear] that of the skin alone; gap
     (m,) [m] of the unloaded surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in
-    strips, whose means over the width then stand in `pressure`, else None; notes: sentences for the warnings.
+    strips, whose means over the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None
+    where it is rigid in shear; notes: sentences for the warnings.
     """
 
     pair: Pair
@@ -32,6 +34,7 @@ class Patch:
     pressure: Pressure
     skin: object
     strips: object
+    tangential_ratio: float | None
     notes: tuple
     seconds: dict
 
@@ -108,7 +111,10 @@ def pressed(scene, pair: Pair) -> Patch:
     giving = pieces.tangential
     if contact.shear is None:
         giving = frozen_array(giving - pair.compliance.tangential)
-    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, notes, pair.seconds | seconds)
+    ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
+    if pair.joint is not None and pair.joint.ripple > RIPPLE:
+        notes = (*notes, f"contact.mesh: {pair.joint.reason}")
+    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
@@ -148,10 +154,9 @@ def moment_of(contact) -> float | None:
 def solve_all(scene, estimate: bool = True, fresh: bool = False) -> tuple:
     """(Patch on the asked mesh, on a mesh twice and four times as coarse); None where none is wanted or possible.
 
-    A static patch whose element size is neither pinned nor decided by a profile gets the mesh that its tolerance asks for.
-    A mesh of any cells has
-    no coarser one: its second patch is on the mesh with every edge halved. fresh: condense anew, whatever is kept on
-    disk.
+    A static patch whose element size is neither pinned nor decided by a profile gets the mesh that its tolerance asks
+    for. A mesh of any cells has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense
+    anew, whatever is kept on disk.
     """
     contact = scene.contact
     free = contact.element_size is None and contact.mesh is None and contact.profile is None

@@ -41,10 +41,11 @@ def _smooth(skin) -> bool:
     return skin is not None and hasattr(skin, "log_pressure")
 
 
-def strip_values(contact, patch, peak_of) -> dict:
+def strip_values(patch, peak_of) -> dict:
     """name -> value of what strips change: peak of any strip, share of the area, stiffnesses, and the lateral place of
     the pressure with its roll moment. peak_of: largest pressure of one strip from (x, pressure)."""
-    state, count, pieces = patch.strips, contact.strips.count, patch.pair.compliance
+    state, pieces = patch.strips, patch.pair.compliance
+    count = len(state.offsets)
     weight = pieces.interface.weight / count
     out = {"contact_fraction": state.fraction, "pressure_centre_lateral": state.centre_y,
            "roll_moment": state.roll_moment}
@@ -52,8 +53,7 @@ def strip_values(contact, patch, peak_of) -> dict:
     if not state.load > 0:
         return out | {"loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0}
     out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])
-    ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
+    ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     out["normal_stiffness"] = strips_tangent(pieces.normal * count, weight, state)
-    out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state,
-                                                 np.inf if ratio is None else ratio)
+    out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state, ratio)
     return out

@@ -71,14 +71,14 @@ def _arrays(root, steps, kind: str, data: dict, count: int, units: dict) -> None
         offsets[name] = (np.arange(count) if len(values) == count else np.zeros(count, np.int64)) * size
 
 
-def bodies(lower: dict, upper: dict, interface: dict) -> tuple:
+def bodies(lower: dict, upper: dict, interface: dict, above: dict | None = None) -> tuple:
     """Points, blocks of cells, point data and cell data of a pair.
 
     lower, upper: "points" (n, 2), "blocks" of cells numbered from 0, "material" (t,) of all of them, "interface" (m,)
     node numbers, "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises" (f, t) [Pa],
     "stress_error" (f, t) [1], "bond" name -> (f, m) of the lower boundary of its coating, {} without one; interface:
-    name -> (f, m). Bond-line stress stands at the same x of the interface: the piece's own at its nodes, that of the
-    lower piece (or the only coated one) on the line between.
+    name -> (f, m); above: the same at the nodes of the upper piece where they differ. Bond-line stress stands at the
+    same x of the interface: the piece's own at its nodes, that of the lower piece (or the only coated one) between.
     """
     low, high = lower["interface"], upper["interface"]
     first, last = len(lower["points"]), len(lower["points"]) + len(upper["points"])
@@ -93,14 +93,14 @@ def bodies(lower: dict, upper: dict, interface: dict) -> tuple:
     for name, values in interface.items():
         full = np.full((frames, len(points)), np.nan, np.float32) if name != "status" else \
             np.full((frames, len(points)), -1, np.int8)
-        for place in (low, high + first, last + np.arange(low.size)):
-            full[:, place] = values
+        full[:, low] = full[:, last + np.arange(low.size)] = values
+        full[:, high + first] = values if above is None else above[name]
         point_data[name] = full
     for name in dict.fromkeys([*lower["bond"], *upper["bond"]]):
         full = np.full((frames, len(points)), np.nan, np.float32)
         for place, part in ((last + np.arange(low.size), upper), (last + np.arange(low.size), lower), (low, lower),
                             (high + first, upper)):
-            if name in part["bond"]:
+            if name in part["bond"] and part["bond"][name].shape[-1] == place.size:
                 full[:, place] = part["bond"][name]
         point_data[name] = full
     body, both = len(lower["material"]), len(lower["material"]) + len(upper["material"])

@@ -1,0 +1,86 @@
+"""The bodies and their interface frame by frame: what a run writes for VTK and draws in its report."""
+
+from pathlib import Path
+
+import numpy as np
+
+
+def write_fields(result, path: Path) -> dict:
+    """Both bodies and the interface, frame by frame, of one pair; the pressed state for the report's picture, which is
+    drawn for tensor grids only."""
+    from .contact.elasticity import Piece
+    from .export.vtkhdf import bodies, write_series
+
+    patch, fields = result.patch, result.fields
+    times = fields["time"]
+    interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
+    low, high = _body(patch, fields, "lower"), _body(patch, fields, "upper")
+    for one, other in ((low, high), (high, low)):
+        one["stress_error"] = one["error"].shares(other["error"])[0]
+    joined = [interface] if patch.pair.joint is None else \
+        [_moved(interface, patch.x, body.x) for body in (patch.pair.grid, patch.pair.upper_grid)]
+    points, blocks, point_data, cell_data = bodies(low, high, *joined)
+    units = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "part": "1", "material": "1",
+             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1",
+             "stress_error": "1", "normal_bond": "Pa", "shear_bond": "Pa"}
+    used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
+    write_series(path, points, blocks, times, point_data, cell_data, used)
+    if not isinstance(patch.pair.piece, Piece):
+        return {}
+    shape = (patch.x.size - 1, -1)
+    return {"depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
+            "mises": [body["mises"][0].reshape(shape) for body in (low, high)]}
+
+
+def _moved(interface: dict, x, nodes) -> dict:
+    """Fields (f, m) at x read off at the nodes of a piece; a status is that of the nearest point."""
+    nearest = np.abs(np.subtract.outer(nodes, x)).argmin(axis=1)
+    return {name: rows[:, nearest] if name == "status" else np.array([np.interp(nodes, x, row) for row in rows])
+            for name, rows in interface.items()}
+
+
+def _body(patch, fields: dict, side: str) -> dict:
+    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface."""
+    from .contact import bond
+    from .contact.elasticity import von_mises
+    from .contact.recovery import cells_of, indicator, recovery
+
+    lower = side == "lower"
+    piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
+    sign = -1.0 if lower else 1.0
+    force = patch.pieces.interface.weight / patch.pieces.interface.width
+    tau = fields.get("shear_stress", np.zeros((len(fields["time"]), force.size)))
+    shear = patch.pair.forces(np.concatenate([np.zeros((1, force.size)), -sign * tau * force]))[0 if lower else 1]
+    normal = np.zeros_like(shear)
+    normal[0] = patch.pair.forces(patch.pressure.sigma_n * force)[0 if lower else 1]
+    points, blocks, interface, u, stress = _inside(piece, grid, shear, normal)
+    u, stress, cells = u[:1] + u[1:], stress[:1] + stress[1:], cells_of(piece)
+    error = indicator(recovery(cells), u, stress)
+    bonded = bond.at(cells, bond.bond_line(cells, u), grid.x)
+    if bonded:
+        bonded["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
+    move, stress = u * [1.0, sign], stress * np.array([1.0, 1.0, 1.0, sign])
+    if not lower:
+        p = patch.pressure
+        move[..., 0] += fields.get("holder_slide", np.zeros(len(tau)))[:, None] - p.rotation * points[:, 1]
+        move[..., 1] += p.rotation * points[:, 0] - p.approach
+    blocks = [block if not lower else block[:, ::-1] for block in blocks]
+    return {"points": points * [1.0, sign], "blocks": blocks, "interface": interface, "displacement": move,
+            "material": grid.is_coating if hasattr(grid, "is_coating") else piece.is_coating, "stress": stress,
+            "mises": von_mises(stress), "error": error, "bond": bonded}
+
+
+def _inside(piece, grid, shear, normal) -> tuple:
+    """(points (n, 2) as x and depth, blocks of cells, interface nodes, displacement, cell stress) of a piece."""
+    from .contact import elasticity
+
+    if isinstance(piece, elasticity.Piece):
+        rows = grid.depth.size
+        points = np.stack([np.repeat(grid.x, rows), np.tile(grid.depth, grid.x.size)], axis=1)
+        u = elasticity.displacement(piece, shear, normal)
+        return points, [piece.cells], np.arange(0, len(points), rows), u, elasticity.cell_stress(piece, u)[0]
+    from .contact import substructure
+
+    u = substructure.displacement(piece, shear, normal)
+    blocks = [block for block in (grid.triangles, grid.quads) if len(block)]
+    return grid.points, blocks, grid.interface, u, substructure.cell_stress(piece, u)[0]
