@@ -7,6 +7,7 @@ import numpy as np
 from .pictures import axis_unit
 from .vtkhdf import Frame
 
+CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way
 VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap in it takes
 
 
@@ -60,7 +61,8 @@ def _panel(frame: Frame, move, window: tuple, share: float, magnify: float | Non
     here = (cells[:, 0] >= left) & (cells[:, 0] <= right) & (cells[:, 1] >= bottom) & (cells[:, 1] <= top)
     here &= np.isfinite(mises)
     largest = float(mises[here].max(initial=0.0))
-    limit = min(largest, float(_exceeded(mises[here], areas(frame)[here], share)))
+    limit = float(_exceeded(mises[here], areas(frame)[here], share))
+    limit = limit if limit < CLIPPED * largest else largest
     places = (frame.points[:, :2] + magnify * move) * 1e3
     drawn = places[np.unique(frame.connectivity[np.repeat(here, np.diff(frame.offsets))])]
     low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
