@@ -20,6 +20,7 @@ NOT_BUILT = "not yet built"
 
 # (text, sets, key, what the message says)
 REFUSED = [
+    (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "beside [contact.shear]: leave one of them out"),
     (RIG, [SHEAR, "friction.order=0.5"], "friction.order", "0.5 beside [contact.shear]: use order = 1"),
     (RIG, [SHEAR, "friction.order=0"], "friction.order", "0 beside [contact.shear]: use order = 1"),
     (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2"], "friction.order", "use order = 1; not yet built"),

@@ -280,8 +280,6 @@ def test_refuses_another_shape_of_table(text, says):
 
 UNBUILT = [
     (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
-    (PATCH, ["contact.profile.file=before.csv"], "contact.profile"),
-    (PATCH, ["contact.strips.count=8"], "contact.strips"),
     (BENCH, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "friction.law"),
     (BENCH, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
     (RIG, ["friction.spread=5 um"], "friction.spread"),
