@@ -88,7 +88,7 @@ def combinations(draft: Draft, kind: str) -> None:
     if kind == "linear" and accuracy and accuracy.method == "march":
         draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
     if contact is not None:
-        _approach(draft, contact)
+        _mesh(draft, contact)
     if kind not in ("bench", "rig") or law is None:
         return
     if shear:
@@ -101,11 +101,7 @@ def combinations(draft: Draft, kind: str) -> None:
             draft.say("contact.strips", f"beside {shear}: leave one of them out; not yet built")
 
 
-def _approach(draft: Draft, contact: Contact) -> None:
-    if contact.approach is not None:
-        for name in ("load_line", "holder"):
-            if getattr(contact, name) is not None:
-                draft.say(f"contact.{name}", "beside [contact.approach]: use contact.load; not yet built")
+def _mesh(draft: Draft, contact: Contact) -> None:
     if contact.mesh is not None:
         for name in ("upper", "lower"):
             if getattr(contact, name) is not None:

@@ -119,6 +119,10 @@ def _contact(draft: Draft) -> None:
         draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is wanted")
     if contact.asperities:
         _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
+        bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
+        if contact.approach and bare:
+            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' beside [contact.approach] needs it "
+                        "at first touch, where an approach starts")  # fmt: skip
 
 
 def _load_line(draft: Draft) -> None:

@@ -1,9 +1,10 @@
 """The static patch of a scene: the pieces condensed to their interface, the gap between them, and what presses them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
+from scipy.optimize import brentq
 
 from .contact.gaps import crown, step, tilt
 from .contact.unilateral import press, press_by
@@ -91,7 +92,23 @@ def pressed(scene, pair: Pair) -> Patch:
     contact, pieces = scene.contact, pair.compliance
     gap, notes, seconds = gap_of(scene, pieces.interface.x)
     angle = contact.tilt.angle if contact.tilt is not None and contact.tilt.on == "upper" else 0.0
-    begin, skin, strips = perf_counter(), None, None
+    begin = perf_counter()
+    turns = contact.load_line is not None or spring_of(contact) > 0
+    how = _closed_by if contact.approach is not None and turns else _under
+    pieces, pressure, skin, strips = how(contact, pieces, gap, angle)
+    seconds["press"] = perf_counter() - begin
+    giving = pieces.tangential
+    if contact.shear is None:
+        giving = frozen_array(giving - pair.compliance.tangential)
+    ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
+    if pair.joint is not None and pair.joint.ripple > RIPPLE:
+        notes = (*notes, f"contact.mesh: {pair.joint.reason}")
+    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
+
+
+def _under(contact, pieces: Compliance, gap, angle: float) -> tuple:
+    """(Compliance with its skin, Pressure, skin, strips) under the load, or the approach with the rotation held."""
+    strips = skin = None
     if contact.strips is not None:
         from .simulate_strips import in_strips
 
@@ -107,14 +124,41 @@ def pressed(scene, pair: Pair) -> Patch:
             pressure = press_by(pieces, gap, contact.approach.distance, angle)
         else:
             pressure = press(pieces, gap, contact.load, moment_of(contact), angle, spring=spring_of(contact))
-    seconds["press"] = perf_counter() - begin
-    giving = pieces.tangential
-    if contact.shear is None:
-        giving = frozen_array(giving - pair.compliance.tangential)
-    ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
-    if pair.joint is not None and pair.joint.ripple > RIPPLE:
-        notes = (*notes, f"contact.mesh: {pair.joint.reason}")
-    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
+    return pieces, pressure, skin, strips
+
+
+def _closed_by(contact, pieces: Compliance, gap, angle: float) -> tuple:
+    """As `_under` for an approach of a piece that turns: the load at which it is reached, since the approach grows with
+    the load. Where a load a millionth of what flat pieces would take is too much, nothing touches."""
+    distance, tried = contact.approach.distance, []
+
+    def short(log_load: float) -> float:
+        loaded = contact.model_copy(update={"load": float(np.exp(log_load)), "approach": None})
+        tried.append(_under(loaded, pieces, gap, angle))
+        return tried[-1][1].approach - distance
+
+    top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
+    least = _least_load(contact, np.ptp(pieces.interface.x))
+    low = top = max(top, np.log(2 * least) if least > 0 else top)
+    bottom = max(top - np.log(1e6), np.log(least * (1 + 1e-9)) if least > 0 else -np.inf)
+    for _ in range(60):
+        if short(top) >= 0:
+            break
+        low, top = top, top + 2
+    while low == top or short(low) >= 0:
+        if low == bottom:
+            still = press(pieces, gap, 0.0, rotation=angle)
+            open_ = frozen_array(gap - min(distance, gap.min()))
+            return pieces, replace(still, gap=open_, approach=distance), None, None
+        low, top = max(low - 2, bottom), low
+    brentq(short, low, top, xtol=1e-13, rtol=1e-14)
+    return tried[-1]
+
+
+def _least_load(contact, length: float) -> float:
+    """Load [N] below which a free piece tips over under its moment."""
+    line = contact.load_line
+    return 2 * abs(line.moment) / length if line is not None and line.moment and spring_of(contact) == 0 else 0.0
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from patchfem import scene, simulate_bodies, simulate_measures, simulate_patch
 from patchfem.contact.gaps import step
-from patchfem.core import PatchfemError
+from patchfem.core import Outcome, PatchfemError
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh
 from patchfem.mesh.tensor import graded_grid
 
@@ -104,11 +104,6 @@ def test_exact_a_step_lifts_one_side():
     assert step(np.array([-1.0, 0.0, 1.0]), 2.0, 0.0).tolist() == [0.0, 1.0, 2.0]
 
 
-def test_refuses_an_approach_beside_a_line_or_a_spring():
-    for tables in ('[contact.load_line]\noffset = "1 mm"\n', '[contact.holder]\nrotational_stiffness = "1 N m/rad"\n'):
-        with pytest.raises(scene.SceneError, match=r"beside .contact.approach.*not yet built"):
-            scene.loads(TEXT.format("", tables + '[contact.approach]\ndistance = "1 um"\n'))
-
 
 def triangles(path, size, shift=0.0):
     """The pieces of TEXT cut into triangles, as a tagged .msh; the upper piece shifted along x."""
@@ -166,3 +161,31 @@ def test_exact_a_hard_skin_is_none():
     bare, hard = solved(tables=tilt)[1], solved(tables=tilt + skin + '"1e21 Pa/m"\n')[1]
     for name, value in bare.items():
         assert hard[name] == pytest.approx(value, rel=1e-6)
+
+
+TURNING = {
+    "spring": '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n[contact.tilt]\nangle = "0.01 mrad"\n',
+    "offset": '[contact.load_line]\noffset = "2 mm"\n',
+    "moment": '[contact.load_line]\nmoment = "0.05 N m"\n',
+    "spring and offset": '[contact.holder]\nrotational_stiffness = "1e3 N m/rad"\n'
+                         '[contact.load_line]\noffset = "1 mm"\n',
+    "smooth skin": '[contact.load_line]\noffset = "2 mm"\n[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\n'
+                   'density = "1e8 1/m^2"\nheight_deviation = "0.05 um"\n',
+    "strips": '[contact.load_line]\noffset = "2 mm"\n[contact.strips]\ncount = 4\nroll = "0.01 mrad"\n',
+}
+
+
+@pytest.mark.parametrize("tables", TURNING.values(), ids=TURNING.keys())
+def test_exact_an_approach_with_a_turning_piece_is_the_load_that_reaches_it(tables):
+    """The approach that a load gives, asked for in its place, gives that load back, the rotation and the pressure."""
+    _, loaded = solved(tables=tables)
+    closed = solved("", tables + f'[contact.approach]\ndistance = "{loaded["approach"]!r} m"\n')[1]
+    assert closed["normal_load"] == pytest.approx(loaded["normal_load"], rel=1e-7)
+    for name in ("rotation", "moment", "pressure_peak", "approach"):
+        assert closed[name] == pytest.approx(loaded[name], rel=1e-6, abs=1e-13), name
+
+
+def test_exact_a_turning_piece_above_first_touch_is_apart():
+    tables = TURNING["spring"]
+    patch, found = solved("", tables.replace("0.01 mrad", "0 mrad") + '[contact.approach]\ndistance = "0 m"\n')
+    assert patch.pressure.outcome is Outcome.NO_CONTACT and found["normal_load"] == 0
