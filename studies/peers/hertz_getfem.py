@@ -125,12 +125,13 @@ def agreement(one: Row, other: Row) -> float:
 
 
 def _line_of(row: Row) -> str:
-    return (f"{row.program:13} a/{row.cells:<3} {row.dofs:6d} dofs  cold {row.cold:6.3f} s  further {1e3 * row.warm:8.2f}"
-            f" ms  p(0) {row.errors[0]:+.1e}  half width {row.errors[1]:+.1e}  rms {row.errors[2]:.1e}")
+    return (f"{row.program:13} a/{row.cells:<3} {row.dofs:6d} dofs  cold {row.cold:6.3f} s  "
+            f"further {1e3 * row.warm:8.2f} ms  p(0) {row.errors[0]:+.1e}  half width {row.errors[1]:+.1e}  "
+            f"rms {row.errors[2]:.1e}")
 
 
 def ratios(rows: list) -> list:
-    """(peer row, cold over ours at the same mesh, at the same rms error as text, further step over ours) of one form."""
+    """Of one form: (peer row, its cold time over ours at the same mesh, at the same rms error, its further step)."""
     mine = [r for r in rows if r.program == "patchfem"]
     out = []
     for row in (r for r in rows if r.program != "patchfem"):
@@ -159,8 +160,8 @@ def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -
             for row in rows:
                 print("  " + _line_of(row))
             for row, cold, equal, warm in ratios(rows):
-                print(f"  {row.program:13} a/{row.cells:<3} over patchfem: cold {cold:.1f} at the same mesh, {equal} at "
-                      f"the same rms error; further step {warm:.0f}")
+                print(f"  {row.program:13} a/{row.cells:<3} over patchfem: cold {cold:.1f} at the same mesh, {equal} "
+                      f"at the same rms error; further step {warm:.0f}")
     return out
 
 
