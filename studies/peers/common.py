@@ -41,6 +41,7 @@ class Peer:
             raise Missing(f"{self.name} ended without an answer (exit code {self.child.wait()}): {self.remedy}")
         found = json.loads(line)
         if "missing" in found:
+            self.child.wait()
             raise Missing(f"{self.name} is not installed ({found['missing']}): {self.remedy}")
         if "error" in found:
             raise NotConverged(f"{self.name}: {found['error']}")

@@ -11,7 +11,7 @@ from scipy.sparse import diags
 from patchfem import closed_forms as exact
 from patchfem.contact.elasticity import Layers, Piece, assemble, displacement, interface_compliance
 from patchfem.contact.unilateral import press
-from patchfem.core import Compliance, Interface, Pressure
+from patchfem.core import Compliance, Interface, Pressure, frozen_array
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 EVEN = 0.1  # depth of even rows over the wave
@@ -60,12 +60,16 @@ def harmonic_compliance(grid: TensorGrid, layers: Layers) -> float:
     return float(force @ motion / (grid.x[-1] / 2))
 
 
-def wavy_press(cells: int, share: float, wave: float, amplitude: float, material: tuple) -> Pressure:
-    """Two guided pieces of one material pressed on the gap A (1 - cos(2 pi x/wave)); the crest is the first node,
-    x = 0, and the mean pressure the `share` of that which closes it."""
+def wavy_pair(cells: int, wave: float, material: tuple) -> Compliance:
+    """Two guided pieces of one material with `cells` per half wave [m], per unit width."""
     grid = strip_grid(wave, cells)
     normal = 2 * strip_compliance(grid, Layers(material, material, "strain"))
-    mean = share * exact.westergaard_full_pressure(wave, amplitude, exact.combined_modulus(*material))
-    gap = 2 * amplitude * np.sin(np.pi * grid.x / wave)**2
-    pair = Compliance(Interface(grid.x, grid.tributary(), 1.0), normal, normal)
-    return press(pair, gap, mean * wave / 2)
+    return Compliance(Interface(grid.x, frozen_array(grid.tributary()), 1.0), normal, normal)
+
+
+def wavy_press(pair: Compliance, share: float, amplitude: float, modulus: float) -> Pressure:
+    """The pair pressed on the gap A (1 - cos(2 pi x/wave)), E* = `modulus` [Pa]; the crest is the first node, x = 0,
+    and the mean pressure the `share` of that which closes it."""
+    x, wave = pair.interface.x, 2 * pair.interface.length
+    mean = share * exact.westergaard_full_pressure(wave, amplitude, modulus)
+    return press(pair, 2 * amplitude * np.sin(np.pi * x / wave)**2, mean * wave / 2)

@@ -1,7 +1,8 @@
 """The peer's side of westergaard_tamaas.py: runs under the interpreter that has Tamaas, knows nothing of patchfem.
 
 Reads one JSON request per line, answers one JSON line each; SI units. One period of the wavy surface
-A cos(2 pi x/lambda), its crest in the middle, pressed on a half plane by Tamaas' Polonsky-Keer-Rey solver under a mean pressure.
+A cos(2 pi x/lambda), its crest in the middle, pressed on a half plane by Tamaas' Polonsky-Keer-Rey solver under a
+mean pressure.
 """
 
 import json

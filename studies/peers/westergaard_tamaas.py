@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
 from common import Peer, run, timed
-from strip import wavy_press
+from strip import wavy_pair, wavy_press
 
 from patchfem import closed_forms as exact
 from patchfem.contact.halfspace import press_periodic, wave_numbers
@@ -78,7 +78,7 @@ def theirs(peer: Peer, points: int, tolerance: float, count: bool) -> Row:
 def finite_elements(cells: int, share: float = SHARE) -> tuple:
     """(p(0) error, mean-square error) of two elastic pieces between lines of symmetry, `cells` per half wave."""
     modulus = exact.combined_modulus(*MATERIAL)
-    state = wavy_press(cells, share, WAVE, HIGH, MATERIAL)
+    state = wavy_press(wavy_pair(cells, WAVE, MATERIAL), share, HIGH, modulus)
     mean = share * exact.westergaard_full_pressure(WAVE, HIGH, modulus)
     return errors_of(np.linspace(0, WAVE / 2, cells + 1), state.sigma_n, mean, modulus)
 
