@@ -1,0 +1,102 @@
+"""Shared by the comparisons: the peer as a child process, CPU seconds, the time at equal error.
+
+A peer runs under its own interpreter, which an environment variable names, and answers JSON lines; the study and the
+peer take turns, so that a busy machine slows both alike. CPU seconds of one thread each, imports not counted.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+from patchfem.core import Missing, NotConverged, PatchfemError
+
+ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+class Peer:
+    """A child that answers one JSON line per request; `version` of the library inside it.
+
+    Missing where its interpreter or the library is absent, NotConverged where the peer reports a failure.
+    """
+
+    def __init__(self, name: str, script: str, variable: str, default: str, remedy: str):
+        self.name = name
+        python = os.environ.get(variable, default)
+        self.remedy = f"{remedy}, then name its interpreter in {variable} (now {python})"
+        try:
+            self.child = subprocess.Popen([python, str(Path(__file__).parent / script)], text=True,
+                                          stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ | ONE_THREAD)
+        except OSError as error:
+            raise Missing(f"{name} cannot be run ({error}): {self.remedy}") from None
+        self.version = self._read()["version"]
+
+    def _read(self) -> dict:
+        line = self.child.stdout.readline()
+        if not line:
+            raise Missing(f"{self.name} ended without an answer (exit code {self.child.wait()}): {self.remedy}")
+        found = json.loads(line)
+        if "missing" in found:
+            self.child.wait()
+            raise Missing(f"{self.name} is not installed ({found['missing']}): {self.remedy}")
+        if "error" in found:
+            raise NotConverged(f"{self.name}: {found['error']}")
+        return found
+
+    def ask(self, **request) -> dict:
+        """The answer to a request of plain numbers, texts and lists."""
+        try:
+            self.child.stdin.write(json.dumps(request) + "\n")
+            self.child.stdin.flush()
+        except BrokenPipeError:
+            pass  # the reader says what happened
+        return self._read()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.child.stdin.close()
+        self.child.stdout.close()
+        self.child.wait()
+
+
+def timed(work, repeats: int = 1) -> tuple:
+    """(answer, median CPU seconds) of work()."""
+    seconds = []
+    for _ in range(repeats):
+        start = process_time()
+        answer = work()
+        seconds.append(process_time() - start)
+    return answer, float(np.median(seconds))
+
+
+def seconds_at(error: float, errors, seconds) -> tuple:
+    """(seconds, sign) at which a curve of falling errors reaches `error`, log-log between its points.
+
+    sign is "" inside the curve, "<" where its coarsest point is already better (the seconds of that point are more than
+    needed) and ">" where its finest is worse.
+    """
+    order = np.argsort(errors)
+    e, t = np.asarray(errors, float)[order], np.asarray(seconds, float)[order]
+    sign = "<" if error > e[-1] else ">" if error < e[0] else ""
+    return float(np.exp(np.interp(np.log(error), np.log(e), np.log(t)))), sign
+
+
+def ratio_text(theirs: float, ours: float, sign: str) -> str:
+    """Their seconds over ours; a bound where ours is one."""
+    return {"<": "> ", ">": "< ", "": ""}[sign] + f"{theirs / ours:.2g}"
+
+
+def run(main) -> int:
+    """Exit code of a study: a named failure is a line on stderr, never a traceback."""
+    try:
+        main()
+    except PatchfemError as error:
+        print(error, file=sys.stderr)
+        return error.code
+    return 0

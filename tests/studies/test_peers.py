@@ -1,0 +1,93 @@
+"""The comparisons with other programs: their arithmetic, their refusals and, where a peer is installed, its answers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from test_studies import study
+
+from patchfem import closed_forms as exact
+from patchfem.core import Missing
+
+GETFEM, TAMAAS = "PATCHFEM_GETFEM_PYTHON", "PATCHFEM_TAMAAS_PYTHON"
+
+
+@pytest.fixture(scope="module")
+def hertz():
+    return study("peers/hertz_getfem.py")
+
+
+@pytest.fixture(scope="module")
+def wavy():
+    return study("peers/westergaard_tamaas.py")
+
+
+def without(name) -> bool:
+    """Does this interpreter lack the package?"""
+    return subprocess.run([sys.executable, "-c", f"import {name}"], capture_output=True).returncode != 0
+
+
+def test_exact_time_at_equal_error_of_a_power_law(hertz):
+    errors = np.array([1e-2, 1e-3, 1e-4])
+    seconds = errors ** -0.5
+    assert hertz.seconds_at(3e-4, errors, seconds) == (pytest.approx(3e-4 ** -0.5, rel=1e-12), "")
+    assert hertz.seconds_at(1e-1, errors, seconds) == (pytest.approx(10.0), "<")
+    assert hertz.seconds_at(1e-5, errors, seconds) == (pytest.approx(100.0), ">")
+    assert hertz.ratio_text(30.0, 10.0, "<") == "> 3"  # ours needs less than 10: theirs takes more than 3 times that
+
+
+def test_exact_errors_of_the_closed_forms_themselves_vanish(hertz, wavy):
+    x = hertz.grid_of(16).x
+    hertzian = exact.hertz_pressure(x, hertz.LOAD, hertz.RADIUS, hertz.MODULUS)
+    assert np.abs(hertz.errors_of(x, hertzian)).max() <= 1e-12
+    assert hertz.errors_of(x, 1.01 * hertzian)[0] == pytest.approx(0.01)
+    x = wavy.places(64)
+    waves = exact.westergaard_pressure(x, wavy.MEAN, wavy.WAVE, wavy.HIGH, wavy.MODULUS)
+    assert np.abs(wavy.errors_of(x, waves)).max() <= 1e-14
+    assert wavy.errors_of(x, 0.99 * waves)[1] == pytest.approx(0.01)
+
+
+def test_exact_mirrored_and_twice_condensed_pairs_are_one(hertz):
+    mirror, pair = hertz.ours(4, "mirror"), hertz.ours(4, "pair")
+    assert hertz.agreement(mirror, pair) <= 1e-12
+    assert pair.dofs == 2 * mirror.dofs
+
+
+def test_exact_getfem_finds_the_same_pressures(hertz):
+    """With the corner rule both programs solve one discrete problem by different means: all three steps agree."""
+    try:
+        peer = hertz.Peer("GetFEM", "getfem_child.py", GETFEM, "/usr/bin/python3", "")
+    except Missing as absent:
+        pytest.skip(str(absent))
+    with peer:
+        mirror = hertz.theirs(peer, 8, "mirror", "nodal")
+        pair = hertz.theirs(peer, 4, "pair", "nodal")
+    assert hertz.agreement(hertz.ours(8, "mirror"), mirror) <= 1e-9
+    assert hertz.agreement(hertz.ours(4, "pair"), pair) <= 1e-4  # points are looked up across the faces
+
+
+def test_exact_tamaas_finds_the_same_wave(wavy):
+    try:
+        peer = wavy.Peer("Tamaas", "tamaas_child.py", TAMAAS, sys.executable, "")
+    except Missing as absent:
+        pytest.skip(str(absent))
+    with peer:
+        other = wavy.theirs(peer, 256, 1e-10, True)
+    mine = wavy.ours(256, 1e-11)
+    assert other.top == pytest.approx(mine.top, abs=1e-8)
+    assert other.mean_square == pytest.approx(mine.mean_square, rel=1e-6)
+    assert 20 <= other.iterations <= 200
+
+
+@pytest.mark.parametrize("name, variable, package", [("hertz", GETFEM, "getfem"), ("wavy", TAMAAS, "tamaas")])
+def test_refuses_an_absent_peer_by_name(name, variable, package, monkeypatch, capsys, request):
+    module = request.getfixturevalue(name)
+    places = ["/nowhere/python"] + [sys.executable] * without(package)
+    for place in places:
+        monkeypatch.setenv(variable, place)
+        assert module.run(module.main) == 4
+        said = capsys.readouterr().err
+        assert variable in said and place in said and package in said.lower() and "Traceback" not in said
