@@ -19,7 +19,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
 Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
-NOT_BUILT = ("sweep", "cost", "fit", "profile", "compare", "report", "import", "demo", "new",
+NOT_BUILT = ("sweep", "fit", "profile", "compare", "report", "import", "demo", "new",
              "schema", "doctor", "cite")
 
 
@@ -167,6 +167,51 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
         raise Refused(f"{scene}: contact.mesh: a mesh of any cells is only read; writing it is not yet built")
     write_mesh(grid, out)
     print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")
+
+
+@app.command
+def cost(scene: Path, /, *, over: str = "", out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None,
+         set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
+         quiet: Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())] = False):
+    """Error against time of SCENE for a knob (--over element_size, steps_per_cycle, shear_modes), or for all it has."""
+    from .simulate_cost import KNOBS, cheapest, curve, knobs_of, turned_by
+
+    found = _scene(scene, set_)
+    if over and over not in KNOBS:
+        raise Refused(f"cost --over {over}: the knobs are {', '.join(KNOBS)}; others are not yet built")
+    knobs = [over] if over else knobs_of(found)
+    if not knobs:
+        raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
+    from .export.cost import write
+
+    target, answer = out if out is not None else Path("out") / f"{found.path.stem}-cost", {}
+    for knob in knobs:
+        runs = curve(found, knob, None if quiet else say)
+        names = [name for name in MAIN if name in turned_by(runs)]
+        best = cheapest(runs, found.accuracy.tolerance)
+        table, picture = write(target, knob, runs, found.accuracy.tolerance, names)
+        answer[knob] = {"runs": [{"label": one.label, "value": one.value, "seconds": one.seconds, "values": one.values,
+                                  "errors": one.errors} for one in runs], "cheapest": best}
+        if not json_:
+            _print_cost(knob, runs, names, best, found.accuracy.tolerance)
+            print(f"results: {table} {picture}")
+    if json_:
+        print(json.dumps(answer))
+
+
+MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak",
+        "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
+
+
+def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float) -> None:
+    print(f"{knob:<16} {'seconds':>9}  " + "  ".join(f"{name[:16]:>16}" for name in names) + "   (relative errors)")
+    for one in runs:
+        cells = (one.errors.get(name) for name in names)
+        text = (f"{error / abs(one.values[name]):16.1e}" if error is not None and one.values[name] else f"{'-':>16}"
+                for name, error in zip(names, cells))
+        print(f"{one.label:<16} {one.seconds:9.3f}  " + "  ".join(text))
+    for name in names:
+        print(f"  {name}: {'no run' if best[name] is None else best[name]} is the quickest within {tolerance:g}")
 
 
 @app.command
