@@ -5,7 +5,7 @@ S = K_ss - K_si K_ii^-1 K_is, so one sparse factorisation gives the compliance S
 after it. The inside is ordered by nested dissection.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -23,31 +23,58 @@ RESIDUAL = 1e-8  # of a solve with random loads, relative
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Substructure:
-    """Assembled piece. mesh: as mesh.anymesh.PieceMesh; order: (n,) free nodes as eliminated, interface last by x;
-    matrix: stiffness per unit width in that order, two unknowns per node (along x, inward); factor: of the matrix."""
+    """One piece, assembled and factorised when first needed: a piece whose compliance is kept on disk never is.
+
+    mesh: as mesh.anymesh.PieceMesh; name: of the factors, see `factor.factorise`; made: what has been assembled.
+    """
 
     mesh: object
     layers: Layers
-    order: np.ndarray
-    matrix: csc_matrix
-    factor: object
+    name: str | None = None
+    made: dict = field(default_factory=dict)
+
+    @property
+    def order(self) -> np.ndarray:
+        """(n,) free nodes as eliminated, interface last by x."""
+        return self._part("order")
+
+    @property
+    def matrix(self) -> csc_matrix:
+        """Stiffness per unit width in that order, two unknowns per node (along x, inward)."""
+        return self._part("matrix")
+
+    @property
+    def factor(self):
+        """Factors of the matrix."""
+        return self._part("factor")
+
+    def _part(self, name: str):
+        if not self.made:
+            self.made.update(zip(("order", "matrix", "factor"), _assembled(self.mesh, self.layers, self.name)))
+        return self.made[name]
 
 
 def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
-    """Stiffness per unit width [N/m per m] of one piece held at its far face, and its factors.
+    """Stiffness per unit width [N/m per m] of one piece held at its far face, and its factors, at once.
 
     mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
     factor: name of the factors, see `factor.factorise`. NotConverged when they do not solve the system.
     """
+    piece = Substructure(mesh, layers, factor)
+    _ = piece.factor
+    return piece
+
+
+def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
     order, firsts = elimination(mesh)
     matrix = _stiffness(mesh, layers, order)
     with threadpool_limits(1, "blas"):
-        found = factorise(matrix, firsts, factor)
+        found = factorise(matrix, firsts, name)
         load = np.random.default_rng(0).normal(size=(matrix.shape[0], 1))
         miss = np.abs(matrix @ found.solve(load) - load).max() / np.abs(load).max()
     if not miss <= RESIDUAL:
         raise NotConverged(f"the stiffness of the piece is solved to {miss:.1e} only, wanted {RESIDUAL:.0e}")
-    return Substructure(mesh, layers, order, matrix, found)
+    return order, matrix, found
 
 
 def elimination(mesh) -> tuple:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import halved
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_pieces, write_mesh
+from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
 
 GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
@@ -159,6 +160,31 @@ def test_exact_a_written_grid_is_read_as_any_mesh(name, tmp_path):
     pair = read_pieces(tmp_path / name)
     assert np.array_equal(pair.lower.points, pair.upper.points)
     assert pair.lower.is_coating.sum() == GRID.cell_is_coating().sum()
+
+
+@pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_any_pair_is_written_and_read_back_bit_by_bit(kind, name, tmp_path):
+    m = drawn(kind)
+    m.points[m.points[:, 1] > 0] *= [1.0, 1.7]  # unlike pieces
+    pair = stored(m, tmp_path)
+    write_mesh(pair.lower, tmp_path / name, pair.upper)
+    back = read_pieces(tmp_path / name)
+    for mine, theirs in ((back.lower, pair.lower), (back.upper, pair.upper)):
+        for part in ("points", "triangles", "quads", "is_coating", "interface", "far"):
+            assert np.array_equal(getattr(mine, part), getattr(theirs, part)), part
+
+
+def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
+    other = graded_grid(2e-3, 3e-3, 2.5e-4)
+    write_mesh(GRID, tmp_path / "pair.msh", other)
+    back = read_pieces(tmp_path / "pair.msh")
+    for piece, grid in ((back.lower, GRID), (back.upper, other)):
+        assert np.array_equal(piece.x, grid.x) and piece.height == grid.height
+        assert piece.coating == pytest.approx(grid.coating, rel=1e-12)
+        assert np.array_equal(np.sort(piece.quads, axis=1)[np.argsort(piece.is_coating, kind="stable")],
+                              np.sort(as_piece(grid).quads, axis=1)[np.argsort(grid.cell_is_coating().ravel(),
+                                                                               kind="stable")])
 
 
 @settings(max_examples=30, deadline=None)
