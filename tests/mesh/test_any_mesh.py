@@ -162,6 +162,18 @@ def test_exact_a_written_grid_is_read_as_any_mesh(name, tmp_path):
     assert pair.lower.is_coating.sum() == GRID.cell_is_coating().sum()
 
 
+def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
+    m = drawn("mixed")
+    lift = np.maximum(np.abs(m.points[:, 0]) - 0.5e-3, 0) ** 2 / 0.02
+    m.points[:, 1] += np.where(np.arange(len(lift)) < len(lift) // 2, -1, 1) * lift
+    pair = stored(m, tmp_path)
+    for piece in (pair.lower, pair.upper):
+        assert piece.rise == pytest.approx(np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15)
+        assert np.array_equal(halved(piece).rise[::2], piece.rise)
+        assert halved(piece).rise[1::2] == pytest.approx((piece.rise[1:] + piece.rise[:-1]) / 2, abs=1e-18)
+    assert np.all(stored(drawn("mixed"), tmp_path).lower.rise == 0)
+
+
 @pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_any_pair_is_written_and_read_back_bit_by_bit(kind, name, tmp_path):
@@ -244,6 +256,12 @@ def interface_node(m, side="upper", k=3):
     return nodes[np.argsort(m.points[nodes, 0])][k]
 
 
+def bend(m):
+    """Both ends of the upper interface chamfered by a slope of 0.2."""
+    upper = m.points[len(m.points) // 2:]
+    upper[:, 1] += 0.2 * np.maximum(np.abs(upper[:, 0]) - 0.75e-3, 0)
+
+
 def double(m, node, cell):
     """A second node at the same place, used by one cell only."""
     m.points = np.append(m.points, m.points[node:node + 1], axis=0)
@@ -300,6 +318,7 @@ SPOILT = {
     "loose coating": (loosen, "9 pairs of nodes of the upper piece lie on one another"),
     "hanging node": (hang, "do not meet edge to edge: a node hangs"),
     "shared nodes": (share, "the two pieces share 9 nodes"),
+    "steep edge": (bend, "rounded away by a slope up to 0.1: the node"),
     "across": (lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]), "piece reaches 0.001 m across y = 0"),
     "no far face": (lambda m: drop_edge(m, "upper_far"), r"nothing is tagged upper_far \("),
     "no interface": (lambda m: drop_edge(m, "lower_interface"), r"nothing is tagged lower_interface \("),
