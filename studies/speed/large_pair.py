@@ -1,6 +1,16 @@
 """How long does an unstructured pair of 1e6 unknowns take, and which factors are the fastest?
 
-TABLE
+About 10 s of one processor and 1.8 GB with the package's own fronts, which need no library beside SciPy: as fast as
+CHOLMOD or Pardiso, so they are the default and the others serve to check them. Two unlike pieces of triangles,
+1 005 708 unknowns, 401 interface nodes, graded towards the interface; both factors kept; a process of its own, one
+thread, AMD EPYC 2.6 GHz, a busy machine. Seconds of the processor for order, stiffness and factors | both compliances |
+contact under a tilt, and the largest memory:
+
+    fronts    10.0 | 0.03 | 0.02   1.8 GB      cholmod    9.2 | 0.9 | 0.02   2.5 GB
+    pardiso   11.2 | 0.04 | 0.02   1.7 GB      superlu   12.8 | 5.2 | 0.02   5.3 GB
+
+The peak pressure of the four agrees to 3e-11. Of the 5 s of a piece the stiffness takes 2, the order 1, the factors 2.
+
 Run: python studies/speed/large_pair.py [fronts superlu cholmod pardiso]
 """
 
