@@ -35,7 +35,7 @@ def dissection(points, pairs) -> tuple:
         pairs = pairs[(of[pairs[:, 0]] == of[pairs[:, 1]]) & (of[pairs[:, 0]] >= 0)]
         side = _sides(rising, pairs, of)
         key[nodes] += side[nodes]
-        cut = _least_cover(pairs[side[pairs[:, 0]] != side[pairs[:, 1]]], side)
+        cut = least_cover(pairs[side[pairs[:, 0]] != side[pairs[:, 1]]], side)
         key[cut] += 2 - side[cut]
         nodes = np.setdiff1d(nodes, cut, assume_unique=True)
     return _in_sequence(points, key)
@@ -56,8 +56,11 @@ def _sides(rising, pairs, of) -> np.ndarray:
     return np.where((severed[1] < severed[0])[of], sides[1], sides[0])
 
 
-def _least_cover(pairs, side) -> np.ndarray:
-    """The fewest nodes that touch every pair between the halves: Koenig's theorem from a largest matching."""
+def least_cover(pairs, side) -> np.ndarray:
+    """The fewest nodes that touch every one of the pairs (e, 2) between nodes of side 0 and of side 1.
+
+    Koenig's theorem: what alternating paths from the unmatched nodes do not reach on one side, and do on the other.
+    """
     if not len(pairs):
         return np.empty(0, np.int64)
     swap = side[pairs[:, 0]] == 1

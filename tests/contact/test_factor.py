@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import COATED, COATING
-from scipy.sparse import csc_matrix
+from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
 from test_substructure import of_grid
 
 from patchfem.contact import factor, fronts
-from patchfem.contact.dissect import LEAF, dissection
+from patchfem.contact.dissect import LEAF, dissection, least_cover
 from patchfem.contact.factor import BACKENDS, factorise
 from patchfem.contact.substructure import assemble, condense
 from patchfem.core import Missing, NotConverged, PatchfemError
@@ -89,24 +90,30 @@ def test_refuses_an_unknown_name_and_a_library_that_is_not_there(monkeypatch, ca
 
 @settings(max_examples=25, deadline=None)
 @given(count=st.integers(4, 900), seed=st.integers(0, 99))
-def test_always_a_dissection_is_an_order_whose_parts_meet_only_in_later_cuts(count, seed):
+def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves(count, seed):
     points, pairs = scattered(count, seed)
     order, firsts = dissection(points, pairs)
     assert np.array_equal(np.sort(order), np.arange(count))
     assert firsts[0] == 0 and firsts[-1] == count and np.all(np.diff(firsts) > 0)
-    place = np.empty(count, np.int64)
-    place[order] = np.arange(count)
-    front = np.searchsorted(firsts, place[pairs], side="right") - 1
-    low, high = front.min(axis=1), front.max(axis=1)
-    if count > LEAF:
-        assert firsts.size > 3
-    # fronts that touch lie on one branch of the tree: the reach of the lower one grows along its fathers only
-    touched = {f: set(high[(low == f) & (high > f)].tolist()) for f in range(firsts.size - 1)}
-    for f in range(firsts.size - 1):
-        if touched[f]:
-            father = min(touched[f])
-            touched[father] |= touched[f] - {father}
-    assert sum(not fathers for fathers in touched.values()) == 1  # one root: the graph is connected
+    if count <= LEAF:
+        return
+    cut = order[firsts[-2]:]
+    left = ~np.isin(pairs, cut).any(axis=1)
+    graph = coo_matrix((np.ones(left.sum()), pairs[left].T), shape=(count, count))
+    label = connected_components(graph, False)[1]
+    assert np.bincount(np.delete(label, cut)).max() <= count / 2 + 1  # the last cut parts the halves
+    assert cut.size <= 3 * np.sqrt(count)
+
+
+@settings(max_examples=100, deadline=None)
+@given(pairs=st.sets(st.tuples(st.integers(0, 4), st.integers(5, 9)), max_size=12))
+def test_exact_the_least_cover_is_that_of_trying_all(pairs):
+    pairs = np.array(sorted(pairs), np.int64).reshape(-1, 2)
+    found = least_cover(pairs[:, ::-1], (np.arange(10) > 4).astype(np.int64))
+    assert np.isin(pairs, found).any(axis=1).all() and np.unique(found).size == found.size
+    sizes = [bin(mask).count("1") for mask in range(1024)
+             if all(mask >> a & 1 or mask >> b & 1 for a, b in pairs.tolist())]
+    assert found.size == min(sizes)
 
 
 def test_order_cuts_of_a_square_grid_hold_the_fewest_nodes_and_the_factors_grow_as_n_log_n():
