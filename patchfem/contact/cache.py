@@ -1,7 +1,7 @@
 """Condensed interface operators kept on disk, found again by the content that made them.
 
-The key is a hash of columns, rows, layers and of the source text that assembles and condenses, so neither a changed
-piece nor a changed program ever meets an old operator. Files are written whole and renamed; the folder is kept below a
+The key is a hash of the mesh, the layers and the source text that assembles and condenses, so neither a changed piece
+nor a changed program ever meets an old operator. Files are written whole and renamed; the folder is kept below a
 size; a file that cannot be read is made again.
 """
 
@@ -25,14 +25,31 @@ def folder() -> Path:
     return Path(base) / "patchfem" / "operators"
 
 
+GRID_SOURCE = ("elasticity.py", "stiffness.py", "condense.py")
+MESH_SOURCE = ("elasticity.py", "stiffness.py", "dissect.py", "factor.py", "fronts.py", "substructure.py")
+
+
 def key_of(x, depth, coating_rows: int, layers) -> str:
     """Content hash of one piece: x (nx,), depth (ny,) [m], rows of coating, its Layers."""
+    return _hash((np.asarray(x, np.float64), np.asarray(depth, np.float64)), (int(coating_rows),), layers, GRID_SOURCE)
+
+
+def key_of_mesh(mesh, layers) -> str:
+    """Content hash of one piece of any mesh (mesh.anymesh.PieceMesh): points, cells, tags, its Layers, and the factors
+    named for this run. Renumbered nodes make another key."""
+    arrays = (np.asarray(mesh.points, np.float64), *(np.asarray(part, np.int64) for part in (
+        mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)))
+    return _hash(arrays, ("mesh", os.environ.get("PATCHFEM_FACTOR", "")), layers, MESH_SOURCE)
+
+
+def _hash(arrays, words: tuple, layers, source: tuple) -> str:
     digest = hashlib.sha256()
-    for array in (x, depth):
-        digest.update(np.ascontiguousarray(array, np.float64).tobytes())
-    digest.update(repr((int(coating_rows), layers.coating, layers.substrate, layers.plane)).encode())
+    for array in arrays:
+        digest.update(repr(array.shape).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(repr((words, layers.coating, layers.substrate, layers.plane)).encode())
     here = Path(__file__).parent
-    for name in ("elasticity.py", "condense.py"):
+    for name in source:
         digest.update((here / name).read_bytes())
     return digest.hexdigest()[:32]
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad
-from skfem.helpers import ddot, sym_grad, trace
+from skfem import Basis, ElementQuad1, MeshQuad
 
 from ..core import frozen_array
+from .stiffness import stiffness
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -50,25 +50,17 @@ def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
     mesh = MeshQuad.init_tensor(np.asarray(x), np.asarray(depth))
     middle = mesh.p[:, mesh.t].mean(axis=1)[1]
     coat = middle < depth[coating_rows] if coating_rows else np.zeros(mesh.t.shape[1], bool)
-    soft = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[coat.astype(int)]
-
-    @BilinearForm
-    def energy(u, v, w):
-        return w.lam * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * w.mu * ddot(sym_grad(u), sym_grad(v))
-
-    basis = Basis(mesh, ElementVector(ElementQuad1()), intorder=2)
-    points = basis.X.shape[-1]
-    lam, mu = (np.repeat(soft[:, k:k + 1], points, axis=1) for k in (0, 1))
-    stiff = energy.assemble(basis, lam=lam, mu=mu).tocsr()
-    # scikit-fem numbers vertices its own way; ours is column by column
-    place = np.searchsorted(x, mesh.p[0] - 1e-12 * np.ptp(x)) * ny + \
-        np.searchsorted(depth, mesh.p[1] - 1e-12 * depth[-1])
-    order = np.empty((nx * ny, 2), dtype=np.int64)
-    order[place] = basis.nodal_dofs.T
-    free = order.reshape(nx, ny, 2)[:, :-1].ravel()
-    cells = _counter_clockwise(place[mesh.t].T, ny)
+    lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[coat.astype(int)].T
+    basis = Basis(mesh, ElementQuad1(), intorder=2)
+    # scikit-fem numbers vertices its own way; ours is column by column, without the far face
+    column = np.searchsorted(x, mesh.p[0] - 1e-12 * np.ptp(x))
+    row = np.searchsorted(depth, mesh.p[1] - 1e-12 * depth[-1])
+    place = np.empty(nx * ny, dtype=np.int64)
+    place[basis.nodal_dofs[0]] = np.where(row < ny - 1, column * (ny - 1) + row, -1)
+    matrix = stiffness([(basis, lam, mu, place)], nx * (ny - 1))
+    cells = _counter_clockwise((column * ny + row)[mesh.t].T, ny)
     column_by_column = np.argsort(cells[:, 0])
-    return Piece(x, depth, stiff[free][:, free].tocsr(), cells[column_by_column], coat[column_by_column], layers)
+    return Piece(x, depth, matrix, cells[column_by_column], coat[column_by_column], layers)
 
 
 def _counter_clockwise(cells, ny: int) -> np.ndarray:

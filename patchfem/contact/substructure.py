@@ -1,129 +1,113 @@
 """One piece of any mesh condensed to its interface: assembled by scikit-fem, factorised once with the interface last.
 
-With the unknowns split into inside i and interface s and K = L U, the trailing blocks of the factors are the Schur
-complement S = K_ss - K_si K_ii^-1 K_is = L_ss U_ss, so one sparse factorisation gives the compliance S^-1 and serves
-every displacement field after it. The inside is ordered by nested dissection of its coordinates.
+With the unknowns split into inside i and interface s, eliminating the inside leaves the Schur complement
+S = K_ss - K_si K_ii^-1 K_is, so one sparse factorisation gives the compliance S^-1 and serves every displacement field
+after it. The inside is ordered by nested dissection.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg.lapack import dtrtri
-from scipy.sparse import coo_matrix, csc_matrix
-from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
-from skfem.helpers import ddot, sym_grad, trace
+from scipy.sparse import csc_matrix
+from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri
 from threadpoolctl import threadpool_limits
 
 from ..core import NotConverged, frozen_array
+from .dissect import dissection
 from .elasticity import Layers, hooke, lame
+from .factor import factorise
+from .stiffness import stiffness
 
-LEAF = 24  # nodes below which a part is not cut any further
 RESIDUAL = 1e-8  # of a solve with random loads, relative
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Substructure:
-    """Assembled piece. mesh: as mesh.anymesh.PieceMesh; order: (n,) free nodes as eliminated, interface last by x;
-    matrix: stiffness per unit width in that order, two unknowns per node (along x, inward); factor: of the matrix."""
+    """One piece, assembled and factorised when first needed: a piece whose compliance is kept on disk never is.
+
+    mesh: as mesh.anymesh.PieceMesh; name: of the factors, see `factor.factorise`; made: what has been assembled.
+    """
 
     mesh: object
     layers: Layers
-    order: np.ndarray
-    matrix: csc_matrix
-    factor: object
+    name: str | None = None
+    made: dict = field(default_factory=dict)
+
+    @property
+    def order(self) -> np.ndarray:
+        """(n,) free nodes as eliminated, interface last by x."""
+        return self._part("order")
+
+    @property
+    def matrix(self) -> csc_matrix:
+        """Stiffness per unit width in that order, two unknowns per node (along x, inward)."""
+        return self._part("matrix")
+
+    @property
+    def factor(self):
+        """Factors of the matrix."""
+        return self._part("factor")
+
+    def _part(self, name: str):
+        if not self.made:
+            self.made.update(zip(("order", "matrix", "factor"), _assembled(self.mesh, self.layers, self.name)))
+        return self.made[name]
 
 
-def assemble(mesh, layers: Layers) -> Substructure:
-    """Stiffness per unit width [N/m per m] of one piece held at its far face, and its factors.
+def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
+    """Stiffness per unit width [N/m per m] of one piece held at its far face, and its factors, at once.
 
     mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
-    NotConverged when the factors do not solve the system.
+    factor: name of the factors, see `factor.factorise`. NotConverged when they do not solve the system.
     """
-    order = np.concatenate([dissected(mesh), mesh.interface])
-    unknowns = (2 * order[:, None] + [0, 1]).ravel()
-    matrix = _stiffness(mesh, layers)[unknowns][:, unknowns].tocsc()
+    piece = Substructure(mesh, layers, factor)
+    _ = piece.factor
+    return piece
+
+
+def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
+    order, firsts = elimination(mesh)
+    matrix = _stiffness(mesh, layers, order)
     with threadpool_limits(1, "blas"):
-        try:
-            factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        except RuntimeError as error:
-            raise NotConverged(f"the stiffness of the piece cannot be factorised ({error})") from None
-    load = np.random.default_rng(0).normal(size=matrix.shape[0])
-    miss = np.abs(matrix @ factor.solve(load) - load).max() / np.abs(load).max()
+        found = factorise(matrix, firsts, name)
+        load = np.random.default_rng(0).normal(size=(matrix.shape[0], 1))
+        miss = np.abs(matrix @ found.solve(load) - load).max() / np.abs(load).max()
     if not miss <= RESIDUAL:
         raise NotConverged(f"the stiffness of the piece is solved to {miss:.1e} only, wanted {RESIDUAL:.0e}")
-    return Substructure(mesh, layers, order, matrix, factor)
+    return order, matrix, found
 
 
-def _stiffness(mesh, layers: Layers):
+def elimination(mesh) -> tuple:
+    """((n,) free nodes in the order of elimination, interface last by x; (f + 1,) where each front begins in it)."""
+    inside = np.ones(len(mesh.points), bool)
+    inside[mesh.interface] = inside[mesh.far] = False
+    nodes, new = np.flatnonzero(inside), np.cumsum(inside) - 1
+    pairs = [cells[:, [i, j]] for cells in (mesh.triangles, mesh.quads) for i in range(cells.shape[1])
+             for j in range(i)]
+    pairs = np.concatenate([new[pair[inside[pair].all(axis=1)]] for pair in pairs])
+    order, firsts = dissection(mesh.points[nodes], pairs)
+    return np.concatenate([nodes[order], mesh.interface]), np.append(firsts, nodes.size + mesh.interface.size)
+
+
+def _stiffness(mesh, layers: Layers, order) -> csc_matrix:
     pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
-
-    @BilinearForm
-    def energy(u, v, w):
-        return w.lam * trace(sym_grad(u)) * trace(sym_grad(v)) + 2 * w.mu * ddot(sym_grad(u), sym_grad(v))
-
-    size, total, first = 2 * len(mesh.points), None, 0
-    for cells, shape, element, order in ((mesh.triangles, MeshTri, ElementTriP1, 1),
-                                         (mesh.quads, MeshQuad, ElementQuad1, 2)):
-        coat = mesh.is_coating[first:first + len(cells)]
+    number = np.full(len(mesh.points), -1)
+    number[order] = np.arange(order.size)
+    parts, first = [], 0
+    for cells, shape, element, degree in ((mesh.triangles, MeshTri, ElementTriP1, 1),
+                                          (mesh.quads, MeshQuad, ElementQuad1, 2)):
+        lam, mu = pairs[mesh.is_coating[first:first + len(cells)].astype(int)].T
         first += len(cells)
         if not len(cells):
             continue
         used, own = np.unique(cells, return_inverse=True)
         part = shape(np.ascontiguousarray(mesh.points[used].T), np.ascontiguousarray(own.reshape(cells.shape).T))
-        basis = Basis(part, ElementVector(element()), intorder=order)
-        lam, mu = (np.repeat(pairs[coat.astype(int), k][:, None], basis.X.shape[-1], axis=1) for k in (0, 1))
-        stiff = energy.assemble(basis, lam=lam, mu=mu).tocoo()
-        place = np.empty(2 * used.size, np.int64)
-        place[basis.nodal_dofs] = 2 * used + np.array([[0], [1]])
-        stiff = coo_matrix((stiff.data, (place[stiff.row], place[stiff.col])), shape=(size, size)).tocsr()
-        total = stiff if total is None else total + stiff
-    return total
-
-
-def dissected(mesh) -> np.ndarray:
-    """Free nodes off the interface in the order of elimination: both halves of a part, then the cut between them.
-
-    A part is halved at the median of its longer side; the nodes of one half that touch the other are the cut. All
-    parts of a level are cut at once, so the cost is a sort per level: 0.3 s for 1e5 nodes.
-    """
-    count = len(mesh.points)
-    inside = np.ones(count, bool)
-    inside[mesh.interface] = inside[mesh.far] = False
-    pairs = np.concatenate([cells[:, [i, j]] for cells in (mesh.triangles, mesh.quads)
-                            for i in range(cells.shape[1]) for j in range(i)])
-    pairs = pairs[inside[pairs].all(axis=1)]
-    key = np.zeros(count, np.int64)  # digits of base 3: 0 and 1 the halves, 2 the cut
-    active = inside.copy()
-    while active.any():
-        nodes = np.flatnonzero(active)
-        _, part, sizes = np.unique(key[nodes], return_inverse=True, return_counts=True)
-        key *= 3
-        side = np.zeros(count, np.int64)
-        side[nodes] = _halves(mesh.points[nodes], part, sizes)
-        big = np.zeros(count, bool)
-        big[nodes] = sizes[part] > LEAF
-        pairs = pairs[big[pairs].all(axis=1) & (key[pairs[:, 0]] == key[pairs[:, 1]])]
-        apart = pairs[side[pairs[:, 0]] != side[pairs[:, 1]]]
-        cut = np.where(side[apart[:, 0]] == 0, apart[:, 0], apart[:, 1])
-        key[big] += side[big]
-        active = big
-        key[cut] += 2
-        active[cut] = False
-    inside = np.flatnonzero(inside)
-    return inside[np.lexsort((mesh.points[inside, 0], mesh.points[inside, 1], key[inside]))]
-
-
-def _halves(points, part, sizes) -> np.ndarray:
-    """0 or 1 for every point: the half of its part, cut at the median of the part's longer side."""
-    order = np.argsort(part, kind="stable")
-    starts = np.cumsum(sizes) - sizes
-    extent = np.maximum.reduceat(points[order], starts) - np.minimum.reduceat(points[order], starts)
-    along = np.where(extent[part, 0] >= extent[part, 1], points[:, 0], points[:, 1])
-    order = np.lexsort((along, part))
-    rank = np.empty(len(part), np.int64)
-    rank[order] = np.arange(len(part)) - np.repeat(starts, sizes)
-    return (rank >= sizes[part] // 2).astype(np.int64)
+        basis = Basis(part, element(), intorder=degree)
+        place = np.empty(used.size, np.int64)
+        place[basis.nodal_dofs[0]] = number[used]
+        parts.append((basis, lam, mu, place))
+    rows = stiffness(parts, order.size)
+    return csc_matrix((rows.data, rows.indices, rows.indptr), shape=rows.shape)  # symmetric: its rows are its columns
 
 
 def condense(piece: Substructure) -> tuple:
@@ -131,18 +115,8 @@ def condense(piece: Substructure) -> tuple:
 
     nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x.
     """
-    m = 2 * len(piece.mesh.interface)
-    size = piece.matrix.shape[0]
-    if np.array_equal(piece.factor.perm_c[-m:], np.arange(size - m, size)) and \
-            np.array_equal(piece.factor.perm_r, piece.factor.perm_c):
-        low = piece.factor.L[size - m:, size - m:].toarray()
-        pivots = piece.factor.U.diagonal()[size - m:]
-        inverse, _ = dtrtri(low, lower=1, unitdiag=1)
-        both = inverse.T @ (inverse / pivots[:, None])
-    else:
-        unit = np.zeros((size, m))
-        unit[size - m:] = np.eye(m)
-        both = piece.factor.solve(unit)[size - m:]
+    with threadpool_limits(1, "blas"):
+        both = piece.factor.compliance()
     both = (both + both.T) / 2
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))
 

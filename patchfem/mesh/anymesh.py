@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from ..core import PatchfemError, frozen_array
 
 CLOSE = 1e-9  # lengths below this share of the interface are nothing
+STEEP = 0.1  # slope of a rounded edge from which normal and vertical differ by half a percent
 CELLS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
 EDGES = ("upper_interface", "lower_interface", "upper_far", "lower_far")
 
@@ -46,6 +47,11 @@ class PieceMesh:
     def x(self) -> np.ndarray:
         """(m,) places of the interface nodes [m]."""
         return self.points[self.interface, 0]
+
+    @property
+    def rise(self) -> np.ndarray:
+        """(m,) distance of the interface nodes from y = 0 [m], >= 0: what rounded edges add to the gap."""
+        return self.points[self.interface, 1]
 
     @property
     def length(self) -> float:
@@ -183,24 +189,31 @@ def _upright(points, cells, where) -> np.ndarray:
 
 
 def _interface(points, nodes, side: str, where) -> np.ndarray:
-    """The interface nodes by rising x; PatchfemError unless they lie on y = 0, apart, and nothing lies beyond."""
+    """The interface nodes by rising x; PatchfemError unless they lie on y = 0 or fall off it gently, apart, and
+    nothing lies beyond y = 0."""
     name = f"{side}_interface"
     if nodes.size < 3:
         raise PatchfemError(f"{where}: {name} holds {nodes.size} nodes; three or more are needed")
     nodes = nodes[np.argsort(points[nodes, 0], kind="stable")]
     x, y = points[nodes].T
     close = CLOSE * np.ptp(x)
-    off = int(np.argmax(np.abs(y)))
-    if not abs(y[off]) <= close or close == 0:
-        raise PatchfemError(f"{where}: {name} is not the straight line y = 0: a node at x = {x[off]:.6g} m lies "
-                            f"{abs(y[off]):.6g} m off it; shapes belong into the gap ([contact.crown], [contact.tilt])")
     twin = int(np.argmin(np.diff(x)))
-    if x[twin + 1] - x[twin] <= close:
+    if x[twin + 1] - x[twin] <= close and np.ptp(x) > 0:
         raise PatchfemError(f"{where}: {name} has two nodes at x = {x[twin]:.6g} m; merge them")
+    flat = np.abs(y) <= close
+    slope = np.diff(y) / np.maximum(np.diff(x), 1e-300)
+    hollow = np.append(False, np.diff(slope) < -1e-6 - 4 * close / max(np.diff(x).min(), close))
+    wrong = (np.abs(slope) > STEEP) | hollow
+    if wrong.any() or not flat.any():
+        off = int(np.argmax(np.abs(y))) if not flat.any() else int(np.argmax(wrong))
+        raise PatchfemError(f"{where}: {name} is not the straight line y = 0, with edges rounded away by a slope up to "
+                            f"{STEEP:g}: the node at x = {x[off]:.6g} m lies {abs(y[off]):.6g} m off it; shapes belong "
+                            "into the gap ([contact.crown], [contact.tilt])")
     if points[:, 1].min() < -close:
         raise PatchfemError(f"{where}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
                             "piece lies at y <= 0, the upper one at y >= 0")
-    points[nodes, 1] = 0.0
+    if flat.all():
+        points[nodes, 1] = 0.0
     np.maximum(points[:, 1], 0.0, out=points[:, 1])
     return nodes
 

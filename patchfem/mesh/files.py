@@ -14,6 +14,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 from .anymesh import PairMesh, Tagged, pieces
 from .decks import read_inp, read_unv
+from .pairs import blocks
 from .tensor import TensorGrid
 
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
@@ -25,28 +26,19 @@ def pair_mesh(grid: TensorGrid) -> dict:
 
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
     """
-    nx, ny = grid.x.size, grid.depth.size
-    lower = np.stack([np.repeat(grid.x, ny), -np.tile(grid.depth, nx)], axis=1)
-    upper = lower * [1.0, -1.0]
-    node = np.arange(nx * ny).reshape(nx, ny)
-    a, b, c, d = (part.ravel() for part in (node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]))
-    quads_lower = np.stack([a, b, c, d], axis=1)  # counter-clockwise at y <= 0
-    quads_upper = np.stack([a, d, c, b], axis=1) + nx * ny
-    coat = grid.cell_is_coating().ravel()
-    tags = np.concatenate([np.where(coat, CELL_TAGS["lower_coating"], CELL_TAGS["lower_substrate"]),
-                           np.where(coat, CELL_TAGS["upper_coating"], CELL_TAGS["upper_substrate"])])
-    edges, edge_tags = [], []
-    for name, row, shift in (("lower_interface", 0, 0), ("lower_far", -1, 0),
-                             ("upper_interface", 0, nx * ny), ("upper_far", -1, nx * ny)):
-        edges.append(np.stack([node[:-1, row], node[1:, row]], axis=1) + shift)
-        edge_tags.append(np.full(nx - 1, EDGE_TAGS[name]))
-    return {"points": np.concatenate([lower, upper]), "quads": np.concatenate([quads_lower, quads_upper]),
-            "tags": tags, "edges": np.concatenate(edges), "edge_tags": np.concatenate(edge_tags)}
+    points, ((_, quads, names), (_, edges, ends)) = blocks(grid, grid)
+    return {"points": points, "quads": quads, "tags": _codes(names), "edges": edges, "edge_tags": _codes(ends)}
 
 
-def write_mesh(grid: TensorGrid, path: Path) -> None:
+def _codes(names) -> np.ndarray:
+    numbers = CELL_TAGS | EDGE_TAGS
+    return np.array([numbers[name] for name in names.tolist()], np.int32)
+
+
+def write_mesh(lower, path: Path, upper=None) -> None:
     """Write the pair as a tagged mesh; the ending of `path` picks the format (.msh, .vtu).
 
+    lower, upper: TensorGrid or PieceMesh each, upper None where it is alike. `read_pieces` gives the same pieces again.
     PatchfemError for an ending that cannot carry the tags, Missing when the folder cannot be written.
     """
     import meshio
@@ -54,17 +46,16 @@ def write_mesh(grid: TensorGrid, path: Path) -> None:
     path = Path(path)
     if path.suffix not in (".msh", ".vtu"):
         raise PatchfemError(f"{path}: a mesh is written as .msh or .vtu")
-    pair = pair_mesh(grid)
-    points = np.column_stack([pair["points"], np.zeros(len(pair["points"]))])
-    mesh = meshio.Mesh(points, [("quad", pair["quads"]), ("line", pair["edges"])])
+    points, found = blocks(lower, lower if upper is None else upper)
+    tags = [_codes(names) for _, _, names in found]
+    mesh = meshio.Mesh(np.column_stack([points, np.zeros(len(points))]), [(kind, cells) for kind, cells, _ in found])
     if path.suffix == ".msh":
-        both = [pair["tags"].astype(np.int32), pair["edge_tags"].astype(np.int32)]
-        mesh.cell_data = {"gmsh:physical": both, "gmsh:geometrical": both}
+        mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
         mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
         mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
         kind = {"file_format": "gmsh22", "binary": True}
     else:
-        mesh.cell_data = {"tag": [pair["tags"], pair["edge_tags"]]}
+        mesh.cell_data = {"tag": tags}
         kind = {"file_format": "vtu"}
     try:
         meshio.write(path, mesh, **kind)

@@ -1,12 +1,14 @@
 """Operators on disk: the same bits back, never for another piece, and damage is mended."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from patchfem.contact import cache
 from patchfem.contact.elasticity import Layers
+from patchfem.mesh.anymesh import PieceMesh
 
 LAYERS = Layers((250e9, 0.24), (121e9, 0.32), "strain")
 X, DEPTH = np.linspace(-1, 1, 7), np.linspace(0, 1, 4)
@@ -33,6 +35,32 @@ def test_always_another_piece_has_another_key():
             cache.key_of(X, DEPTH, 1, Layers((250e9, 0.25), (121e9, 0.32), "strain")),
             cache.key_of(X, DEPTH, 1, Layers((250e9, 0.24), (121e9, 0.32), "stress"))}
     assert len(keys) == 6
+
+
+def test_always_another_mesh_has_another_key(monkeypatch):
+    points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], float)
+    mesh = PieceMesh(points, np.array([[0, 1, 4], [0, 4, 3]]), np.array([[1, 2, 5, 4]]),
+                     np.array([True, False, False]), np.array([0, 1, 2]), np.array([3, 4, 5]))
+    other = [replace(mesh, points=points + 1e-15), replace(mesh, triangles=mesh.triangles[::-1]),
+             replace(mesh, quads=np.roll(mesh.quads, 1)), replace(mesh, is_coating=~mesh.is_coating),
+             replace(mesh, interface=np.array([0, 1])), replace(mesh, far=np.array([3, 5]))]
+    keys = {cache.key_of_mesh(one, LAYERS) for one in (mesh, *other)}
+    keys |= {cache.key_of_mesh(mesh, Layers((250e9, 0.25), (121e9, 0.32), "strain"))}
+    assert cache.key_of_mesh(replace(mesh), LAYERS) in keys and len(keys) == 8
+    monkeypatch.setenv("PATCHFEM_FACTOR", "superlu")
+    assert cache.key_of_mesh(mesh, LAYERS) not in keys
+
+
+def test_always_a_changed_source_text_has_another_key(tmp_path, monkeypatch):
+    here = cache.Path(cache.__file__).parent
+    for name in {*cache.GRID_SOURCE, *cache.MESH_SOURCE}:
+        (tmp_path / name).write_bytes((here / name).read_bytes())
+    monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
+    keys = {cache.key_of(X, DEPTH, 1, LAYERS)}
+    for name in cache.GRID_SOURCE:
+        (tmp_path / name).write_bytes(b"# changed")
+        keys.add(cache.key_of(X, DEPTH, 1, LAYERS))
+    assert len(keys) == 1 + len(cache.GRID_SOURCE)
 
 
 def test_refuses_damaged_and_foreign_files(place):

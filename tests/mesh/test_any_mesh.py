@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import halved
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_pieces, write_mesh
+from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
 
 GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
@@ -161,6 +162,43 @@ def test_exact_a_written_grid_is_read_as_any_mesh(name, tmp_path):
     assert pair.lower.is_coating.sum() == GRID.cell_is_coating().sum()
 
 
+def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
+    m = drawn("mixed")
+    lift = np.maximum(np.abs(m.points[:, 0]) - 0.5e-3, 0) ** 2 / 0.02
+    m.points[:, 1] += np.where(np.arange(len(lift)) < len(lift) // 2, -1, 1) * lift
+    pair = stored(m, tmp_path)
+    for piece in (pair.lower, pair.upper):
+        assert piece.rise == pytest.approx(np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15)
+        assert np.array_equal(halved(piece).rise[::2], piece.rise)
+        assert halved(piece).rise[1::2] == pytest.approx((piece.rise[1:] + piece.rise[:-1]) / 2, abs=1e-18)
+    assert np.all(stored(drawn("mixed"), tmp_path).lower.rise == 0)
+
+
+@pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_any_pair_is_written_and_read_back_bit_by_bit(kind, name, tmp_path):
+    m = drawn(kind)
+    m.points[m.points[:, 1] > 0] *= [1.0, 1.7]  # unlike pieces
+    pair = stored(m, tmp_path)
+    write_mesh(pair.lower, tmp_path / name, pair.upper)
+    back = read_pieces(tmp_path / name)
+    for mine, theirs in ((back.lower, pair.lower), (back.upper, pair.upper)):
+        for part in ("points", "triangles", "quads", "is_coating", "interface", "far"):
+            assert np.array_equal(getattr(mine, part), getattr(theirs, part)), part
+
+
+def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
+    other = graded_grid(2e-3, 3e-3, 2.5e-4)
+    write_mesh(GRID, tmp_path / "pair.msh", other)
+    back = read_pieces(tmp_path / "pair.msh")
+    for piece, grid in ((back.lower, GRID), (back.upper, other)):
+        assert np.array_equal(piece.x, grid.x) and piece.height == grid.height
+        assert piece.coating == pytest.approx(grid.coating, rel=1e-12)
+        assert np.array_equal(np.sort(piece.quads, axis=1)[np.argsort(piece.is_coating, kind="stable")],
+                              np.sort(as_piece(grid).quads, axis=1)[np.argsort(grid.cell_is_coating().ravel(),
+                                                                               kind="stable")])
+
+
 @settings(max_examples=30, deadline=None)
 @given(order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0), kind=st.sampled_from(KINDS))
 def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(order, shift, kind, tmp_path_factory):
@@ -216,6 +254,12 @@ def move(m, at, by):
 def interface_node(m, side="upper", k=3):
     nodes = np.unique(m.edges[m.edge_tags == EDGE_TAGS[f"{side}_interface"]])
     return nodes[np.argsort(m.points[nodes, 0])][k]
+
+
+def bend(m):
+    """Both ends of the upper interface chamfered by a slope of 0.2."""
+    upper = m.points[len(m.points) // 2:]
+    upper[:, 1] += 0.2 * np.maximum(np.abs(upper[:, 0]) - 0.75e-3, 0)
 
 
 def double(m, node, cell):
@@ -274,6 +318,7 @@ SPOILT = {
     "loose coating": (loosen, "9 pairs of nodes of the upper piece lie on one another"),
     "hanging node": (hang, "do not meet edge to edge: a node hangs"),
     "shared nodes": (share, "the two pieces share 9 nodes"),
+    "steep edge": (bend, "rounded away by a slope up to 0.1: the node"),
     "across": (lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]), "piece reaches 0.001 m across y = 0"),
     "no far face": (lambda m: drop_edge(m, "upper_far"), r"nothing is tagged upper_far \("),
     "no interface": (lambda m: drop_edge(m, "lower_interface"), r"nothing is tagged lower_interface \("),

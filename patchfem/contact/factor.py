@@ -1,0 +1,165 @@
+"""Factors of a piece's stiffness behind one small interface, by the package's own fronts or by another library.
+
+Every one has `solve(load (n, r)) -> (n, r)` and `compliance() -> (k, k)`, the last diagonal block of the inverse. The
+fronts are the default: they need nothing but LAPACK and are the fastest (studies/speed/large_pair.py); the others check
+them. PATCHFEM_FACTOR names one for a whole run; one that is missing or broken is replaced with a remark on stderr.
+"""
+
+import ctypes
+import os
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dpotri, dtrtri
+from scipy.sparse import csc_matrix, triu
+from scipy.sparse.linalg import splu
+
+from ..core import Missing, NotConverged, PatchfemError
+from . import fronts
+
+DEFAULT = "fronts"
+
+
+def factorise(matrix: csc_matrix, firsts, name: str | None = None):
+    """Factors of a symmetric positive definite stiffness in the order it comes, the interface its last front.
+
+    firsts: (f + 1,) first node of every front, two unknowns a node. name: of BACKENDS, [PATCHFEM_FACTOR, else fronts].
+    PatchfemError for an unknown name, Missing when `name` is given and its library cannot be used, NotConverged where
+    the matrix is singular.
+    """
+    wanted = name or os.environ.get("PATCHFEM_FACTOR") or DEFAULT
+    if wanted not in BACKENDS:
+        raise PatchfemError(f"PATCHFEM_FACTOR: unknown {wanted!r}; known are {', '.join(BACKENDS)}")
+    try:
+        return BACKENDS[wanted](matrix, np.asarray(firsts))
+    except (ImportError, OSError, AttributeError) as error:
+        fault = f"{wanted} cannot be used ({error}); {REMEDY.get(wanted, '')}"
+    if name is not None:
+        raise Missing(fault)
+    print(f"patchfem: {fault}; {DEFAULT} used instead", file=sys.stderr, flush=True)
+    return BACKENDS[DEFAULT](matrix, np.asarray(firsts))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SuperLU:
+    """SciPy's factors L U without pivoting; S = L_ss U_ss."""
+
+    factor: object
+    size: int
+
+    def solve(self, load) -> np.ndarray:
+        """(n, r) solution for (n, r) loads."""
+        return self.factor.solve(np.ascontiguousarray(load, float))
+
+    def compliance(self) -> np.ndarray:
+        """(k, k) last diagonal block of the inverse."""
+        n, k = self.factor.shape[0], self.size
+        order = self.factor.perm_c
+        if not (np.array_equal(order[n - k:], np.arange(n - k, n)) and np.array_equal(self.factor.perm_r, order)):
+            return self.solve(np.eye(n, k, k - n))[n - k:]
+        low = self.factor.L[n - k:, n - k:].toarray()
+        inverse, _ = dtrtri(low, lower=1, unitdiag=1)
+        return inverse.T @ (inverse / self.factor.U.diagonal()[n - k:, None])
+
+
+def _superlu(matrix, firsts) -> SuperLU:
+    try:
+        factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError as error:
+        raise NotConverged(f"the stiffness of the piece cannot be factorised ({error})") from None
+    return SuperLU(factor, 2 * int(firsts[-1] - firsts[-2]))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cholmod:
+    """CHOLMOD's factors L L^T in the given order; C = L_ss^-T L_ss^-1."""
+
+    factor: object
+    size: int
+
+    def solve(self, load) -> np.ndarray:
+        """(n, r) solution for (n, r) loads."""
+        return self.factor(np.asarray(load, float))
+
+    def compliance(self) -> np.ndarray:
+        """(k, k) last diagonal block of the inverse."""
+        low = self.factor.L()
+        n = low.shape[0]
+        return _inverse(low[n - self.size:, n - self.size:].toarray())
+
+
+def _cholmod(matrix, firsts) -> Cholmod:
+    from sksparse.cholmod import CholmodNotPositiveDefiniteError, cholesky
+
+    try:
+        factor = cholesky(matrix, mode="supernodal", ordering_method="natural")
+        return Cholmod(factor, 2 * int(firsts[-1] - firsts[-2]))
+    except CholmodNotPositiveDefiniteError as error:
+        raise NotConverged(f"the stiffness of the piece is not positive definite ({error})") from None
+
+
+def _inverse(low) -> np.ndarray:
+    both, fault = dpotri(low, lower=1)
+    if fault:
+        raise NotConverged("the stiffness of the piece is not positive definite")
+    return np.tril(both) + np.tril(both, -1).T
+
+
+class Pardiso:
+    """MKL Pardiso's factors with the Schur complement of the last unknowns; its memory is released with the object."""
+
+    __slots__ = ("library", "matrix", "schur", "size")
+
+    def __init__(self, matrix: csc_matrix, size: int):
+        from pypardiso import PyPardisoSolver
+
+        n = matrix.shape[0]
+        self.library, self.size = PyPardisoSolver(mtype=2), size
+        upper = triu(matrix, format="csr")
+        self.matrix = upper.data, (upper.indptr + 1).astype(np.int32), (upper.indices + 1).astype(np.int32)
+        # no default parameters, METIS, no scaling of a positive definite matrix, Schur complement with its factors kept
+        for place, value in ((1, 1), (2, 2), (36, 2)):
+            self.library.iparm[place - 1] = value
+        self.library.perm = (np.arange(n) >= n - size).astype(np.int32)
+        self.schur = np.zeros((size, size))
+        self._call(12, np.zeros(n), self.schur)
+
+    def _call(self, phase: int, load, out) -> None:
+        data, pointer, indices = self.matrix
+        number = [ctypes.byref(ctypes.c_int32(k)) for k in (1, 1, 2, phase, pointer.size - 1)]
+        fault, real, whole = ctypes.c_int32(0), ctypes.POINTER(ctypes.c_double), ctypes.POINTER(ctypes.c_int32)
+        columns = ctypes.byref(ctypes.c_int32(1 if load.ndim == 1 else load.shape[1]))
+        self.library._mkl_pardiso(
+            self.library.pt.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), *number, data.ctypes.data_as(real),
+            pointer.ctypes.data_as(whole), indices.ctypes.data_as(whole), self.library.perm.ctypes.data_as(whole),
+            columns, self.library.iparm.ctypes.data_as(whole), ctypes.byref(ctypes.c_int32(0)),
+            load.ctypes.data_as(real), out.ctypes.data_as(real), ctypes.byref(fault))
+        if fault.value:
+            raise NotConverged(f"the stiffness of the piece cannot be factorised (Pardiso error {fault.value})")
+
+    def solve(self, load) -> np.ndarray:
+        """(n, r) solution for (n, r) loads."""
+        load = np.asfortranarray(load, float)
+        out = np.zeros_like(load, order="F")
+        self._call(33, load, out)
+        return np.ascontiguousarray(out)
+
+    def compliance(self) -> np.ndarray:
+        """(k, k) last diagonal block of the inverse."""
+        try:
+            return _inverse(np.linalg.cholesky(self.schur))
+        except np.linalg.LinAlgError:
+            raise NotConverged("the stiffness of the piece is not positive definite") from None
+
+    def __del__(self):
+        if getattr(self, "schur", None) is not None:
+            self._call(-1, np.zeros(1), np.zeros(1))
+
+
+def _pardiso(matrix, firsts) -> Pardiso:
+    return Pardiso(matrix, 2 * int(firsts[-1] - firsts[-2]))
+
+
+BACKENDS = {"fronts": fronts.factorise, "superlu": _superlu, "cholmod": _cholmod, "pardiso": _pardiso}
+REMEDY = {"cholmod": "install libsuitesparse-dev, then patchfem[cholmod]", "pardiso": "install patchfem[pardiso]"}

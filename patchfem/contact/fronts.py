@@ -1,0 +1,131 @@
+"""Sparse Cholesky factors of a stiffness in dense fronts (multifrontal, Duff and Reid 1983), by LAPACK alone.
+
+The nodes of one part or cut of a nested dissection make a front: their own unknowns first, then all later ones they
+touch. Eliminating its own unknowns leaves an update that is added to the front of the first of the later ones. The
+last front is the interface, so its update-free matrix is the Schur complement S and C = S^-1 is the compliance.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.sparse import csc_matrix, tril
+
+from ..core import NotConverged
+
+PER_NODE = 2  # unknowns of a node, next to one another
+LARGE = 40  # nodes of an update from which slices are added
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fronts:
+    """Factors L L^T of a matrix (n, n). panels: per front (own + later, own) the columns of L; firsts: (f + 1,) first
+    own unknown of every front; later: per front the unknowns below its own."""
+
+    panels: list
+    firsts: np.ndarray
+    later: list
+
+    @property
+    def entries(self) -> int:
+        """Numbers kept."""
+        return sum(panel.size for panel in self.panels)
+
+    def compliance(self) -> np.ndarray:
+        """(k, k) last diagonal block of the inverse, that of the unknowns of the last front."""
+        both, _ = dpotri(self.panels[-1], lower=1)
+        return np.tril(both) + np.tril(both, -1).T
+
+    def solve(self, load) -> np.ndarray:
+        """(n, r) solution for (n, r) loads."""
+        x = np.array(load, dtype=float, order="C")
+        steps = list(zip(self.panels, self.firsts, self.firsts[1:], self.later))
+        for panel, start, stop, later in steps:
+            own = stop - start
+            x[start:stop] = dtrsm(1.0, panel[:own], x[start:stop], lower=1)
+            x[later] -= panel[own:] @ x[start:stop]
+        for panel, start, stop, later in reversed(steps):
+            own = stop - start
+            x[start:stop] = dtrsm(1.0, panel[:own], x[start:stop] - panel[own:].T @ x[later], lower=1, trans_a=1)
+        return x
+
+
+def factorise(matrix: csc_matrix, firsts) -> Fronts:
+    """Fronts of a symmetric positive definite matrix whose front f owns the nodes firsts[f]:firsts[f + 1].
+
+    Nodes have two unknowns each. NotConverged when the matrix is not positive definite.
+    """
+    low = tril(matrix, format="csc")
+    reach = _reach(low, firsts)
+    count = len(firsts) - 1
+    owner = np.repeat(np.arange(count), np.diff(firsts))
+    panels, later, updates = [], [], [[] for _ in range(count)]
+    place = np.empty(firsts[-1], np.int64)
+    for front, (start, stop, below) in enumerate(zip(firsts, firsts[1:], reach)):
+        own = PER_NODE * (stop - start)
+        place[start:stop] = np.arange(stop - start)
+        place[below] = np.arange(stop - start, stop - start + below.size)
+        whole = _gathered(low, start, stop, own + PER_NODE * below.size, place)
+        for rows, update in updates[front]:
+            _add(whole, update, place[rows])
+        updates[front] = None
+        panel, fault = dpotrf(whole[:own, :own], lower=1, clean=1)
+        if fault:
+            raise NotConverged("the stiffness of the piece is not positive definite")
+        if below.size:
+            side = dtrsm(1.0, panel, whole[own:, :own], side=1, lower=1, trans_a=1)
+            rest = dsyrk(-1.0, side, beta=1.0, c=np.asfortranarray(whole[own:, own:]), lower=1, overwrite_c=1)
+            updates[owner[below[0]]].append((below, rest))
+            panel = np.asfortranarray(np.concatenate([panel, side]))
+        panels.append(panel)
+        later.append(_unknowns(below))
+    return Fronts(panels, PER_NODE * np.asarray(firsts), later)
+
+
+def _add(whole, update, at) -> None:
+    """Add the lower half of a large update, or all of a small one, at the nodes `at`, block by block of consecutive."""
+    if at.size < LARGE:
+        at = _unknowns(at)
+        whole.T[at[:, None], at] += update.T  # along the columns of both
+        return
+    cuts = np.flatnonzero(np.diff(at) > 1) + 1
+    stops = PER_NODE * np.append(cuts, at.size)
+    starts = PER_NODE * np.append(0, cuts)
+    shift = PER_NODE * at[starts // PER_NODE] - starts
+    for c0, c1, dc in zip(starts, stops, shift):
+        for r0, r1, dr in zip(starts, stops, shift):
+            if r0 >= c0:
+                whole[r0 + dr:r1 + dr, c0 + dc:c1 + dc] += update[r0:r1, c0:c1]
+
+
+def _unknowns(nodes) -> np.ndarray:
+    return (PER_NODE * nodes[:, None] + np.arange(PER_NODE)).ravel()
+
+
+def _reach(low: csc_matrix, firsts) -> list:
+    """Per front the later nodes that its own ones touch once all before are eliminated, rising."""
+    count = len(firsts) - 1
+    owner = np.repeat(np.arange(count), np.diff(firsts))
+    pointer, rows = low.indptr[::PER_NODE], low.indices // PER_NODE
+    found = [[] for _ in range(count)]
+    out = []
+    for front, (start, stop) in enumerate(pairwise(firsts)):
+        near = np.unique(np.concatenate([rows[pointer[start]:pointer[stop]], *found[front]]))
+        found[front] = None
+        near = near[np.searchsorted(near, stop):]
+        if near.size:
+            found[owner[near[0]]].append(near)
+        out.append(near)
+    return out
+
+
+def _gathered(low: csc_matrix, start: int, stop: int, size: int, place) -> np.ndarray:
+    """(size, size) lower entries of the matrix in the columns of a front's own nodes, Fortran order."""
+    whole = np.zeros((size, size), order="F")
+    pointer = low.indptr[PER_NODE * start:PER_NODE * stop + 1]
+    rows = low.indices[pointer[0]:pointer[-1]]
+    columns = np.repeat(np.arange(pointer.size - 1), np.diff(pointer))
+    whole[PER_NODE * place[rows // PER_NODE] + rows % PER_NODE, columns] = low.data[pointer[0]:pointer[-1]]
+    return whole

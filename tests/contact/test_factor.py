@@ -1,0 +1,138 @@
+"""Factors of a stiffness: every library against the dense inverse and each other; what the dissection promises."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import COATED, COATING
+from scipy.sparse import coo_matrix, csc_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay
+from test_substructure import of_grid
+
+from patchfem.contact import factor, fronts
+from patchfem.contact.dissect import LEAF, dissection, least_cover
+from patchfem.contact.factor import BACKENDS, factorise
+from patchfem.contact.substructure import assemble, condense
+from patchfem.core import Missing, NotConverged, PatchfemError
+from patchfem.mesh.tensor import graded_grid
+
+NEEDS = {"cholmod": "sksparse", "pardiso": "pypardiso"}
+
+
+def usable(name):
+    """The name as a test parameter, skipped by name where its extra is not installed."""
+    there = name not in NEEDS or importlib.util.find_spec(NEEDS[name]) is not None
+    return pytest.param(name, marks=pytest.mark.skipif(not there, reason=f"extra {name} is not installed"))
+
+
+each_backend = pytest.mark.parametrize("name", [usable(name) for name in BACKENDS])
+
+
+def scattered(count, seed):
+    """Points on the unit square and the edges of their Delaunay triangles."""
+    points = np.random.default_rng(seed).random((count, 2))
+    cells = Delaunay(points).simplices
+    return points, np.unique(np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])), axis=0)
+
+
+@each_backend
+@pytest.mark.parametrize("size, split", [(5e-4, 0.0), (1e-4, 0.5)])
+def test_exact_solutions_and_compliance_are_those_of_the_dense_inverse(name, size, split):
+    mesh = of_grid(graded_grid(2e-3, 1e-3, size, COATING), split, seed=4)
+    piece = assemble(mesh, COATED, name)
+    full = np.linalg.inv(piece.matrix.toarray())
+    k = 2 * mesh.interface.size
+    assert np.abs(piece.factor.compliance() - full[-k:, -k:]).max() <= 1e-10 * np.abs(full).max()
+    load = np.random.default_rng(1).normal(size=(full.shape[0], 3))
+    kept = load.copy()
+    assert np.abs(piece.factor.solve(load) - full @ load).max() <= 1e-10 * np.abs(full @ load).max()
+    assert np.array_equal(load, kept)
+
+
+@each_backend
+def test_exact_all_libraries_give_one_compliance(name):
+    mesh = of_grid(graded_grid(12.7e-3, 6.35e-3, 12.7e-3 / 100, COATING), 0.5, seed=2)
+    wanted = condense(assemble(mesh, COATED, "fronts"))
+    for mine, theirs in zip(condense(assemble(mesh, COATED, name)), wanted):
+        assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
+
+
+@each_backend
+def test_refuses_a_singular_stiffness(name):
+    matrix = csc_matrix(np.diag([2.0, 1, 1, 1, 1, 1]) - np.diag([1.0, 0, 0, 0, 0], 1) - np.diag([1.0, 0, 0, 0, 0], -1))
+    matrix[0, 0] = 1.0
+    with pytest.raises(NotConverged, match="stiffness of the piece"):
+        factorise(matrix, [0, 2, 3], name).compliance()
+
+
+def test_refuses_an_unknown_name_and_a_library_that_is_not_there(monkeypatch, capsys):
+    matrix, firsts = csc_matrix(np.eye(4)), [0, 1, 2]
+
+    def broken(matrix, firsts):
+        raise ImportError("libcholmod.so.3: cannot open shared object file")
+
+    monkeypatch.setitem(factor.BACKENDS, "cholmod", broken)
+    with pytest.raises(Missing, match=r"cholmod cannot be used \(libcholmod.*patchfem\[cholmod\]"):
+        factorise(matrix, firsts, "cholmod")
+    with pytest.raises(PatchfemError, match="known are fronts, superlu, cholmod, pardiso"):
+        factorise(matrix, firsts, "mumps")
+    monkeypatch.setenv("PATCHFEM_FACTOR", "cholmod")
+    assert isinstance(factorise(matrix, firsts), fronts.Fronts)
+    assert "cholmod cannot be used" in capsys.readouterr().err
+    monkeypatch.setenv("PATCHFEM_FACTOR", "superlu")
+    assert isinstance(factorise(matrix, firsts), factor.SuperLU)
+
+
+@settings(max_examples=25, deadline=None)
+@given(count=st.integers(4, 900), seed=st.integers(0, 99))
+def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves(count, seed):
+    points, pairs = scattered(count, seed)
+    order, firsts = dissection(points, pairs)
+    assert np.array_equal(np.sort(order), np.arange(count))
+    assert firsts[0] == 0 and firsts[-1] == count and np.all(np.diff(firsts) > 0)
+    if count <= LEAF:
+        return
+    cut = order[firsts[-2]:]
+    left = ~np.isin(pairs, cut).any(axis=1)
+    graph = coo_matrix((np.ones(left.sum()), pairs[left].T), shape=(count, count))
+    label = connected_components(graph, False)[1]
+    assert np.bincount(np.delete(label, cut)).max() <= count / 2 + 1  # the last cut parts the halves
+    assert cut.size <= 3 * np.sqrt(count)
+
+
+@settings(max_examples=100, deadline=None)
+@given(pairs=st.sets(st.tuples(st.integers(0, 4), st.integers(5, 9)), max_size=12))
+def test_exact_the_least_cover_is_that_of_trying_all(pairs):
+    pairs = np.array(sorted(pairs), np.int64).reshape(-1, 2)
+    found = least_cover(pairs[:, ::-1], (np.arange(10) > 4).astype(np.int64))
+    assert np.isin(pairs, found).any(axis=1).all() and np.unique(found).size == found.size
+    sizes = [bin(mask).count("1") for mask in range(1024)
+             if all(mask >> a & 1 or mask >> b & 1 for a, b in pairs.tolist())]
+    assert found.size == min(sizes)
+
+
+def test_order_cuts_of_a_square_grid_hold_the_fewest_nodes_and_the_factors_grow_as_n_log_n():
+    kept = []
+    for n in (32, 64, 128):
+        x, y = (part.ravel() for part in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+        node = np.arange(n * n).reshape(n, n)
+        pairs = np.concatenate([np.stack([node[1:].ravel(), node[:-1].ravel()], 1),
+                                np.stack([node[:, 1:].ravel(), node[:, :-1].ravel()], 1)])
+        order, firsts = dissection(np.stack([x, y], 1).astype(float), pairs)
+        assert np.diff(firsts)[-1] == n  # the first cut is one line of the grid
+        # the graph's Laplacian, two unknowns a node
+        rows = np.concatenate([pairs[:, 0], pairs[:, 1], np.arange(n * n)])
+        columns = np.concatenate([pairs[:, 1], pairs[:, 0], np.arange(n * n)])
+        values = np.concatenate([np.full(2 * len(pairs), -1.0), np.full(n * n, 4.1)])
+        place = np.empty(n * n, np.int64)
+        place[order] = np.arange(n * n)
+        both = [(2 * place[rows] + k, 2 * place[columns] + k) for k in (0, 1)]
+        matrix = csc_matrix((np.tile(values, 2), (np.concatenate([r for r, _ in both]),
+                                                  np.concatenate([c for _, c in both]))))
+        kept.append(fronts.factorise(matrix, firsts).entries / (4 * n * n * np.log2(n)))
+    assert max(kept) <= 1.2 * 31 / 4  # George 1973: 31/4 n^2 log2 n
