@@ -158,15 +158,12 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     if found.contact is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
-    from .simulate_bodies import bodies_of, unlike
+    from .simulate_bodies import bodies_of
 
-    if unlike(found.contact):
-        raise Refused(f"{scene}: contact.upper, contact.lower: a mesh of unlike pieces is not yet built")
-    grid, other = bodies_of(found)
-    if other is not None:
-        raise Refused(f"{scene}: contact.mesh: a mesh of any cells is only read; writing it is not yet built")
-    write_mesh(grid, out)
-    print(f"{out}: 2 pieces of {grid.x.size - 1} x {grid.depth.size - 1} quads, {grid.coating_rows} coating rows")
+    low, high = bodies_of(found)
+    write_mesh(low, out, high)
+    for name, body in (("lower", low), ("upper", high or low)):
+        print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")
 
 
 @app.command

@@ -21,7 +21,7 @@ class Pair:
     grid, piece: the lower piece, upper_grid, upper: the other one, the same objects where the pieces are alike;
     TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all pairs together; closing
     (m, m): normal closing per shear force on the interface [m/N], zero for like pieces. joint: the Mortar of pieces
-    whose interface nodes do not match, else None.
+    whose interface nodes do not match, else None; rise (m,): gap [m] that rounded interfaces leave by themselves.
     """
 
     grid: object
@@ -31,6 +31,7 @@ class Pair:
     compliance: Compliance
     closing: np.ndarray
     joint: object
+    rise: np.ndarray
     seconds: dict
 
     @property
@@ -104,21 +105,23 @@ def finite_elements(body, layers: Layers):
         return assemble(body.x, body.depth, body.coating_rows, layers)
     from .contact import substructure
 
-    return substructure.assemble(body, layers)
+    return substructure.Substructure(body, layers)
 
 
 def compliance_of(body, piece, fresh: bool) -> tuple:
-    """(nn, tt, nt) of one piece; that of a large tensor grid from the cache of operators unless `fresh`."""
+    """(nn, tt, nt) of one piece; that of a large one from the cache of operators unless `fresh`."""
+    condense, large = interface_compliance, body.x.size >= LEAST_CACHED
     if not isinstance(body, TensorGrid):
-        from .contact import substructure
+        from .contact.substructure import condense
 
-        return substructure.condense(piece)
-    if body.x.size < LEAST_CACHED:
-        return interface_compliance(piece)
-    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers)
+        large = len(body.points) >= LEAST_CACHED * LEAST_CACHED
+    if not large:
+        return condense(piece)
+    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers) if isinstance(body, TensorGrid) else \
+        cache.key_of_mesh(body, piece.layers)
     found = None if fresh else cache.fetch(key, body.x.size)
     if found is None:
-        found = interface_compliance(piece)
+        found = condense(piece)
         cache.keep(key, found)
     return found
 
@@ -148,9 +151,15 @@ def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
         parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
+    rise = sum(_rise(body, interface.x) for body in (grid, upper_grid or grid))
     seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
     pieces = Compliance(interface, normal, tangential)
-    return Pair(grid, upper_grid or grid, piece, upper, pieces, closing, joint, seconds)
+    return Pair(grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds)
+
+
+def _rise(body, x) -> np.ndarray:
+    rise = getattr(body, "rise", None)
+    return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)
 
 
 def _match(x, other) -> bool:

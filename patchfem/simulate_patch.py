@@ -91,6 +91,7 @@ def pressed(scene, pair: Pair) -> Patch:
     """The pair under the shapes, the load and the holder of a scene; the pair serves any number of them."""
     contact, pieces = scene.contact, pair.compliance
     gap, notes, seconds = gap_of(scene, pieces.interface.x)
+    gap = gap + pair.rise
     angle = contact.tilt.angle if contact.tilt is not None and contact.tilt.on == "upper" else 0.0
     begin = perf_counter()
     turns = contact.load_line is not None or spring_of(contact) > 0

@@ -357,7 +357,8 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
             force, s, motion, count = _loaded(skin, c, x, weight, gap, target, spring, start, rotation)
     delta, free = float(motion[0]), -float(motion[1]) if motion.size > 1 else 0.0
     checks = residuals(skin, c, x, weight, gap, force, delta, free, load, moment, spring)
-    if motion.size > 1 and spring == 0 and not _smooth(skin) and (force > 0).any(axis=0).sum() < 2:
+    bearing = (force > 1e-12 * force.max()).any(axis=0).sum()
+    if motion.size > 1 and spring == 0 and not _smooth(skin) and bearing < 2:
         raise NotConverged("contact.strips: the contact set does not determine the rotation; raise the load or name "
                            "contact.holder.rotational_stiffness")
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
