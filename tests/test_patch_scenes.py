@@ -1,0 +1,287 @@
+"""Effects of the static patch through their scenes: skins, strips, profiles, joined and rounded pieces, cost."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patchfem import closed_contact
+from patchfem.core import Outcome, PatchfemError, frozen_array
+from patchfem.mesh.files import write_mesh
+from patchfem.mesh.pairs import as_piece
+from patchfem.mesh.tensor import graded_grid
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_bodies import bodies_of, condensed
+from patchfem.simulate_measures import measures, plane_band, values
+from patchfem.simulate_patch import pressed, solve, solve_all
+
+LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
+TEXT = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+{keys}
+substrate = {material}
+{tables}
+"""
+STEEL = '"steel"'
+RIGID = '{young = "1e12 GPa", poisson = 0.3, density = "1 kg/m^3"}'
+TILT = '[contact.tilt]\nangle = "{} rad"\n'
+SKINS = {
+    "linear": '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\ntangential_ratio = 0.8\n',
+    "exponential": '[contact.asperities]\nlaw = "exponential"\ndecay_length = "2.5 um"\n'
+                   'normal_stiffness = "1e11 Pa/m"\ntangential_ratio = 0.8\n',
+    "hertz": '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e8 1/m^2"\n'
+             'height_deviation = "0.05 um"\ntangential_ratio = 0.8\n',
+}
+
+
+def scene(tables="", keys='load = "26 lbf"\nelement_size = "0.127 mm"', material=STEEL, path="scene.toml"):
+    return loads(TEXT.format(keys=keys, material=material, tables=tables), path)
+
+
+def solved(*args, **kwargs) -> tuple:
+    found = scene(*args, **kwargs)
+    patch = solve(found, *bodies_of(found))
+    return patch, values(patch)
+
+
+# ---------------------------------------------------------------------------------------------------------------- skins
+@pytest.mark.parametrize("angle", [1e-5, 1e-4, 1e-3])
+def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
+    _, found = solved(TILT.format(angle) + SKINS["exponential"], material=RIGID)
+    fraction, centre = closed_contact.wedge_skin(angle, LENGTH, 2.5e-6)
+    assert found["loaded_fraction"] == pytest.approx(fraction, rel=2e-4 + 0.1 * (angle * 0.127e-3 / 2.5e-6)**2)
+    assert found["pressure_centre"] == pytest.approx(centre, rel=2e-3)
+    assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)  # k_t follows the pressure
+    assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
+    _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
+    fraction, centre, _, most = closed_contact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
+    cell = 0.127e-3 / LENGTH
+    assert found["contact_fraction"] == pytest.approx(fraction, abs=cell)
+    assert found["pressure_centre"] == pytest.approx(centre, abs=2 * cell**2 * LENGTH, rel=5e-3)
+    assert found["pressure_peak"] == pytest.approx(most, rel=0.6 * cell / fraction)
+    assert found["tangential_stiffness"] == pytest.approx(0.8 * 1e13 * found["contact_fraction"] * LENGTH * WIDTH,
+                                                          rel=1e-5)
+
+
+@pytest.mark.parametrize("law", SKINS)
+@pytest.mark.parametrize("strips", ["", '[contact.strips]\ncount = 3\nroll = "0.01 mrad"\n'])
+def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, strips):
+    tables = TILT.format(2e-5) + SKINS[law] + strips
+    _, here = solved(tables)
+    step, loads_ = 1e-13, []
+    for sign in (-1, 1):
+        closing = f'[contact.approach]\ndistance = "{here["approach"] + sign * step!r} m"\n'
+        loads_.append(solved(tables + closing, keys='element_size = "0.127 mm"')[1]["normal_load"])
+    assert np.mean(loads_) == pytest.approx(LOAD, rel=1e-6)
+    assert np.diff(loads_)[0] / (2 * step) == pytest.approx(here["normal_stiffness"], rel=1e-4)
+
+
+@pytest.mark.parametrize("law", SKINS)
+def test_exact_asperities_give_way_in_shear_without_the_pieces(law):
+    """A slow loop far inside the sticking range has the slope of the skin alone, and with [contact.shear] of both."""
+    bench = '[friction]\nlaw = "coulomb"\nstatic = 1e4\n[slide]\nkind = "triangle"\namplitude = "1 nm"\n' \
+            'speed = "1 mm/s"\n'
+    patch, found = solved(SKINS[law])
+    crush = 1e13 if patch.skin is None else patch.skin.stiffness
+    rigid, both = 0.8 * np.sum(crush * patch.pieces.interface.weight), found["tangential_stiffness"]
+    assert both < rigid
+    for tables, stiffness in (("", rigid), ("[contact.shear]\n", both)):
+        found = run(plan(scene(SKINS[law] + tables + bench)), estimate=False)
+        assert found.response.force.max() == pytest.approx(stiffness * 1e-9, rel=2e-4)
+        assert found.measures["loop_area"].value <= 1e-9 * stiffness * 1e-18
+
+
+# --------------------------------------------------------------------------------------------------------------- strips
+@pytest.mark.parametrize("count", [2, 8])
+def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
+    """Below the opening roll the pressure is linear over the width: the wedge's centre times 1 - 1/count^2."""
+    roll = 0.5 * closed_contact.wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\nroll = "{roll!r} rad"\n'
+    patch, found = solved(tables, material=RIGID)
+    centre = closed_contact.wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
+    assert found["pressure_centre_lateral"] == pytest.approx(centre * (1 - 1 / count**2), rel=1e-5)
+    assert found["roll_moment"] == pytest.approx(LOAD * found["pressure_centre_lateral"], rel=1e-12)
+    assert found["contact_fraction"] == pytest.approx(1.0, rel=1e-12)
+    weight = patch.pieces.interface.weight
+    assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
+
+
+def test_exact_strips_without_roll_are_the_patch():
+    tables = TILT.format(1e-4)
+    one, strips = solved(tables)[1], solved(tables + "[contact.strips]\ncount = 4\n")[1]
+    for name, value in one.items():
+        assert strips[name] == pytest.approx(value, rel=1e-9, abs=1e-15), name
+    assert strips["pressure_centre_lateral"] == pytest.approx(0.0, abs=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------------------- profiles
+def profile(folder, x, z, name="before.csv"):
+    rows = "\n".join(f"{a * 1e6:.6f},{b * 1e9:.6f}" for a, b in zip(x, z))
+    (folder / name).write_text(f"x [um],z [nm]\n{rows}\n", "utf-8")
+    return f'[contact.profile]\nfile = "{name}"\n'
+
+
+def test_exact_a_crown_read_from_a_profile_is_the_crown(tmp_path):
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
+    tables = profile(tmp_path, x, x**2 / 2 / 5.0)
+    read, crown = (solved(part, path=tmp_path / "scene.toml")[1]
+                   for part in (tables, '[contact.crown]\nradius = "5 m"\n'))
+    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness"):
+        assert read[name] == pytest.approx(crown[name], rel=1e-5), name
+
+
+def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
+    tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
+    with pytest.raises(PatchfemError, match=r"contact\.profile: .* % of its height below 2 elements .*element_size"):
+        solved(tables, path=tmp_path / "scene.toml")
+    patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
+    assert any("left to the law of the asperities" in note for note in patch.notes)
+    box = np.sinc(0.127e-3 / 50e-6)  # of the average over a cell
+    assert np.abs(patch.gap[1:-1]).max() == pytest.approx(1e-7 * abs(box), rel=0.02)
+
+
+# --------------------------------------------------------------------------------------------------- pieces that differ
+def meshed(folder, lower, upper) -> str:
+    write_mesh(lower, folder / "pair.msh", upper)
+    return 'load = "26 lbf"\nmesh = "pair.msh"'
+
+
+def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
+    coarse, fine = (graded_grid(LENGTH, HEIGHT, LENGTH / cells) for cells in (60, 96))
+    found = scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")
+    low, high = bodies_of(found)
+    patch = solve(found, low, high)
+    assert patch.pair.joint is not None and low.x.size == 61 and high.x.size == 97
+    weight = patch.pieces.interface.weight
+    forces = patch.pair.forces(patch.pressure.sigma_n * weight)
+    for body, force in zip((low, high), forces):
+        assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
+        assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
+    same = values(solve(scene(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'), coarse))
+    mine = values(patch)
+    for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
+        assert mine[name] == pytest.approx(same[name], rel=0.02), name
+    result = run(plan(found), estimate=False)
+    from patchfem.simulate_fields import write_fields
+
+    write_fields(result, tmp_path / "fields.vtkhdf")
+    assert (tmp_path / "fields.vtkhdf").stat().st_size > 1e4
+
+
+def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_path):
+    """Both faces fall away by x^2/(4 R): together the crown of radius R."""
+    grid = graded_grid(LENGTH, HEIGHT, 0.127e-3)
+    flat = as_piece(grid)
+    depth = flat.points[:, 1]
+    points = flat.points.copy()
+    points[:, 1] = depth + points[:, 0]**2 / (4 * 5.0) * (1 - depth / HEIGHT)
+    round_ = replace(flat, points=frozen_array(points))
+    keys = meshed(tmp_path, round_, round_)
+    found = scene("", keys, path=tmp_path / "scene.toml")
+    patch = solve(found, *bodies_of(found))
+    x = patch.x
+    assert patch.gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
+    mine, crown = values(patch), solved('[contact.crown]\nradius = "5 m"\n')[1]
+    for name in ("pressure_peak", "contact_fraction", "normal_stiffness", "approach"):
+        assert mine[name] == pytest.approx(crown[name], rel=1e-3), name
+
+
+# ------------------------------------------------------------------------------------------------------ the chosen mesh
+def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
+    """The contact is a hundredth of the patch, which no even mesh of that cost resolves."""
+    found = scene('[contact.crown]\nradius = "0.2 m"\n[accuracy]\ntolerance = 1e-2\n', 'load = "40 N"')
+    series = solve_all(found)
+    mine = measures(*series)
+    modulus = closed_contact.combined_modulus(210e9, 0.3, 210e9, 0.3)
+    half = closed_contact.hertz_half_width(40 / WIDTH, 0.2, modulus)
+    peak = closed_contact.hertz_peak(40 / WIDTH, 0.2, modulus)
+    assert series[0].x.size < 420 and half < 0.01 * LENGTH
+    assert mine["pressure_peak"].value == pytest.approx(peak, rel=2e-3)
+    assert mine["contact_half_width"].value == pytest.approx(half, rel=5e-3)
+    assert abs(mine["contact_fraction"].value * LENGTH / 2 / half - 1) < 0.01
+    for name in ("pressure_peak", "contact_fraction", "normal_stiffness"):
+        assert mine[name].error <= 1e-2 * mine[name].value, name
+
+
+def test_exact_the_same_pair_serves_every_load_and_tilt():
+    found = scene(TILT.format(1e-5))
+    pair = condensed(found, *bodies_of(found))
+    for angle in (0.0, 1e-4):
+        other = scene(TILT.format(angle))
+        again, anew = values(pressed(other, pair)), solved(TILT.format(angle))[1]
+        assert again == pytest.approx(anew, rel=1e-12, abs=1e-18)
+
+
+def test_exact_the_plane_band_is_the_other_plane_state():
+    found = scene(TILT.format(1e-5))
+    patch = solve(found, *bodies_of(found))
+    [sentence] = plane_band(found, patch)
+    stress = values(solve(scene(TILT.format(1e-5) + "", 'load = "26 lbf"\nelement_size = "0.127 mm"\nplane = "stress"'),
+                          *bodies_of(found)))
+    change = 100 * (stress["approach"] / values(patch)["approach"] - 1)
+    assert f"approach by {change:+.2g} %" in sentence and change > 3
+    wide = loads(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.127 mm"', material=STEEL, tables="")
+                 .replace('width = "12.7 mm"', 'width = "60 mm"'))
+    assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
+
+
+# ----------------------------------------------------------------------------------------------------------------- cost
+def test_exact_cost_times_every_value_and_measures_it_against_the_best(tmp_path, capsys):
+    from patchfem.__main__ import main
+
+    path = tmp_path / "a.toml"
+    path.write_text(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.254 mm"', material=STEEL,
+                                tables=TILT.format(5e-5) + "[accuracy]\ntolerance = 0.05\n"), "utf-8")
+    with pytest.raises(SystemExit) as end:
+        main(["cost", str(path), "--over", "element_size", "-o", str(tmp_path / "out"), "--json", "-q"])
+    answer = json.loads(capsys.readouterr().out)["element_size"]
+    assert not end.value.code
+    even, chosen = answer["runs"][:-1], answer["runs"][-1]
+    assert [one["value"] for one in even] == pytest.approx([LENGTH / n for n in (12, 25, 50, 100)])
+    assert chosen["value"] is None and all(one["seconds"] > 0 for one in answer["runs"])
+    for one in even:
+        gap = abs(one["values"]["normal_stiffness"] - chosen["values"]["normal_stiffness"])
+        assert one["errors"]["normal_stiffness"] == pytest.approx(gap)
+    errors = [one["errors"]["pressure_peak"] for one in even]
+    assert errors[-1] < errors[0] / 2
+    with open(tmp_path / "out" / "cost_element_size.csv", encoding="utf-8") as file:
+        assert len(list(csv.reader(file))) == 1 + len(answer["runs"])
+    assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
+
+
+def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
+    from patchfem.simulate_cost import Cost, cheapest
+
+    def one(label, seconds, error):
+        return Cost(label, 1.0, seconds, {"a": 1.0}, {"a": error}, {"a": "1"})
+
+    runs = [one("lucky", 1, 1e-6), one("bad", 2, 1e-1), one("good", 3, 1e-3), one("best", 9, 1e-5)]
+    assert cheapest(runs, 1e-2) == {"a": "good"} and cheapest(runs, 1e-6) == {"a": None}
+    assert cheapest(runs, 0.2) == {"a": "lucky"}
+
+
+@pytest.mark.parametrize("words, said", [
+    (["--over", "colour"], "the knobs are element_size"), (["--over", "steps_per_cycle"], "has the knobs element_size"),
+])
+def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, capsys, words, said):
+    from patchfem.__main__ import main
+
+    path = tmp_path / "a.toml"
+    path.write_text(TEXT.format(keys='load = "26 lbf"', material=STEEL, tables=""), "utf-8")
+    with pytest.raises(SystemExit) as end:
+        main(["cost", str(path), *words])
+    assert end.value.code == 2 and said in capsys.readouterr().err
+
+
+def test_exact_nothing_touching_is_a_result_with_its_gap():
+    patch, found = solved('[contact.approach]\ndistance = "0 m"\n[contact.crown]\nradius = "1 m"\n' + SKINS["linear"],
+                          keys='element_size = "0.5 mm"')
+    assert patch.pressure.outcome is Outcome.NO_CONTACT and found["normal_load"] == 0
+    assert patch.pressure.gap == pytest.approx(patch.gap)
