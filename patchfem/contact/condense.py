@@ -35,9 +35,44 @@ def sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
     matrix: symmetric positive definite, (columns * size) square, its first two unknowns of a column at the interface.
     Cost about columns^2 * size^2 * 2 flop. LinAlgError when the matrix is not positive definite.
     """
+    return _swept(*_blocks(matrix, columns))
+
+
+def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
+    """As `sweep` at half its cost, for a piece that is its own mirror image and has a column in the middle.
+
+    Motion that is even inward and odd along x and motion the other way round do not mix: each is that of the right half
+    with what it forbids held in the middle. A force on the right is half the sum of its even and its odd pair.
+    """
+    diagonal, upper = _blocks(matrix, columns)
+    middle, size = columns // 2, diagonal.shape[1]
+    sign = np.tile([-1.0, 1.0], columns - middle)  # parity of (along x, inward) in even motion
+    halves = []
+    for held in (0, 1):
+        block, first = diagonal[middle:].copy(), upper[middle:].copy()
+        block[0] /= 2
+        gone = np.arange(held, size, 2)
+        strength = np.abs(np.diag(block[0])).max()
+        block[0][gone], block[0][:, gone], first[0][gone] = 0.0, 0.0, 0.0
+        block[0][gone, gone] = strength
+        half = _swept(block, first)
+        half[held], half[:, held] = 0.0, 0.0
+        halves.append(half / 2)
+    same, across = halves[0] + halves[1], sign[:, None] * (halves[0] - halves[1])
+    right = slice(2 * middle, None)
+    out = np.empty((2 * columns, 2 * columns))
+    out[right, right] = same
+    flip = (np.arange(columns)[::-1, None] * 2 + [0, 1]).ravel()
+    left = flip[right]
+    out[np.ix_(left, np.arange(2 * columns)[right])] = across
+    out[np.ix_(np.arange(2 * columns)[right], left)] = across.T
+    out[np.ix_(left, left)] = sign[:, None] * same * sign
+    return out
+
+
+def _swept(diagonal, upper) -> np.ndarray:
+    columns, size = diagonal.shape[:2]
     with threadpool_limits(1, "blas"):
-        diagonal, upper = _blocks(matrix, columns)
-        size = diagonal.shape[1]
         right = np.empty_like(diagonal)
         propagate = np.empty_like(upper)
         right[-1] = diagonal[-1]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pieces import COATED, COATING
 from scipy.sparse import csr_matrix
 
-from patchfem.contact.condense import sweep
+from patchfem.contact.condense import mirrored_sweep, sweep
 from patchfem.contact.elasticity import assemble
 from patchfem.mesh.tensor import graded_grid
 
@@ -27,6 +27,15 @@ def test_exact_sweep_of_a_piece_is_the_dense_inverse(cells):
     matrix = assemble(grid.x, grid.depth, grid.coating_rows, COATED).matrix
     wanted = interface_block(np.linalg.inv(matrix.toarray()), cells + 1)
     assert np.abs(sweep(matrix, cells + 1) - wanted).max() <= 1e-9 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("cells", [2, 4, 30])
+def test_exact_halves_of_a_mirrored_piece_give_the_whole(cells):
+    grid = graded_grid(6e-3, 3e-3, 6e-3 / cells, COATING)
+    matrix = assemble(grid.x, grid.depth, grid.coating_rows, COATED).matrix
+    whole, halves = sweep(matrix, cells + 1), mirrored_sweep(matrix, cells + 1)
+    assert np.abs(whole - halves).max() <= 1e-11 * np.abs(whole).max()
+    assert np.array_equal(halves, halves.T)
 
 
 @settings(max_examples=40, deadline=None)
