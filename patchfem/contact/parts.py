@@ -21,10 +21,10 @@ class Operator:
     more row, a leaving node as one more force that makes its own vanish.
     """
 
-    __slots__ = ("base", "c", "low")
+    __slots__ = ("answers", "base", "c", "index", "low")
 
     def __init__(self, c: np.ndarray):
-        self.c, self.base, self.low = c, None, None
+        self.c, self.base, self.index, self.low, self.answers = c, None, None, None, {}
 
     def part(self, rows: np.ndarray) -> np.ndarray:
         """Fresh C-ordered block of `rows` (sorted indices)."""
@@ -39,36 +39,42 @@ class Operator:
             changed = np.flatnonzero(active != self.base)
             if changed.size * 12 <= index.size:
                 return self._changed(active, changed) if changed.size else self._same
-        self.base, self.low = active, factor(self.part(index))
+        self.base, self.index, self.low, self.answers = active, index, factor(self.part(index)), {}
         return self._same
 
     def _same(self, sides: np.ndarray) -> np.ndarray:
         return dpotrs(self.low, sides, lower=1)[0]
 
+    def _columns(self, gone, new) -> np.ndarray:
+        """What unit forces at the nodes do to those of the factor (n, k); kept, as the next sets differ little."""
+        lacking = [node for node in (*gone, *new) if node not in self.answers]
+        if lacking:
+            unit = self.c[self.index[:, None], lacking]
+            for k, node in enumerate(lacking):
+                if self.base[node]:
+                    unit[:, k] = self.index == node
+            self.answers.update(zip(lacking, self._same(np.asfortranarray(unit)).T))
+        return np.stack([self.answers[node] for node in (*gone, *new)], axis=1)
+
     def _changed(self, active, changed):
-        low, base = self.low, np.flatnonzero(self.base)
+        base = self.index
         gone, new = changed[~active[changed]], changed[active[changed]]
-        g = gone.size
-        places = np.searchsorted(base, gone)
-        border = np.zeros((base.size, changed.size), order="F")
-        border[places, np.arange(g)] = 1.0
-        border[:, g:] = self.c[base[:, None], new]
-        answer = dpotrs(low, border, lower=1)[0]
-        small = border.T @ answer
-        small[g:, g:] -= self.c[new[:, None], new]
+        places, rows = np.searchsorted(base, gone), self.c[new[:, None], base]
+        answer = self._columns(gone.tolist(), new.tolist())
+        small = np.concatenate([answer[places], rows @ answer])
+        small[gone.size:, gone.size:] -= self.c[new[:, None], new]
         stays, index = active[base], np.flatnonzero(active)
         old, entered = np.searchsorted(index, base[stays]), np.searchsorted(index, new)
 
         def solve(sides):
             whole = np.zeros((base.size, sides.shape[1]), order="F")
             whole[stays] = sides[old]
-            free = dpotrs(low, whole, lower=1)[0]
-            lack = border.T @ free
-            lack[g:] -= sides[entered]
+            free = self._same(whole)
+            lack = np.concatenate([free[places], rows @ free - sides[entered]])
             added = np.linalg.solve(small, lack)
             out = np.empty(sides.shape)
             out[old] = (free - answer @ added)[stays]
-            out[entered] = added[g:]
+            out[entered] = added[gone.size:]
             return out
         return solve
 
