@@ -51,18 +51,19 @@ class _Motion:
     """The equations of one contact set: forces and rigid motion from a gap on it, a load and a moment about centre."""
 
     def __init__(self, operator: Operator, ask: Ask, active, index):
-        x = ask.x[index]
-        self.solve, self.spring = operator.solver(active), ask.spring
-        self.centre, self.rows, self.stiffness = 0.0, np.zeros((0, x.size)), np.zeros(0)
-        if ask.load is None:
-            self.lift = np.zeros((x.size, 0))
-            return
-        free = ask.moment is not None
+        x, gap = ask.x[index], ask.gap[index]
+        given = (ask.load is not None) + (ask.moment is not None)
+        self.solve, self.centre = operator.solver(active), 0.0
+        self.rows, self.stiffness = np.zeros((0, x.size)), np.zeros(0)
+        self.near = gap.min() if given else 0.0  # taken out first: the closing may be far smaller than the gaps
         middle = (x[0] + x[-1]) / 2
-        self.lift = self.solve(np.asfortranarray(np.stack([np.ones(x.size), x - middle][:1 + free], axis=1)))
+        sides = self.solve(np.stack([gap - self.near, np.ones(x.size), x - middle][:1 + given]).T)
+        self.free, self.lift = sides[:, 0], sides[:, 1:]
+        if given == 0:
+            return
         total = self.lift[:, 0].sum()
         self.rows, self.stiffness = np.ones((1, x.size)), np.array([total])
-        if free:
+        if given > 1:
             shift = self.lift[:, 1].sum() / total
             self.centre = middle + shift
             self.lift[:, 1] -= shift * self.lift[:, 0]
@@ -72,14 +73,18 @@ class _Motion:
         if not (self.stiffness > 0).all():
             raise np.linalg.LinAlgError("the set does not determine the rigid motion")
 
-    def forces(self, gap, target) -> tuple:
-        """Forces (n,) and (lift, lean) with C f - closing = -gap and the sums in `target`."""
-        near = gap.min() if target.size else 0.0  # taken out first: the closing may be far smaller than the gaps
-        free = self.solve((gap - near)[:, None])[:, 0]
+    def forces(self, target, free=None, near: float = 0.0) -> tuple:
+        """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`; of the gap asked
+        for where `free` is not given."""
+        free, near = (self.free, self.near) if free is None else (free, near)
         motion = (target + self.rows @ free) / self.stiffness
         force = self.lift @ motion - free
         motion[:1] += near
         return force, motion
+
+    def correction(self, opening, lack) -> tuple:
+        """What to add to forces and motion where an opening (n,) and a lack of the sums are left."""
+        return self.forces(lack, self.solve(opening[:, None])[:, 0])
 
 
 def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) -> Found:
@@ -89,7 +94,7 @@ def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) ->
     target = np.array([value for value in (ask.load, ask.moment) if value is not None])
     if target.size > 1:
         target[1] -= target[0] * system.centre
-    inside, motion = system.forces(ask.gap[index], target)
+    inside, motion = system.forces(target)
     force = np.zeros(ask.x.size)
     for step in range(polish + 1):
         force[index] = inside
@@ -102,7 +107,7 @@ def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) ->
             break
         lack = target - system.rows @ inside
         lack[1:] -= ask.spring * lean
-        more, turn = system.forces(opening[index], lack)
+        more, turn = system.correction(opening[index], lack)
         inside, motion = inside + more, motion + turn
     stiffness = float(system.stiffness[0]) if target.size else 0.0
     return Found(force, opening, scale, float(lift - lean * system.centre), -float(lean), stiffness)
