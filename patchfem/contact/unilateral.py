@@ -1,137 +1,149 @@
-"""Unilateral contact on the condensed interface by a primal-dual active set.
+"""Unilateral contact of the condensed interface: forces, rigid motion, and an independent check of both.
 
 Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0, under a given approach delta, or a given
 load sum f = N with the rotation held (already inside g), free under a moment, sum f x = M, or against the holder's
-spring, sum f x = M + K theta. Every answer is checked again by `residuals`, which shares no intermediate result with
-the solver.
+spring, sum f x = M + K theta. The primal-dual active set of `active_set` finds them; where a set comes back, conjugate
+gradients and then a finite descent (`gradients`) take over. Every answer is checked again by `residuals`, which shares
+no intermediate result with the solver.
 """
 
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array
+from .active_set import ROUND, Ask, Found, flaw, nested_set, rest, settle
+from .gradients import descend, gradients
+from .parts import Operator
+from .threads import one_thread
 
-LIMIT = 1e-9  # largest relative residual that still counts as solved
-
-
-def _bordered(c, gap, rigid, target, active, spring=0.0):
-    """Forces and rigid motions r = (delta, -theta) on the active set: [C -R; R^T S] [f; r] = [-g; target], S the spring
-    of the rotation. Without rigid motions the forces alone."""
-    caa = c[np.ix_(active, active)]
-    r = rigid[active]
-    if r.shape[1] == 0:
-        return -np.linalg.solve(caa, gap[active]), np.zeros(0)
-    nearest = gap[active].min()  # taken out first: the closing may be far smaller than the gaps
-    both = np.linalg.solve(caa, np.column_stack([gap[active] - nearest, r]))
-    free, lift = both[:, 0], both[:, 1:]
-    stiff = np.diag([0.0, spring][:r.shape[1]])
-    motion = np.linalg.solve(r.T @ lift + stiff, target + r.T @ free)
-    force = lift @ motion - free
-    motion[0] += nearest
-    return force, motion
+LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
+SOLVED = 1e-12  # of a contact without a skin
+LEAST = 1e-200  # N or m; below it the products of the check lose their digits
 
 
-def _hull_start(x, gap, target):
-    """Active set of the rigid body resting on the gap: the touching nodes, widened to enough of them."""
-    middle = min(max(target[1] / target[0], x[0]), x[-1]) if target.size > 1 else None
-    lean = 0.0
-    if middle is not None:
-        slopes = np.linspace(-1, 1, 41) * 4 * (np.ptp(gap) + 1e-300) / np.ptp(x)
-        rest = [np.min(gap + s * (x - middle)) for s in slopes]
-        lean = slopes[int(np.argmax(rest))]
-    height = gap + lean * x
-    return height <= height.min() + 0.5 * (np.ptp(height) + 1e-300)
+class Solved(NamedTuple):
+    """Forces (m,), closing beyond the first touch of the gap as given [m], theta [rad], dN/d(delta) at held rotation
+    [N/m] (0 under an approach), active set (m,) and iterations."""
+
+    force: np.ndarray
+    closing: float
+    theta: float
+    stiffness: float
+    active: np.ndarray
+    iterations: int
 
 
-def solve_forces(c, x, gap, target, start=None, limit: int = 200, spring: float = 0.0) -> tuple:
+def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
+    """(Found, iterations) where sets came back: from all nodes, from conjugate gradients, by descent."""
+    found, _, first = settle(operator, ask, np.ones(ask.x.size, bool), limit)
+    if found is not None and flaw(found) <= SOLVED:
+        return found, first
+    force, second = gradients(operator, ask)
+    found, _, third = settle(operator, ask, force > 1e-9 * force.max(), limit)
+    if found is not None and flaw(found) <= SOLVED:
+        return found, first + second + third
+    found, fourth = descend(operator, ask, force)
+    return found, first + second + third + fourth
+
+
+def _balanced_on_one(operator: Operator, ask: Ask, lean: float) -> Found | None:
+    """One node below the load line that carries all of it while no other touches; of the rotations that leave them
+    open the middle one, or none (`lean` is already in the gap) where that is among them."""
+    line = ask.moment / ask.load
+    k = int(np.argmin(np.abs(ask.x - line)))
+    if abs(ask.x[k] - line) > 1e-15 * np.ptp(ask.x):
+        return None
+    column = operator.c[:, k] * ask.load
+    height, arm = ask.gap - ask.gap[k] + column - column[k], ask.x - ask.x[k]
+    noise = ROUND * (np.abs(ask.gap) + abs(column[k]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bound = -(height + noise) / arm
+    low, high = bound[arm > 0].max(initial=-np.inf), bound[arm < 0].min(initial=np.inf)
+    if not low <= high:
+        return None
+    theta = -lean if low <= -lean <= high else (low + high) / 2
+    force = np.where(np.arange(ask.x.size) == k, ask.load, 0.0)
+    opening = height + theta * arm
+    return Found(force, opening, np.abs(height) + abs(column[k]) + np.abs(theta * arm),
+                 float(ask.gap[k] + theta * ask.x[k] + column[k]), float(theta), float(1 / operator.c[k, k]))
+
+
+def solve(operator: Operator, ask: Ask, start: np.ndarray | None = None, limit: int = 100) -> Solved:
+    """Forces and rigid motion of a question with any gap; `start` (m,): contact set of a neighbouring solve.
+
+    NotConverged when active set, gradients and descent all miss; LinAlgError for an operator that is not definite.
+    """
+    lean, low = 0.0, None
+    if ask.load is not None:
+        gap = ask.gap - ask.gap.min()
+        if ask.moment is not None:
+            lean = rest(ask.x, gap, ask.load, ask.moment, ask.spring)
+            gap = gap + lean * ask.x
+        low = gap.min()
+        moment = None if ask.moment is None else ask.moment + ask.spring * lean
+        ask = ask._replace(gap=gap - low, moment=moment)
+    found = _balanced_on_one(operator, ask, lean) if ask.least == 2 else None
+    before = count = 0
+    if found is None:
+        if start is None or np.count_nonzero(start) < ask.least:
+            start, before = nested_set(operator, ask)
+        found, _, count = settle(operator, ask, start, limit)
+        if found is None or not flaw(found) <= SOLVED:
+            found, more = _fallen_back(operator, ask, limit)
+            count += more
+    closing = 0.0 if low is None else float(found.closing + low)
+    return Solved(found.force, closing, found.theta + lean, found.stiffness, found.force > 0, before + count)
+
+
+def solve_forces(c, x, gap, target, start=None, limit: int = 100, spring: float = 0.0) -> tuple:
     """Nodal forces, rigid motions (none, delta or delta, -theta) and iterations.
 
     c (m, m) [m/N], x (m,), gap (m,) [m], target () with the approach inside the gap, (N,) or (N, M); spring [N m/rad]
     of the rotation. `start`: active set of a neighbouring solve.
-    NotConverged when both the active set and its finite fallback miss the complementarity.
+    NotConverged when both the active set and its fallbacks miss the complementarity.
     """
-    rigid = np.ones((x.size, target.size))
-    if target.size > 1:
-        rigid[:, 1] = x
-    active = start.copy() if start is not None else _hull_start(x, gap, target) if target.size else gap < 0
-    seen = set()
-    for count in range(1, limit + 1):
-        if active.sum() < max(target.size, 1):
-            active = np.ones(x.size, bool)
-        key = active.tobytes()
-        if key in seen:
-            break
-        seen.add(key)
-        index = np.flatnonzero(active)
-        force = np.zeros(x.size)
-        force[index], motion = _bordered(c, gap, rigid, target, index, spring)
-        opening = gap - rigid @ motion + c @ force
-        scale = 1e-13 * (np.abs(c).max() * np.abs(force).sum() + np.ptp(gap))
-        following = (active & (force > 0)) | (~active & (opening < -scale))
-        if np.array_equal(following, active):
-            return force, motion, count
-        active = following
-    force, motion = _one_at_a_time(c, x, gap, rigid, target, spring)
-    return force, motion, limit
-
-
-def _one_at_a_time(c, x, gap, rigid, target, spring=0.0):
-    """Primal active-set method for the strictly convex program: feasible, energy falls at each step, finite."""
-    force = _feasible(x, target)
-    active = force > 0
-    for _ in range(20 * x.size):
-        index = np.flatnonzero(active)
-        step = np.zeros(x.size)
-        step[index], motion = _bordered(c, gap, rigid, target, index, spring)
-        move = step - force
-        falling = active & (step < 0)
-        if falling.any():
-            ratio = np.where(falling, force / np.where(falling, force - step, 1.0), np.inf)
-            worst = int(np.argmin(ratio))
-            force = np.maximum(force + ratio[worst] * move, 0.0)
-            force[worst] = 0.0
-            active[worst] = False
-            continue
-        force = step
-        opening = gap - rigid @ motion + c @ force
-        worst = int(np.argmin(np.where(active, np.inf, opening)))
-        if active.all() or opening[worst] >= -1e-12 * (np.ptp(gap) + np.abs(c @ force).max()):
-            return force, motion
-        active[worst] = True
-    raise NotConverged("contact: the active set did not settle; refine contact.element_size or change the load")
-
-
-def _feasible(x, target):
-    """A positive load distribution with the wanted resultant and moment."""
-    if target.size < 2:
-        return np.full(x.size, (target[0] if target.size else 1e-300) / x.size)
-    middle = min(max(target[1] / target[0], x[0]), x[-1])
-    left, right = x <= middle, x >= middle
-    force = np.zeros(x.size)
-    a, b = x[left].mean(), x[right].mean()
-    share = 1.0 if b == a else (middle - a) / (b - a)
-    force[right] += target[0] * share / right.sum()
-    force[left] += target[0] * (1 - share) / left.sum()
-    return force
+    load, moment = (*map(float, target), None, None)[:2]
+    out = solve(Operator(c), Ask(x, gap, load, moment, spring), start, limit)
+    motion = (gap.min() + out.closing, -out.theta) if target.size else ()
+    return out.force, np.array(motion[:target.size]), out.iterations
 
 
 def residuals(c, x, gap, force, delta: float, theta: float, load: float, moment: float | None = None,
               spring: float = 0.0) -> MappingProxyType:
     """Relative residuals of a contact answer, recomputed from its definition alone.
 
-    Keys: force_balance, moment_balance, penetration, tension, complementarity.
+    Keys: force_balance, moment_balance, penetration, tension, complementarity. An opening is measured at each node in
+    the size of the terms it is the sum of, so a spike of the gap elsewhere hides nothing.
     """
     opening = gap + theta * x - delta + c @ force
-    depth = np.abs(c @ force).max() + np.ptp(gap)
+    span = slice(*np.flatnonzero(force)[[0, -1]] + [0, 1])
+    depth = np.abs(gap) + np.abs(theta * x) + abs(delta) + np.abs(c[:, span]) @ np.abs(force[span])
+    share = opening / np.where(depth > 0, depth, 1.0)
     out = {"force_balance": abs(force.sum() - load) / load,
-           "penetration": max(0.0, -opening.min()) / depth,
+           "penetration": max(0.0, -share.min()),
            "tension": max(0.0, -force.min()) / load,
-           "complementarity": np.abs(force * opening).sum() / (load * depth)}
+           "complementarity": np.abs(force * share).sum() / load}
     if moment is not None:
         out["moment_balance"] = abs(force @ x - moment - spring * theta) / (load * np.ptp(x) + abs(spring * theta))
     return MappingProxyType({key: float(value) for key, value in out.items()})
+
+
+def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
+    """PatchfemError for a question without an answer."""
+    if not (0 <= load <= 1 / LEAST and np.isfinite(gap).all()):
+        raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
+    if 0 < load < LEAST:
+        raise PatchfemError(f"contact.load: {load:.3g} N is too small to compute with; take 0 for a touch without load "
+                            f"or at least {LEAST:.0e} N")
+    if moment is not None and not (np.isfinite(moment) and np.isfinite(spring) and spring >= 0):
+        raise PatchfemError(f"contact.load_line: the moment ({moment:.6g} N m) must be finite and the spring of the "
+                            f"holder ({spring:.6g} N m/rad) >= 0")
+    middle, half = (x[0] + x[-1]) / 2, np.ptp(x) / 2
+    if load and moment is not None and spring == 0 and not abs(moment / load - middle) < half * (1 - 1e-13):
+        raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
+                            f"outside the half length {half:.6g} m: the piece tips over")
 
 
 def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None = None, rotation: float = 0.0,
@@ -140,37 +152,28 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
 
     With `moment` [N m] of the load about the middle the upper piece is free to rotate, or held by the `spring`
     [N m/rad] of its holder from `rotation` [rad] on; without it `rotation` is held (and already in `gap`, so it is only
-    reported). Zero load gives the outcome no_contact. PatchfemError for a moment that no pressure can carry, a load
-    that is negative or a gap that is not finite, NotConverged when a residual exceeds 1e-9.
+    reported). `start` (m,): contact set of a neighbouring solve. Zero load gives the outcome no_contact. PatchfemError
+    for a moment that no pressure can carry, a load that is negative or below 1e-200 N, or a gap that is not finite;
+    NotConverged when a residual exceeds 1e-12.
     """
-    x = pieces.interface.x
-    if not (np.isfinite(load) and load >= 0 and np.isfinite(gap).all()):
-        raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
+    refuse(pieces.interface.x, gap, load, moment, spring)
     if load == 0:
         return _apart(gap, float(gap.min()), rotation)
-    if moment is not None and spring == 0 and not abs(moment) < load * np.ptp(x) / 2:
-        raise PatchfemError(f"contact.load_line: the line of the load lies {moment / load:.6g} m from the middle, "
-                            f"outside the half length {np.ptp(x) / 2:.6g} m: the piece tips over")
-    target = np.array([load]) if moment is None else np.array([load, moment])
-    try:
-        with threadpool_limits(1, "blas"):
-            force, motion, count = solve_forces(pieces.normal, x, gap, target, start, spring=spring)
-    except np.linalg.LinAlgError:
-        raise NotConverged("contact: the rotation is not determined by the contact set; raise the load or name "
-                           "contact.holder.rotational_stiffness") from None
-    theta = 0.0 if moment is None else -float(motion[1])
-    return _checked(pieces, gap, force, float(motion[0]), theta, rotation, load, moment, spring, count)
+    ask = Ask(pieces.interface.x, gap, float(load), None if moment is None else float(moment), spring)
+    return _pressed(pieces, ask, start, float(gap.min()), rotation)
 
 
-def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: float = 0.0) -> Pressure:
+def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: float = 0.0,
+             start: np.ndarray | None = None) -> Pressure:
     """Static pressure at a given `approach` [m] of the holders, the rotation held; no_contact where nothing touches."""
     if not (np.isfinite(approach) and np.isfinite(gap).all()):
         raise PatchfemError("contact.approach: the distance and the gap must be finite")
     if approach <= gap.min():
         return _apart(gap, approach, rotation)
-    with threadpool_limits(1, "blas"):
-        force, _, count = solve_forces(pieces.normal, pieces.interface.x, gap - approach, np.zeros(0))
-    return _checked(pieces, gap, force, approach, 0.0, rotation, float(force.sum()), None, 0.0, count)
+    if approach - gap.min() < LEAST:
+        raise PatchfemError(f"contact.approach: an overlap of {approach - gap.min():.3g} m is too small to compute "
+                            f"with; take {gap.min():.6g} m for a touch without load")
+    return _pressed(pieces, Ask(pieces.interface.x, gap - approach), start, approach, rotation)
 
 
 def _apart(gap, approach: float, rotation: float) -> Pressure:
@@ -178,13 +181,29 @@ def _apart(gap, approach: float, rotation: float) -> Pressure:
                     Outcome.NO_CONTACT, 0, MappingProxyType({}))
 
 
-def _checked(pieces, gap, force, delta, theta, rotation, load, moment, spring, count) -> Pressure:
-    x = pieces.interface.x
-    checks = residuals(pieces.normal, x, gap, force, delta, theta, load, moment, spring)
-    if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
+def _pressed(pieces: Compliance, ask: Ask, start, touch: float, rotation: float) -> Pressure:
+    """The solved and checked state; gaps are measured from `touch` [m], so that a far offset costs no digits."""
+    x, c, weight = pieces.interface.x, pieces.normal, pieces.interface.weight
+    with one_thread():
+        try:
+            out = solve(Operator(c), ask, start)
+        except np.linalg.LinAlgError as error:
+            raise NotConverged(f"contact: {error}; raise the load, name contact.holder.rotational_stiffness or check "
+                               "the mesh") from None
+        opening, checks = checked(c, ask, out)
+    return Pressure(frozen_array(out.force / weight), frozen_array(opening), float(touch + out.closing),
+                    float(rotation + out.theta), float(out.force.sum()), float(out.force @ x), Outcome.DONE,
+                    out.iterations, checks)
+
+
+def checked(c, ask: Ask, out: Solved) -> tuple:
+    """(opening (m,) [m], residuals) of an answer; NotConverged where a residual exceeds 1e-12."""
+    gap = ask.gap if ask.load is None else ask.gap - ask.gap.min()
+    load = float(out.force.sum()) if ask.load is None else ask.load
+    checks = residuals(c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring)
+    if not all(value <= SOLVED for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}")
-    opening = np.maximum(gap + theta * x - delta + pieces.normal @ force, 0.0)
-    opening[force > 0] = 0.0
-    return Pressure(frozen_array(force / pieces.interface.weight), frozen_array(opening), delta, rotation + theta,
-                    float(force.sum()), float(force @ x), Outcome.DONE, count, checks)
+        raise NotConverged(f"contact: {worst} {checks[worst]:.2e} exceeds {SOLVED:.0e}")
+    opening = np.maximum(gap + out.theta * ask.x - out.closing + c @ out.force, 0.0)
+    opening[out.force > 0] = 0.0
+    return opening, checks

@@ -36,11 +36,11 @@ def half_width(x, p):
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_exact_hertz_peak_and_half_width_within_two_in_a_thousand(plane):
+def test_exact_hertz_peak_within_3e_4_and_half_width_within_5e_4(plane):
     grid, state = pressed(16, plane)
     peak = 2 * LOAD / (np.pi * A)
-    assert state.sigma_n.max() == pytest.approx(peak, rel=2e-3)
-    assert half_width(grid.x, state.sigma_n) == pytest.approx(A, rel=2e-3)
+    assert state.sigma_n.max() == pytest.approx(peak, rel=3e-4)
+    assert half_width(grid.x, state.sigma_n) == pytest.approx(A, rel=5e-4)
     inside = np.abs(grid.x) < 0.9 * A
     hertz = peak * np.sqrt(1 - (grid.x[inside] / A) ** 2)
     assert np.abs(state.sigma_n[inside] - hertz).max() <= 8e-3 * peak

@@ -1,0 +1,219 @@
+"""Primal-dual active set on a dense interface compliance, started from a rigid rest position and coarser nodes.
+
+On a guessed contact set A the forces and the rigid motion follow from
+
+    C_AA f - closing = -g on A,    sum f = N,    sum f x = M + K theta,    closing = lift + lean (x - centre)
+
+by one Cholesky factorisation; nodes that pull leave, nodes that overlap enter, until the set repeats itself. `centre`
+makes lift and lean independent of each other (their 2 x 2 system diagonal), so a contact of two neighbouring nodes at
+the far end loses no digits. The lean is -theta.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .parts import Operator
+
+ROUND = 1e-14  # rounding of an opening, relative to the terms it is the sum of
+COARSEST = 60  # nodes below which no coarser problem is solved first
+
+
+class Ask(NamedTuple):
+    """What is asked: nodes x (m,), gap (m,) [m] from first touch on (below zero: overlap, for a given approach), load
+    (None: approach given), moment (None: rotation held) and spring of the rotation [N m/rad]."""
+
+    x: np.ndarray
+    gap: np.ndarray
+    load: float | None = None
+    moment: float | None = None
+    spring: float = 0.0
+
+    @property
+    def least(self) -> int:
+        """Fewest nodes that determine the rigid motion."""
+        return 2 if self.moment is not None and self.spring == 0 else 1
+
+
+class Found(NamedTuple):
+    """Forces and opening (m,), closing [m] at x = 0, rotation theta and dN/d(closing) at held rotation [N/m] of a set;
+    scale (m,): the size of the terms in each opening."""
+
+    force: np.ndarray
+    opening: np.ndarray
+    scale: np.ndarray
+    closing: float
+    theta: float
+    stiffness: float
+
+
+class _Motion:
+    """The equations of one contact set: forces and rigid motion from a gap on it, a load and a moment about centre."""
+
+    def __init__(self, operator: Operator, ask: Ask, active, index):
+        x, gap = ask.x[index], ask.gap[index]
+        given = (ask.load is not None) + (ask.moment is not None)
+        self.solve, self.centre = operator.solver(active), 0.0
+        self.rows, self.stiffness = np.zeros((0, x.size)), np.zeros(0)
+        self.near = gap.min() if given else 0.0  # taken out first: the closing may be far smaller than the gaps
+        middle = (x[0] + x[-1]) / 2
+        sides = self.solve(np.stack([gap - self.near, np.ones(x.size), x - middle][:1 + given]).T)
+        self.free, self.lift = sides[:, 0], sides[:, 1:]
+        if given == 0:
+            return
+        total = self.lift[:, 0].sum()
+        self.rows, self.stiffness = np.ones((1, x.size)), np.array([total])
+        if given > 1:
+            shift = self.lift[:, 1].sum() / total
+            self.centre = middle + shift
+            self.lift[:, 1] -= shift * self.lift[:, 0]
+            self.rows = np.stack([np.ones(x.size), x - self.centre])
+            turn = self.rows[1] @ self.lift[:, 1] + ask.spring
+            self.stiffness = np.array([total, turn])
+        if not (self.stiffness > 0).all():
+            raise np.linalg.LinAlgError("the set does not determine the rigid motion")
+
+    def forces(self, target, free=None, near: float = 0.0) -> tuple:
+        """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`; of the gap asked
+        for where `free` is not given."""
+        free, near = (self.free, self.near) if free is None else (free, near)
+        motion = (target + self.rows @ free) / self.stiffness
+        force = self.lift @ motion - free
+        motion[:1] += near
+        return force, motion
+
+    def correction(self, opening, lack) -> tuple:
+        """What to add to forces and motion where an opening (n,) and a lack of the sums are left."""
+        return self.forces(lack, self.solve(opening[:, None])[:, 0])
+
+
+def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) -> Found:
+    """The answer with the nodes `active` (m,) in contact, whatever the signs; `polish` steps of refinement."""
+    index = np.flatnonzero(active)
+    system = _Motion(operator, ask, active, index)
+    target = np.array([value for value in (ask.load, ask.moment) if value is not None])
+    if target.size > 1:
+        target[1] -= target[0] * system.centre
+    inside, motion = system.forces(target)
+    force = np.zeros(ask.x.size)
+    for step in range(polish + 1):
+        force[index] = inside
+        lift, lean = (*motion, 0.0, 0.0)[:2]
+        tilted = lean * (ask.x - system.centre)
+        bent = operator.bent(force, index)
+        opening = ask.gap - lift - tilted + bent
+        scale = np.abs(ask.gap) + abs(lift) + np.abs(tilted) + np.abs(bent).max()
+        if step == polish:
+            break
+        lack = target - system.rows @ inside
+        lack[1:] -= ask.spring * lean
+        more, turn = system.correction(opening[index], lack)
+        inside, motion = inside + more, motion + turn
+    stiffness = float(system.stiffness[0]) if target.size else 0.0
+    return Found(force, opening, scale, float(lift - lean * system.centre), -float(lean), stiffness)
+
+
+def settle(operator: Operator, ask: Ask, active: np.ndarray, limit: int = 100) -> tuple:
+    """(Found or None, last set, iterations); None where a set came back, was singular or `limit` was reached."""
+    seen = set()
+    for count in range(1, limit + 1):
+        active = supported(ask, active)
+        key = active.tobytes()
+        if key in seen:
+            return None, active, count
+        seen.add(key)
+        try:
+            found = on_set(operator, ask, active)
+        except np.linalg.LinAlgError:
+            return None, active, count
+        following = np.where(active, found.force > 0, found.opening < -ROUND * found.scale)
+        if np.array_equal(following, active):
+            return polished(operator, ask, active, found), active, count
+        active = following
+    return None, active, limit
+
+
+def supported(ask: Ask, active: np.ndarray) -> np.ndarray:
+    """The set, with the lowest node on each side of the load line where it does not reach to both sides."""
+    index = np.flatnonzero(active)
+    if ask.least == 1:
+        return active if index.size else ask.gap <= ask.gap.min()
+    line = ask.moment / ask.load
+    if index.size > 1 and ask.x[index[0]] <= line <= ask.x[index[-1]]:
+        return active
+    out = active.copy()
+    for side in (ask.x <= line, ask.x > line):
+        out[np.argmin(np.where(side, ask.gap, np.inf))] = True
+    return out
+
+
+def flaw(found: Found) -> float:
+    """Largest violation of contact: openings in their scale, pulls in the load."""
+    share = found.opening / np.where(found.scale > 0, found.scale, 1.0)
+    inside = np.abs(share[found.force != 0]).max(initial=0.0)
+    pull = -found.force.min() / max(found.force.sum(), 1e-300)
+    return float(max(inside, -share.min(), pull))
+
+
+def polished(operator, ask, active, found: Found) -> Found:
+    """The same set refined once where rounding is seen in its openings."""
+    off = np.abs(found.opening[active]) > ROUND / 10 * found.scale[active]
+    if not off.any():
+        return found
+    finer = on_set(operator, ask, active, polish=2)
+    return finer if flaw(finer) < flaw(found) else found
+
+
+def rest(x, gap, load: float, moment: float, spring: float = 0.0) -> float:
+    """Rotation theta at which a rigid piece under load and moment (and spring) comes to rest on the gap: it lies on
+    the edge of the lower convex hull below the load line, or with a spring perhaps on one corner."""
+    a, b = 0, x.size - 1
+    while a < b:
+        theta = -(gap[b] - gap[a]) / (x[b] - x[a])
+        height = gap + theta * x
+        j = int(np.argmin(height))
+        if a < j < b and height[j] < min(height[a], height[b]):
+            lack = load * x[j] - moment - spring * theta
+            if lack == 0:
+                return float(theta)
+            a, b = (a, j) if lack > 0 else (j, b)
+            continue
+        if spring > 0 and load * x[a] - moment - spring * theta > 0:
+            b = a
+        elif spring > 0 and load * x[b] - moment - spring * theta < 0:
+            a = b
+        else:
+            return float(theta)
+    return float((load * x[a] - moment) / spring)
+
+
+def first_set(operator: Operator, ask: Ask) -> np.ndarray:
+    """Nodes within the depth to which the load sinks the piece at most half way between a point load and an even one,
+    of the rest position; those that overlap for a given approach."""
+    if ask.load is None:
+        return ask.gap < 0
+    deep = ask.load * np.sqrt(abs(operator.c.diagonal().mean() * operator.c.mean()))
+    return ask.gap <= ask.gap.min() + deep
+
+
+def nested_set(operator: Operator, ask: Ask, every: int = 4) -> tuple:
+    """(first set, iterations on coarser nodes): a contact of the lowest node of each four, solved from coarser nodes in
+    turn, spread over those of the four that its rigid motion reaches."""
+    m = ask.x.size
+    if m < COARSEST:
+        return first_set(operator, ask), 0
+    blocks = -(-m // every)
+    padded = np.full(blocks * every, np.inf)
+    padded[:m] = ask.gap
+    lowest = padded.reshape(blocks, every).argmin(axis=1) + every * np.arange(blocks)
+    kept = lowest if lowest[0] == 0 and lowest[-1] == m - 1 else np.unique(np.concatenate([[0], lowest, [m - 1]]))
+    coarse = Operator(operator.part(kept))
+    question = ask._replace(x=ask.x[kept], gap=ask.gap[kept])
+    start, before = nested_set(coarse, question, every)
+    found, active, count = settle(coarse, question, start, 30)
+    touched = np.zeros(blocks, bool)
+    touched[kept[active] // every] = True
+    spread = np.repeat(touched, every)[:m]
+    if found is not None:
+        spread &= ask.gap < found.closing - found.theta * ask.x
+    return spread, before + count

@@ -1,0 +1,16 @@
+"""One BLAS thread for small dense work, at 10 us per entry: the libraries are looked up once, not at each call."""
+
+from functools import cache
+
+import scipy.linalg  # noqa: F401  (loads the second BLAS before the libraries are looked up)
+from threadpoolctl import ThreadpoolController
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def one_thread():
+    """Context in which numpy and scipy use a single BLAS thread; may be entered again inside."""
+    return _libraries().limit(limits=1, user_api="blas")

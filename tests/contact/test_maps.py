@@ -1,0 +1,125 @@
+"""Maps over loads, tilts and load lines: every point equals its own cold solve, and none is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pieces import LENGTH, LOAD, coated_pair, rough
+
+from patchfem.contact import maps
+from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.maps import press_map
+from patchfem.contact.slip import normal_stiffness, tangential_stiffness
+from patchfem.contact.unilateral import SOLVED, press
+from patchfem.core import NotConverged, Outcome, PatchfemError
+
+LOADS = LOAD * np.array([1.0, 0.01, 10.0, 0.3])  # in no order
+ANGLES = np.array([1e-4, 0.0, -1e-3, 1e-5])
+LINES = LENGTH * np.array([0.2, -0.4, 0.0])
+GAPS = {"flat": lambda x: np.zeros(x.size), "crown": lambda x: crown(x, 10.0),
+        "rough": lambda x: rough(np.random.default_rng(2), x, 1e-7)}
+each_gap = pytest.mark.parametrize("shape", GAPS.values(), ids=GAPS.keys())
+
+
+def agrees(pair, found, point, state):
+    """The numbers of a point are those of a state solved alone."""
+    weight, x = pair.interface.weight, pair.interface.x
+    active = state.sigma_n > 0
+    assert np.abs(found.sigma_n[point] - state.sigma_n).max() <= 1e-9 * state.sigma_n.max()
+    assert found.fraction[point] == pytest.approx(weight[active].sum() / weight.sum(), rel=1e-12)
+    assert found.peak[point] == pytest.approx(state.sigma_n.max(), rel=1e-9)
+    assert found.centre[point] == pytest.approx(state.moment / state.load, abs=1e-9 * LENGTH)
+    assert found.approach[point] == pytest.approx(state.approach, rel=1e-9)
+    assert found.rotation[point] == pytest.approx(state.rotation, rel=1e-9, abs=1e-18)
+    assert found.normal_stiffness[point] == pytest.approx(normal_stiffness(pair.normal, active), rel=1e-9)
+    assert found.shear_stiffness[point] == pytest.approx(tangential_stiffness(pair.tangential, active), rel=1e-9)
+    assert found.outcome[point] is Outcome.DONE and found.residual[point] <= SOLVED and x.size == state.gap.size
+
+
+@each_gap
+def test_exact_every_held_point_is_its_own_cold_solve(shape):
+    pair = coated_pair(200)
+    gap = shape(pair.interface.x)
+    found = press_map(pair, gap, LOADS, ANGLES, shear=True, keep=True)
+    assert found.fraction.shape == (4, 4, 1) and found.sigma_n.shape == (4, 4, 1, 201) and not found.reasons
+    for n, load in enumerate(LOADS):
+        for a, angle in enumerate(ANGLES):
+            agrees(pair, found, (n, a, 0), press(pair, gap + tilt(pair.interface.x, angle), load, rotation=angle))
+
+
+@each_gap
+@pytest.mark.parametrize("spring", [0.0, 1e4])
+def test_exact_every_point_under_a_load_line_is_its_own_cold_solve(shape, spring):
+    pair = coated_pair(200)
+    gap = shape(pair.interface.x)
+    found = press_map(pair, gap, LOADS, ANGLES[:2], LINES, spring, shear=True, keep=True)
+    assert found.fraction.shape == (4, 2, 3) and not found.reasons
+    for n, load in enumerate(LOADS):
+        for a, angle in enumerate(ANGLES[:2]):
+            for k, line in enumerate(LINES):
+                tilted = gap + tilt(pair.interface.x, angle)
+                agrees(pair, found, (n, a, k), press(pair, tilted, load, load * line, angle, spring=spring))
+
+
+def test_exact_a_free_piece_forgets_the_tilt():
+    """Load lines between the nodes: on one that touches alone the rotation is not unique, and the nearest is kept."""
+    pair, lines = coated_pair(100), LINES + 1e-5
+    found = press_map(pair, crown(pair.interface.x, 1.0), LOADS, ANGLES, lines)
+    for numbers in (found.fraction, found.peak, found.centre, found.rotation, found.approach):
+        assert np.abs(np.ptp(numbers, axis=1)).max() <= 1e-9 * np.abs(numbers).max()
+    assert np.abs(found.centre - lines).max() <= 1e-12 * LENGTH
+
+
+def test_exact_zero_load_touches_and_the_others_are_solved():
+    pair = coated_pair(100)
+    found = press_map(pair, np.full(101, 3e-6), [0.0, LOAD], [0.0, 1e-4], shear=True, keep=True)
+    assert (found.outcome[0] == Outcome.NO_CONTACT).all() and (found.outcome[1] == Outcome.DONE).all()
+    assert not found.sigma_n[0].any() and not found.normal_stiffness[0].any() and not found.shear_stiffness[0].any()
+    assert found.approach[0, :, 0] == pytest.approx([3e-6, 3e-6 - 1e-4 * LENGTH / 2])
+
+
+def test_refuses_by_point_and_solves_the_rest():
+    """Load lines outside the patch and a negative load are marked with the reason, as NaN; nothing else changes."""
+    pair = coated_pair(100)
+    lines = LENGTH * np.array([0.1, 0.6, -0.5])
+    found = press_map(pair, np.zeros(101), [LOAD, -1.0, 2 * LOAD], [0.0], lines, keep=True)
+    bad = np.array([[False, True, True], [True, True, True], [False, True, True]])[:, None, :]
+    assert ((found.outcome == Outcome.NOT_CONVERGED) == bad).all() and (found.outcome[~bad] == Outcome.DONE).all()
+    for numbers in (found.fraction, found.peak, found.approach, found.normal_stiffness, found.residual):
+        assert (np.isnan(numbers) == bad).all()
+    assert np.isnan(found.sigma_n[bad]).all() and set(found.reasons) == set(zip(*np.nonzero(bad)))
+    assert "tips over" in found.reasons[0, 0, 1] and "must be >= 0" in found.reasons[1, 0, 0]
+    assert found.peak[2, 0, 0] == pytest.approx(2 * found.peak[0, 0, 0])
+
+
+def test_refuses_to_hide_what_did_not_converge(monkeypatch):
+    pair, solve = coated_pair(100), maps.solve
+
+    def failing(operator, ask, start):
+        if ask.load == 2 * LOAD:
+            raise NotConverged("as the test wants it")
+        return solve(operator, ask, start)
+    monkeypatch.setattr(maps, "solve", failing)
+    found = press_map(pair, np.zeros(101), [LOAD, 2 * LOAD, 3 * LOAD], [0.0, 1e-4])
+    assert (found.outcome[1] == Outcome.NOT_CONVERGED).all() and np.isnan(found.peak[1]).all()
+    assert (found.outcome[[0, 2]] == Outcome.DONE).all()
+    assert found.reasons == {(1, a, 0): "as the test wants it" for a in (0, 1)}
+
+
+@pytest.mark.parametrize("change, word", [({"loads": []}, "loads"), ({"loads": [np.nan]}, "loads"),
+                                          ({"angles": [np.inf]}, "angles"), ({"lines": [np.nan]}, "lines"),
+                                          ({"gap": np.zeros(3)}, "gap"), ({"gap": np.full(101, np.nan)}, "gap")])
+def test_refuses_inputs_that_are_no_map(change, word):
+    with pytest.raises(PatchfemError, match=f"map: .*{word}"):
+        press_map(coated_pair(100), **({"gap": np.zeros(101), "loads": [LOAD]} | change))
+
+
+def test_always_a_map_is_read_only_and_steps_are_warm():
+    """A step of load or tilt tries a few sets; a thousand points stay far below cold solves."""
+    pair = coated_pair(100)
+    found = press_map(pair, np.zeros(101), LOAD * np.logspace(-1, 1, 25), np.linspace(-2e-4, 2e-4, 40))
+    assert (found.outcome == Outcome.DONE).all() and found.residual.max() <= SOLVED
+    assert found.iterations.mean() <= 5
+    for numbers in (found.loads, found.fraction, found.outcome, found.iterations):
+        assert not numbers.flags.writeable
+    assert np.abs(found.fraction - found.fraction[:, ::-1]).max() <= 1e-12  # the tilt mirrored

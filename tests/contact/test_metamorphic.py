@@ -1,0 +1,161 @@
+"""What happens to the contact of finite-element pieces when the question is scaled, mirrored, swapped or shifted."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import COATED, COATING, HEIGHT, LENGTH, LOAD, TITANIUM, WIDTH, bare, bare_pair, coated_pair, rough
+
+from patchfem.contact.elasticity import assemble, interface_compliance
+from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.unilateral import press, press_by
+from patchfem.core import Compliance, Interface
+from patchfem.mesh.tensor import graded_grid
+
+CELLS = 60
+RUNS = settings(max_examples=25, deadline=None)
+SEED = st.integers(0, 2**32 - 1)
+LINE = st.one_of(st.none(), st.floats(-0.49, 0.49))  # of the length; None: the rotation is held
+HEIGHTS = st.floats(-12, -2)
+SPRING = st.one_of(st.just(0.0), st.floats(-2, 8).map(lambda power: 10.0**power))
+
+
+def gap_of(seed, height):
+    """White noise, waves or a few steps on the interface of CELLS columns."""
+    rng, x = np.random.default_rng(seed), coated_pair(CELLS).interface.x
+    kind = rng.integers(3)
+    if kind == 0:
+        return 10.0**height * rng.normal(size=x.size)
+    return rough(rng, x, 10.0**height) if kind == 1 else 10.0**height * rng.integers(0, 3, x.size)
+
+
+def forces(pair, state):
+    return state.sigma_n * pair.interface.weight
+
+
+def near(one, two, within=1e-8):
+    return np.abs(one - two).max() <= within * np.abs(two).max()
+
+
+def moment_of(load, line):
+    return None if line is None else load * line * LENGTH
+
+
+@RUNS
+@given(st.floats(-6, 6), LINE)
+def test_exact_twice_the_modulus_halves_the_approach_of_flat_pieces(power, line):
+    load = LOAD * 10.0**power
+    soft, stiff = (press(bare_pair(CELLS, f * TITANIUM[0]), np.zeros(CELLS + 1), load, moment_of(load, line))
+                   for f in (1, 2))
+    assert near(stiff.sigma_n, soft.sigma_n, 1e-9)
+    assert stiff.approach == pytest.approx(soft.approach / 2, rel=1e-9, abs=1e-30)
+    assert stiff.rotation == pytest.approx(soft.rotation / 2, rel=1e-9, abs=1e-9 * abs(soft.approach) / LENGTH)
+
+
+@RUNS
+@given(SEED, HEIGHTS, st.floats(-3, 4), LINE, SPRING)
+def test_exact_twice_the_load_on_twice_the_gap_doubles_the_pressure(seed, height, power, line, spring):
+    """Twice the numbers, the same digits."""
+    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    one = press(pair, gap, load, moment_of(load, line), spring=spring)
+    two = press(pair, 2 * gap, 2 * load, moment_of(2 * load, line), spring=spring)
+    assert near(two.sigma_n, 2 * one.sigma_n, 1e-13)
+    assert two.approach == pytest.approx(2 * one.approach, rel=1e-13)
+    assert two.rotation == pytest.approx(2 * one.rotation, rel=1e-13)
+
+
+@RUNS
+@given(SEED, HEIGHTS, st.floats(-3, 4), LINE, SPRING)
+def test_exact_mirror_of_gap_and_moment_mirrors_the_pressure(seed, height, power, line, spring):
+    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    one = press(pair, gap, load, moment_of(load, line), spring=spring)
+    two = press(pair, gap[::-1].copy(), load, None if line is None else -moment_of(load, line), spring=spring)
+    assert near(two.sigma_n[::-1], one.sigma_n)
+    size = np.ptp(gap) + one.gap.max() + abs(one.approach)
+    assert two.approach == pytest.approx(one.approach, abs=1e-9 * size)
+    assert two.rotation == pytest.approx(-one.rotation, abs=1e-8 * size / LENGTH)
+
+
+@cache
+def pieces() -> tuple:
+    """(x, nodal areas, compliances per width) of a coated and an uncoated piece on the same columns."""
+    coated, plain = graded_grid(LENGTH, HEIGHT, LENGTH / CELLS, COATING), graded_grid(LENGTH, HEIGHT, LENGTH / CELLS)
+    both = [interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
+            for grid, layers in ((coated, COATED), (plain, bare(TITANIUM)))]
+    return coated.x, coated.tributary() * WIDTH, both
+
+
+@RUNS
+@given(SEED, HEIGHTS, st.floats(-3, 4), LINE)
+def test_exact_swapped_bodies_change_nothing(seed, height, power, line):
+    x, weight, both = pieces()
+    gap, load = gap_of(seed, height), 10.0**power
+    one, two = (press(Compliance(Interface(x, weight, WIDTH), *((a + b) / WIDTH for a, b in zip(low[:2], high[:2]))),
+                      gap, load, moment_of(load, line)) for low, high in (both, both[::-1]))
+    assert np.array_equal(one.sigma_n, two.sigma_n) and one.approach == two.approach and one.rotation == two.rotation
+
+
+@RUNS
+@given(SEED, st.floats(-3, 3), st.floats(1.01, 100), st.floats(-2e-4, 2e-4))
+def test_always_more_load_never_shrinks_the_contact_of_a_convex_gap(seed, power, more, angle):
+    pair, rng = coated_pair(CELLS), np.random.default_rng(seed)
+    x = pair.interface.x
+    gap = crown(x - rng.uniform(-4e-3, 4e-3), 10.0**rng.uniform(-1, 2)) + tilt(x, angle)
+    gap = np.maximum(gap, tilt(x, rng.uniform(-1e-3, 1e-3)))  # the larger of two convex ones is convex
+    load = LOAD * 10.0**power
+    less, larger = press(pair, gap, load).sigma_n > 0, press(pair, gap, load * more).sigma_n > 0
+    assert np.all(larger[less])
+    assert press(pair, gap, load * more).approach > press(pair, gap, load).approach
+
+
+@RUNS
+@given(SEED, HEIGHTS, st.floats(-3, 4), st.floats(-0.49, 0.49), SPRING)
+def test_exact_controls_agree_on_one_contact(seed, height, power, line, spring):
+    """The rotation and then the approach that moment control returned give the same forces when they are held.
+
+    What is handed on is a rounded rotation and approach: as far as the gap outweighs the closing, digits go.
+    """
+    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    x = pair.interface.x
+    free = press(pair, gap, load, moment_of(load, line), spring=spring)
+    turned = gap + tilt(x, free.rotation)
+    size = np.abs(gap).max() + np.abs(free.rotation) * LENGTH + abs(free.approach)
+    stiff = np.linalg.eigvalsh(pair.normal)[0]
+    within = 1e-9 * load + 1e-15 * size / stiff
+    held = press(pair, turned, load, rotation=free.rotation)
+    assert np.abs(forces(pair, held) - forces(pair, free)).max() <= within
+    assert held.approach == pytest.approx(free.approach, abs=1e-9 * np.abs(pair.normal).max() * load + 1e-14 * size)
+    by = press_by(pair, turned, held.approach, rotation=free.rotation)
+    assert np.abs(forces(pair, by) - forces(pair, held)).max() <= within
+
+
+@RUNS
+@given(SEED, HEIGHTS, st.floats(-3, 4), LINE, SPRING)
+def test_always_balance_and_the_conditions_of_contact(seed, height, power, line, spring):
+    """sum f = N, sum f x = M + K theta, f >= 0, w >= 0, f w = 0, all to 1e-12."""
+    pair, gap, load = coated_pair(CELLS), gap_of(seed, height), 10.0**power
+    x, moment = pair.interface.x, moment_of(load, line)
+    state = press(pair, gap, load, moment, spring=spring)
+    force, bent = forces(pair, state), pair.normal @ forces(pair, state)
+    assert abs(force.sum() - load) <= 1e-12 * load and force.min() >= 0
+    if moment is not None:
+        back = spring * state.rotation
+        assert abs(force @ x - moment - back) <= 1e-12 * (load * LENGTH + abs(back))
+    theta = 0.0 if line is None else state.rotation
+    opening = gap + theta * x - state.approach + bent
+    size = np.abs(gap).max() + np.abs(theta) * LENGTH / 2 + bent.max()
+    assert opening.min() >= -1e-12 * size and force @ np.abs(opening) <= 1e-12 * load * size
+    assert np.all(state.gap * state.sigma_n == 0) and state.gap.min() >= 0
+
+
+@pytest.mark.parametrize("pair", [bare_pair(CELLS), coated_pair(CELLS), bare_pair(CELLS, plane="stress"),
+                                  coated_pair(400)], ids=["bare", "coated", "plane stress", "coated, 400"])
+def test_exact_compliance_is_symmetric_and_positive_definite(pair):
+    for c in (pair.normal, pair.tangential):
+        assert np.abs(c - c.T).max() <= 1e-12 * np.abs(c).max()
+        low, high = np.linalg.eigvalsh(c)[[0, -1]]
+        assert low > 1e-6 * high

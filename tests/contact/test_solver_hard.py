@@ -1,0 +1,466 @@
+"""Hard questions to the unilateral solver: degenerate contacts, extreme sizes, cycling sets, many random gaps."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
+
+from patchfem.contact import unilateral
+from patchfem.contact.active_set import Ask, nested_set, rest, settle
+from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.gradients import descend, gradients, nearest
+from patchfem.contact.parts import SMALL, Operator
+from patchfem.contact.unilateral import SOLVED, press, press_by, solve
+from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
+
+
+def pair_on(x, c) -> Compliance:
+    return Compliance(Interface(x, np.full(x.size, WIDTH * LENGTH / x.size), WIDTH), c, c)
+
+
+def forces(pair, state):
+    return state.sigma_n * pair.interface.weight
+
+
+def by_enumeration(c, x, gap, load=None, moment=None, spring=0.0):
+    """(forces, delta, theta): every subset of the nodes is tried, as a saddle-point system of LU."""
+    m, r = x.size, 0 if load is None else 1 if moment is None else 2
+    rigid, best = np.stack([np.ones(m), x], axis=1)[:, :r], (np.inf, None)
+    for size in range(max(r if spring == 0 else 1, 0), m + 1):
+        for part in map(list, combinations(range(m), size)):
+            system = np.block([[c[np.ix_(part, part)], -rigid[part]],
+                               [rigid[part].T, np.diag([0.0, spring][:r])]])
+            answer = np.linalg.lstsq(system, np.concatenate([-gap[part], [load, moment][:r]]), rcond=1e-15)[0]
+            force = np.zeros(m)
+            force[part] = answer[:size]
+            opening = gap + c @ force - rigid @ answer[size:]
+            depth = np.abs(gap) + np.abs(rigid * answer[size:]).sum(axis=1) + np.abs(c @ force).max()
+            bad = max(-force.min() / max(np.abs(force).sum(), 1e-300), (-opening / depth).max(),
+                      np.abs(opening / depth)[part].max(initial=0.0))
+            best = min(best, (bad, tuple(force), *answer[size:]), key=lambda entry: entry[0])
+    return np.array(best[1]), *best[2:]
+
+
+# ---- few nodes, against all subsets
+
+@settings(max_examples=60, deadline=None)
+@given(size=st.integers(2, 7), seed=st.integers(0, 2**32 - 1),
+       control=st.sampled_from(["load", "line", "spring", "by"]))
+def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
+    rng = np.random.default_rng(seed)
+    factor = rng.normal(size=(size, size)) + np.eye(size)
+    c = factor @ factor.T + 0.05 * np.eye(size)
+    x = np.cumsum(rng.uniform(0.1, 1, size))
+    x = x - (x[0] + x[-1]) / 2
+    gap, pair = 100 * rng.normal(size=size), pair_on(x, c)
+    line, spring = rng.uniform(-0.49, 0.49) * np.ptp(x), 10.0**rng.uniform(-3, 3)
+    if control == "by":
+        state = press_by(pair, gap, gap.min() + 100)
+        wanted, = by_enumeration(c, x, gap - gap.min() - 100)
+    else:
+        moment = None if control == "load" else 100 * line
+        state = press(pair, gap, 100.0, moment, spring=spring if control == "spring" else 0.0)
+        wanted, *motion = by_enumeration(c, x, gap, 100.0, moment, spring if control == "spring" else 0.0)
+        assert state.approach == pytest.approx(motion[0], rel=1e-9, abs=1e-8)
+    assert np.abs(forces(pair, state) - wanted).max() <= 1e-9 * wanted.sum()
+
+
+def test_exact_two_nodes():
+    """Held: both touch when N (C_11 - C_12) exceeds the step; free: statics alone."""
+    x, c = np.array([-1e-3, 1e-3]), 1e-9 * np.array([[3.0, 1.0], [1.0, 2.0]])
+    pair, gap = pair_on(x, c), np.array([0.0, 4e-9])
+    assert forces(pair, press(pair, gap, 1.0)) == pytest.approx([1.0, 0.0])
+    first = (10 * (c[1, 1] - c[0, 1]) + gap[1]) / (c[0, 0] + c[1, 1] - 2 * c[0, 1])
+    assert forces(pair, press(pair, gap, 10.0)) == pytest.approx([first, 10 - first], rel=1e-13)
+    free = press(pair, gap, 10.0, 4e-3)
+    assert forces(pair, free) == pytest.approx([3.0, 7.0], rel=1e-13)
+    assert free.rotation == pytest.approx(-(gap[1] - gap[0] + c[1] @ [3, 7] - c[0] @ [3, 7]) / 2e-3, rel=1e-12)
+
+
+def test_exact_three_flat_nodes():
+    x, c = np.array([-1e-3, 0.0, 1e-3]), 1e-9 * np.array([[3.0, 1.0, 0.5], [1.0, 2.0, 1.0], [0.5, 1.0, 3.0]])
+    pair = pair_on(x, c)
+    share = np.linalg.solve(c, np.ones(3))
+    for state in (press(pair, np.zeros(3), 5.0), press(pair, np.zeros(3), 5.0, 0.0)):
+        assert forces(pair, state) == pytest.approx(5 * share / share.sum(), rel=1e-13)
+        assert state.approach == pytest.approx(5 / share.sum(), rel=1e-13) and abs(state.rotation) <= 1e-20
+
+
+# ---- one node touching
+
+@pytest.mark.parametrize("node", [1, 37, 50, 88])
+def test_exact_one_node_below_the_line_carries_all(node):
+    """The rotation is not unique then; any that opens the others is an answer, and none is preferred to some."""
+    pair = coated_pair(100)
+    x, c = pair.interface.x, pair.normal
+    gap = 1e-2 * np.abs(x - x[node])
+    for moment in (None, LOAD * x[node]):
+        state = press(pair, gap, LOAD, moment)
+        force = forces(pair, state)
+        assert force[node] == pytest.approx(LOAD, rel=1e-15) and np.count_nonzero(force) == 1
+        assert state.approach == pytest.approx(c[node, node] * LOAD, rel=1e-12) and state.rotation == 0
+    leaning = press(pair, gap + tilt(x - x[node], 3e-2), LOAD, LOAD * x[node])
+    assert np.count_nonzero(leaning.sigma_n) == 1 and -0.04 < leaning.rotation < -0.02
+    beside = press(pair, gap, LOAD, LOAD * (x[node] + 1e-9 * LENGTH))
+    assert np.count_nonzero(beside.sigma_n) == 2 and beside.moment == pytest.approx(LOAD * (x[node] + 1e-9 * LENGTH))
+
+
+# ---- sizes
+
+@pytest.mark.parametrize("share", [1e-9, 1e-30, 1e-100, 1e-190])
+@pytest.mark.parametrize("moment", [None, 0.0])
+def test_exact_a_vanishing_load(share, moment):
+    """Flat pieces are linear; of a crown only the crest touches, and closes by its own compliance."""
+    pair = coated_pair(100)
+    whole, part = (press(pair, np.zeros(101), f * LOAD, moment) for f in (1.0, share))
+    assert np.abs(part.sigma_n / share - whole.sigma_n).max() <= 1e-12 * whole.sigma_n.max()
+    crest = press(pair, crown(pair.interface.x, 1.0), share * LOAD, moment)
+    assert np.count_nonzero(crest.sigma_n) == 1
+    assert crest.approach == pytest.approx(share * LOAD * pair.normal[50, 50], rel=1e-12)
+
+
+@pytest.mark.parametrize("load", [1e-300, 5e-324, 1e-201])
+def test_refuses_a_load_without_digits(load):
+    with pytest.raises(PatchfemError, match=r"contact\.load: .* too small .* take 0"):
+        press(coated_pair(100), np.zeros(101), load)
+
+
+@pytest.mark.parametrize("load", [1e201, 1.7e308, np.inf, np.nan, -1.0])
+def test_refuses_a_load_that_is_no_load(load):
+    with pytest.raises(PatchfemError, match=r"contact\.load: "):
+        press(coated_pair(100), np.zeros(101), load)
+
+
+def test_refuses_an_overlap_without_digits():
+    with pytest.raises(PatchfemError, match=r"contact\.approach: .* too small"):
+        press_by(coated_pair(100), np.zeros(101), 1e-300)
+
+
+@pytest.mark.parametrize("moment", [None, LOAD * 1e-5])
+def test_refuses_an_indefinite_compliance(moment):
+    c = -coated_pair(100).normal
+    with pytest.raises(NotConverged, match="not positive definite"):
+        press(pair_on(coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
+
+
+@pytest.mark.parametrize("control", ["load", "line", "spring"])
+def test_exact_spikes_of_a_metre_are_as_if_their_nodes_were_not_there(control):
+    pair = coated_pair(100)
+    x, rng = pair.interface.x, np.random.default_rng(4)
+    gap, spikes = rough(rng, x, 3e-7), np.zeros(101, bool)
+    spikes[rng.choice(np.arange(1, 100), 30, replace=False)] = True
+    moment, spring = {"load": (None, 0.0), "line": (LOAD * 2e-3, 0.0), "spring": (LOAD * 2e-3, 1e4)}[control]
+    state = press(pair, gap + spikes, LOAD, moment, spring=spring)
+    kept = np.flatnonzero(~spikes)
+    alone = pair_on(x[kept], pair.normal[np.ix_(kept, kept)])
+    other = press(alone, gap[kept], LOAD, moment, spring=spring)
+    assert np.abs(forces(pair, state)[kept] - forces(alone, other)).max() <= 1e-9 * LOAD
+    assert state.approach == pytest.approx(other.approach, rel=1e-9)
+    assert max(state.residuals.values()) <= SOLVED and not state.sigma_n[spikes].any()
+
+
+def test_exact_two_spikes_downward_carry_the_load_by_statics():
+    pair = coated_pair(100)
+    x, gap = pair.interface.x, np.zeros(101)
+    gap[[20, 70]] = -1.0, -0.5
+    state = press(pair, gap, LOAD, LOAD * 1e-3)
+    share = (1e-3 - x[20]) / (x[70] - x[20])
+    force = forces(pair, state)
+    assert force[70] == pytest.approx(share * LOAD, rel=1e-12) and force[20] == pytest.approx((1 - share) * LOAD)
+    assert np.count_nonzero(force) == 2 and state.rotation == pytest.approx(-0.5 / (x[70] - x[20]), rel=1e-6)
+
+
+@pytest.mark.parametrize("offset", [1e3, -1e3, 1e6])
+@pytest.mark.parametrize("moment", [None, LOAD * 2e-3])
+def test_exact_a_gap_a_kilometre_away(offset, moment):
+    """The forces are those of the gap as it was rounded there; the approach is the sum."""
+    pair = coated_pair(100)
+    far = offset + crown(pair.interface.x, 1.0)
+    near = far - offset  # exact: they are within a factor of two
+    one, two = press(pair, far, LOAD, moment), press(pair, near, LOAD, moment)
+    assert np.abs(one.sigma_n - two.sigma_n).max() <= 1e-12 * two.sigma_n.max()
+    assert one.approach == pytest.approx(offset + two.approach, rel=1e-15)
+    assert max(one.residuals.values()) <= SOLVED
+    by = press_by(pair, far, offset + 1e-6)
+    same = press_by(pair, near, (offset + 1e-6) - offset)
+    assert np.abs(by.sigma_n - same.sigma_n).max() <= 1e-12 * same.sigma_n.max()
+
+
+# ---- the edge of tipping
+
+@pytest.mark.parametrize("share", [0.499, 0.4999, 0.499999, 0.499999999])
+@pytest.mark.parametrize("side", [1, -1])
+def test_exact_a_load_line_at_the_edge_of_tipping(share, side):
+    pair = coated_pair(100)
+    x, line = pair.interface.x, side * share * LENGTH
+    for gap in (np.zeros(101), crown(x, 1.0), 1e-6 * np.random.default_rng(1).normal(size=101)):
+        state = press(pair, gap, LOAD, LOAD * line)
+        force = forces(pair, state)
+        assert abs(force.sum() - LOAD) <= 1e-12 * LOAD and abs(force @ x - LOAD * line) <= 1e-12 * LOAD * LENGTH
+        assert max(state.residuals.values()) <= SOLVED and force.min() >= 0
+        if np.count_nonzero(force) == 2:
+            a, b = np.flatnonzero(force)
+            assert force[b] == pytest.approx(LOAD * (line - x[a]) / (x[b] - x[a]), rel=1e-6)
+    if share > 0.4999:
+        last = forces(pair, press(pair, np.zeros(101), LOAD, LOAD * line))[-1 if side > 0 else 0]
+        assert last == pytest.approx(LOAD, rel=200 * (0.5 - share))
+
+
+@pytest.mark.parametrize("share", [0.5, np.nextafter(0.5, 0), 0.5000001, 0.7, 1e3, -0.5, -0.6])
+def test_refuses_a_load_line_at_or_beyond_the_end(share, monkeypatch):
+    monkeypatch.setattr(unilateral, "solve", lambda *_: pytest.fail("solved before it was refused"))
+    with pytest.raises(PatchfemError, match=r"contact\.load_line: .* tips over"):
+        press(coated_pair(100), np.zeros(101), LOAD, LOAD * share * LENGTH)
+
+
+@pytest.mark.parametrize("change", [{"moment": np.nan}, {"moment": 0.0, "spring": -1.0},
+                                    {"moment": 0.0, "spring": np.nan}])
+def test_refuses_a_moment_or_spring_without_meaning(change):
+    with pytest.raises(PatchfemError, match=r"contact\.load_line"):
+        press(coated_pair(100), np.zeros(101), LOAD, **change)
+
+
+def test_exact_a_spring_holds_a_load_line_beyond_the_end():
+    """All force on the last node, the spring takes the rest of the moment."""
+    pair = coated_pair(100)
+    x = pair.interface.x
+    state = press(pair, 1e-2 * (x[-1] - x), LOAD, LOAD * LENGTH, spring=1e4)
+    assert forces(pair, state)[-1] == pytest.approx(LOAD, rel=1e-13)
+    assert state.rotation == pytest.approx((LOAD * x[-1] - LOAD * LENGTH) / 1e4, rel=1e-12)
+
+
+# ---- ties
+
+@pytest.mark.parametrize("moment", [None, 0.0])
+def test_exact_equal_heights_share_as_their_compliance_says(moment):
+    """A flat top of 21 equal nodes between deep valleys: the forces of the block alone."""
+    pair = coated_pair(100)
+    gap, top = np.full(101, 1e-3), slice(40, 61)
+    gap[top] = 0.0
+    share = np.linalg.solve(pair.normal[top, top], np.ones(21))
+    state = press(pair, gap, LOAD, moment)
+    assert np.abs(forces(pair, state)[top] - LOAD * share / share.sum()).max() <= 1e-12 * LOAD
+    assert state.approach == pytest.approx(LOAD / share.sum(), rel=1e-12)
+
+
+def test_exact_flat_faces_under_no_moment_do_not_turn():
+    pair = coated_pair(200)
+    share = np.linalg.solve(pair.normal, np.ones(201))
+    state = press(pair, np.zeros(201), LOAD, 0.0)
+    assert np.abs(forces(pair, state) - LOAD * share / share.sum()).max() <= 1e-12 * LOAD
+    assert abs(state.rotation) <= 1e-13 * state.approach / LENGTH
+    assert np.abs(state.sigma_n - state.sigma_n[::-1]).max() <= 1e-11 * state.sigma_n.max()
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), levels=st.integers(1, 4), line=st.sampled_from([None, 0.0, 1e-3]))
+def test_always_steps_of_equal_height_are_solved(seed, levels, line):
+    """Duplicated values are mirrored exactly with their gap."""
+    pair = coated_pair(100)
+    gap = 1e-7 * np.random.default_rng(seed).integers(0, levels, 101)
+    state = press(pair, gap, LOAD, None if line is None else LOAD * line)
+    back = press(pair, gap[::-1].copy(), LOAD, None if line is None else -LOAD * line)
+    assert max(state.residuals.values()) <= SOLVED
+    assert np.abs(state.sigma_n - back.sigma_n[::-1]).max() <= 1e-8 * state.sigma_n.max()
+
+
+# ---- what stands behind the active set
+
+CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])  # from all and from the overlap
+
+
+def test_exact_sets_that_come_back_are_left_to_the_gradients():
+    gap, x = np.array([2e-9, -8e-9, 8e-9]), np.array([-1e-3, 0, 1e-3])
+    ask = Ask(x, gap)
+    for start in (gap < 0, np.ones(3, bool)):
+        assert settle(Operator(CYCLE), ask, start)[0] is None
+    state = press_by(pair_on(x, CYCLE), gap + 8e-9, 8e-9)
+    wanted, = by_enumeration(CYCLE, x, gap)
+    assert forces(pair_on(x, CYCLE), state) == pytest.approx(wanted, rel=1e-12)
+
+
+CONTROLS = {"load": (LOAD, None, 0.0), "line": (LOAD, 2e-3 * LOAD, 0.0), "spring": (LOAD, 2e-3 * LOAD, 1e4),
+            "soft spring": (LOAD, 2e-3 * LOAD, 1.0), "by": (None, None, 0.0)}
+SHAPES = {"flat": lambda x: 0 * x, "tilt": lambda x: 1e-4 * x, "crown": lambda x: crown(x, 1.0),
+          "rough": lambda x: rough(np.random.default_rng(3), x, 1e-6),
+          "noise": lambda x: 1e-6 * np.random.default_rng(3).normal(size=x.size)}
+
+
+@pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES.keys())
+def test_exact_gradients_and_descent_reach_the_same_forces_in_every_control(shape, control):
+    pair = coated_pair(100)
+    gap = shape(pair.interface.x)
+    ask = Ask(pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control)
+    operator = Operator(pair.normal)
+    wanted = solve(operator, ask)
+    near, count = gradients(operator, ask)
+    assert np.abs(near - wanted.force).max() <= 1e-8 * wanted.force.sum() and count <= 400
+    start = np.zeros(101) if ask.load is None else nearest(np.full(101, LOAD / 101), np.stack(
+        [np.ones(101), ask.x], axis=1), np.array([LOAD, (ask.moment or 0.0)]))
+    found, _ = descend(operator, ask, start)
+    assert np.abs(found.force - wanted.force).max() <= 1e-10 * wanted.force.sum()
+
+
+@pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
+def test_exact_answers_do_not_change_where_every_set_comes_back(control, monkeypatch):
+    pair = coated_pair(100)
+    gap = rough(np.random.default_rng(3), pair.interface.x, 1e-6)
+    ask = Ask(pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control)
+    wanted = solve(Operator(pair.normal), ask)
+    monkeypatch.setattr(unilateral, "settle", lambda _, ask, start, limit: (None, start, 1))
+    found = solve(Operator(pair.normal), ask)
+    assert np.abs(found.force - wanted.force).max() <= 1e-10 * wanted.force.sum()
+    assert found.closing == pytest.approx(wanted.closing, rel=1e-10, abs=1e-20)
+
+
+def test_refuses_to_return_what_did_not_converge(monkeypatch):
+    pair = coated_pair(100)
+    wrong = solve(Operator(pair.normal), Ask(pair.interface.x, np.zeros(101), LOAD))
+    for bad in (wrong._replace(closing=wrong.closing * (1 + 1e-9)), wrong._replace(force=wrong.force * (1 + 1e-9))):
+        monkeypatch.setattr(unilateral, "solve", lambda *_, bad=bad: bad)
+        with pytest.raises(NotConverged, match="exceeds 1e-12"):
+            press(pair, np.zeros(101), LOAD)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), size=st.integers(2, 60))
+def test_exact_nearest_forces_are_a_projection(seed, size):
+    """f - y = rigid q on f > 0 and y + rigid q <= 0 elsewhere: the conditions of the nearest point."""
+    rng = np.random.default_rng(seed)
+    rigid = np.stack([np.ones(size), np.linspace(-1, 1, size)], axis=1)
+    y, sums = rng.normal(size=size) * 10.0**rng.uniform(-3, 3), np.array([1.0, rng.uniform(-0.99, 0.99)])
+    f = nearest(y, rigid, sums)
+    assert np.abs(rigid.T @ f - sums).max() <= 1e-12 and f.min() >= 0
+    if np.count_nonzero(f) > 1:
+        q = np.linalg.lstsq(rigid[f > 0], (f - y)[f > 0], rcond=None)[0]
+        size = np.abs(y).max() + np.abs(rigid @ q).max()
+        assert np.abs(f - np.maximum(y + rigid @ q, 0)).max() <= 1e-9 * size
+
+
+# ---- parts of the start
+
+@settings(max_examples=80, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), line=st.floats(-0.49, 0.49), power=st.floats(-4, 4), held=st.booleans())
+def test_exact_the_rest_position_of_a_rigid_piece(seed, line, power, held):
+    """Its lowest points straddle the load line, or with a spring balance what the spring leaves of the moment."""
+    rng = np.random.default_rng(seed)
+    x, gap, spring = np.linspace(-1, 1, 40), rng.normal(size=40), 10.0**power if held else 0.0
+    theta = rest(x, gap, 1.0, 2 * line, spring)
+    height = gap + theta * x
+    low = x[height <= height.min() + 1e-12]
+    assert low[0] - 1e-9 <= 2 * line + spring * theta <= low[-1] + 1e-9
+
+
+@pytest.mark.parametrize("control", list(CONTROLS.values())[:3])
+@pytest.mark.parametrize("shape", list(SHAPES.values()))
+def test_always_coarser_nodes_leave_few_sets_to_try(shape, control):
+    pair = coated_pair(400)
+    ask = Ask(pair.interface.x, shape(pair.interface.x), *control)
+    wanted = solve(Operator(pair.normal), ask)
+    lean = 0.0 if ask.moment is None else rest(ask.x, ask.gap, *control)
+    level = ask.gap + lean * ask.x
+    turned = ask._replace(gap=level - level.min(),
+                          moment=None if ask.moment is None else ask.moment + ask.spring * lean)
+    start, _ = nested_set(Operator(pair.normal), turned)
+    assert settle(Operator(pair.normal), turned, start)[2] <= 6 and wanted.iterations <= 20
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), gone=st.integers(0, 9), new=st.integers(0, 9))
+def test_exact_a_changed_factor_solves_as_a_new_one(seed, gone, new):
+    rng, pair = np.random.default_rng(seed), coated_pair(200)
+    active = np.zeros(201, bool)
+    active[rng.permutation(201)[:SMALL + 40]] = True
+    operator = Operator(pair.normal)
+    operator.solver(active)
+    kept = operator.low
+    other = active.copy()
+    other[rng.permutation(np.flatnonzero(active))[:gone]] = False
+    other[rng.permutation(np.flatnonzero(~active))[:new]] = True
+    sides = rng.normal(size=(np.count_nonzero(other), 2))
+    found = operator.solver(other)(sides)
+    index = np.flatnonzero(other)
+    wanted = np.linalg.solve(pair.normal[np.ix_(index, index)], sides)
+    assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max()
+    assert operator.low is kept or (gone + new) * 12 > other.sum()
+
+
+# ---- random gaps on random operators, every control
+
+@cache
+def _real() -> Compliance:
+    return coated_pair(400)
+
+
+def random_operator(rng, size):
+    """(x, C): nodes of the coated pair, picked or in a row, or a random matrix of condition up to 1e6."""
+    kind = rng.integers(4)
+    if kind < 2:
+        first = rng.integers(0, 402 - size)
+        index = np.sort(rng.choice(401, size, replace=False)) if kind else np.arange(first, first + size)
+        x, c = _real().interface.x[index], _real().normal[np.ix_(index, index)]
+    else:
+        x = np.sort(rng.uniform(-0.5, 0.5, size)) + np.linspace(-1e-3, 1e-3, size)
+        x = x * LENGTH / np.ptp(x)
+        turn = np.linalg.qr(rng.normal(size=(size, size)))[0]
+        c = 1e-9 * (turn * 10.0**-rng.uniform(0, rng.uniform(0, 6), size)) @ turn.T
+        c = (c + c.T) / 2
+    return x - (x[0] + x[-1]) / 2, c
+
+
+def random_gap(rng, x):
+    """White noise, waves, spikes, steps or mixed scales of 1e-12 to 1e-2 m."""
+    size, m = 10.0**rng.uniform(-12, -2), x.size
+    return (lambda: size * rng.normal(size=m), lambda: rough(rng, x, size),
+            lambda: size * rng.normal(size=m) * (rng.random(m) < 0.1),
+            lambda: size * np.cumsum(rng.random(m) < 0.1) * rng.choice([-1, 1]),
+            lambda: sum(10.0**rng.uniform(-12, -2) * rng.normal(size=m) for _ in range(3)))[rng.integers(5)]()
+
+
+def random_state(seed, control):
+    """(pair, gap, state) of a random question; loads from almost one node to almost all."""
+    rng = np.random.default_rng([seed, control])
+    x, c = random_operator(rng, rng.integers(5, 202))
+    pair, gap = pair_on(x, c), random_gap(rng, x)
+    depth = np.ptp(gap) * 10.0**rng.uniform(-3, 3) if np.ptp(gap) > 0 else 1e-6
+    load, line = depth / c.max(), rng.uniform(-0.499, 0.499) * np.ptp(x)
+    if control == 0:
+        return pair, gap, press(pair, gap, load)
+    if control == 1:
+        return pair, gap, press(pair, gap, load, load * line)
+    if control == 2:
+        return pair, gap, press_by(pair, gap, gap.min() + depth)
+    return pair, gap, press(pair, gap, load, 2 * load * line, spring=10.0**rng.uniform(-3, 10))
+
+
+def campaign(control, seeds):
+    for seed in seeds:
+        pair, gap, state = random_state(seed, control)
+        x, force, base = pair.interface.x, forces(pair, state), gap.min()
+        assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= SOLVED, (control, seed)
+        bent = pair.normal @ force
+        terms = np.abs(gap) + np.abs(state.rotation * x) + abs(state.approach) + np.abs(pair.normal) @ force + abs(base)
+        opening = (gap + state.rotation * x - state.approach + bent) / terms
+        assert force.min() >= 0 and opening.min() >= -SOLVED, (control, seed)
+        assert force @ np.abs(opening) <= SOLVED * force.sum(), (control, seed)
+
+
+CONTROL_NAMES = ["load", "load and moment", "approach", "load and spring"]
+
+
+@pytest.mark.parametrize("control", range(4), ids=CONTROL_NAMES)
+def test_always_150_random_gaps_on_random_operators(control):
+    campaign(control, range(150))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("control", range(4), ids=CONTROL_NAMES)
+def test_always_3000_random_gaps_on_random_operators(control):
+    campaign(control, range(150, 3150))
