@@ -11,7 +11,8 @@ rest, G_{j+1,i} = P_j G_{j,i} for i <= j. Normal and tangential compliance come 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix
-from threadpoolctl import threadpool_limits
+
+from .threads import one_thread
 
 
 def _blocks(matrix: csr_matrix, columns: int) -> tuple:
@@ -72,7 +73,7 @@ def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
 
 def _swept(diagonal, upper) -> np.ndarray:
     columns, size = diagonal.shape[:2]
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         right = np.empty_like(diagonal)
         propagate = np.empty_like(upper)
         right[-1] = diagonal[-1]

@@ -11,15 +11,14 @@ no slip zone shrinks within it (any stroke at constant load and gap); `slip_path
 """
 
 from dataclasses import dataclass, field
-from functools import cache
 from types import MappingProxyType
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from ..core import Compliance, NotConverged, PatchfemError, frozen_array
 from .slip_sets import Kept, bounded_shear, press_forces
 from .slip_unlike import coupled_forces
+from .threads import one_thread
 from .unilateral import residuals
 
 LIMIT = 1e-10  # largest relative residual that still counts as solved
@@ -136,7 +135,7 @@ def advance(state: SlipState, operators: Operators, step: Step, friction: float)
         return _parted(state, gap, step, friction)
     if step.load is not None:
         _held(step.shear, friction * step.load)
-    with _threads().limit(limits=1, user_api="blas"):
+    with one_thread():
         solve = _alike if operators.coupling is None or friction == 0 else _unlike
         normal, motion, shear, slide, sign, count = solve(state, operators, gap, step, friction)
     approach = float(motion[0]) if step.approach is None else step.approach
@@ -153,12 +152,6 @@ def advance(state: SlipState, operators: Operators, step: Step, friction: float)
     lost = float(shear @ (slip - state.slip))
     return _state(normal, shear, slip, sign, gap, approach, rotation, slide, friction, state.dissipated + lost, count,
                   checks)
-
-
-@cache
-def _threads() -> ThreadpoolController:
-    """Found once: a search takes longer than an increment."""
-    return ThreadpoolController()
 
 
 def _meant(step: Step, operators: Operators, friction: float) -> None:

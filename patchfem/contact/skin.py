@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from threadpoolctl import threadpool_limits
 
 from ..core import NotConverged, Outcome, PatchfemError, frozen_array
 from .skin_laws import ExponentialSkin, LinearSkin
+from .threads import one_thread
 from .unilateral import LIMIT, solve_forces
 
 FLOOR = -600.0  # log pressure below which an approach does not reach the skin
@@ -261,7 +261,7 @@ def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarra
     if start is not None:
         start = replace(start, theta=start.theta - rotation)
     force, s, motion, count, checks = np.zeros(x.size), gap - gap.min(), np.array([gap.min()]), 0, {}
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         if load != 0 and isinstance(skin, LinearSkin):
             force, s, motion, count = _linear(skin, c, x, weight, gap, target, approach, start, spring)
         elif load != 0:
@@ -301,6 +301,6 @@ def tangent(c: np.ndarray, weight: np.ndarray, stiffness: np.ndarray) -> float:
     d = weight * stiffness
     live = _live(d)
     root = np.sqrt(d[live])
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         system = np.eye(live.size) + root[:, None] * c[np.ix_(live, live)] * root
         return float(root @ cho_solve(cho_factor(system, lower=True), root))

@@ -13,9 +13,9 @@ Point i feels the local slide q - sum_j C_ij f_j. Two reductions, both of the co
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..core import PatchfemError, frozen_array
+from .threads import one_thread
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -158,7 +158,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     """
     index = np.flatnonzero(limit > 0)
     root = np.sqrt(limit[index])
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
     values, vectors = values[::-1], vectors[:, ::-1]
     jump = values[0] / bond_length * (weakening - 1)
@@ -170,7 +170,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     elastic = 2 * np.abs(shape @ (values * (shape.T @ limit[index]))).max()
     slides = (6 * bond_length + elastic) * (np.arange(1, 25) / 24) ** 2
     many = max(64, 4 * count)
-    with threadpool_limits(1, "blas"), np.errstate(over="ignore", invalid="ignore"):
+    with one_thread(), np.errstate(over="ignore", invalid="ignore"):
         full = _backbone(limit[index], shape[:, :many], values[:many], bond_length, slides)
         few = _backbone(limit[index], shape[:, :count], values[:count], bond_length, slides)
     error = float(np.abs(full - few).max() / limit.sum())

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import csc_matrix
 from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri
-from threadpoolctl import threadpool_limits
 
 from ..core import NotConverged, frozen_array
 from .dissect import dissection
 from .elasticity import Layers, hooke, lame
 from .factor import factorise
 from .stiffness import stiffness
+from .threads import one_thread
 
 RESIDUAL = 1e-8  # of a solve with random loads, relative
 
@@ -68,7 +68,7 @@ def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
 def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
     order, firsts = elimination(mesh)
     matrix = _stiffness(mesh, layers, order)
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         found = factorise(matrix, firsts, name)
         load = np.random.default_rng(0).normal(size=(matrix.shape[0], 1))
         miss = np.abs(matrix @ found.solve(load) - load).max() / np.abs(load).max()
@@ -115,7 +115,7 @@ def condense(piece: Substructure) -> tuple:
 
     nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x.
     """
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         both = piece.factor.compliance()
     both = (both + both.T) / 2
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))
@@ -139,7 +139,7 @@ def displacement(piece: Substructure, shear: np.ndarray, normal: np.ndarray) -> 
     frames, m = normal.shape
     load = np.zeros((piece.order.size, 2, frames))
     load[-m:, 0], load[-m:, 1] = shear.T, normal.T
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         u = piece.factor.solve(load.reshape(-1, frames)).reshape(-1, 2, frames)
     out = np.zeros((frames, len(piece.mesh.points), 2))
     out[:, piece.order] = np.moveaxis(u, 2, 0)

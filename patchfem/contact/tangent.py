@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from ..core import NotConverged, PatchfemError, frozen_array
 from .partial_slip import Operators
+from .threads import one_thread
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,7 +59,7 @@ def operating_tangent(operators: Operators, active, slipping=None, friction: flo
     core = system[np.ix_(known, known)]
     core[:, slips] += system[np.ix_(known, n + slips)] * (sign[slips] * friction)
     try:
-        with threadpool_limits(1, "blas"):
+        with one_thread():
             found = np.linalg.solve(core, motion[known])
     except np.linalg.LinAlgError:
         raise NotConverged("contact: the tangent is singular; friction times the coupling of the unlike pieces is too "

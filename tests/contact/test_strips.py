@@ -12,7 +12,7 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
 from patchfem.closed_contact import wedge_linear, wedge_opening, wedge_skin
 from patchfem.contact import skin as skins
-from patchfem.contact import strips
+from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
 from patchfem.contact.slip import normal_stiffness, tangential_stiffness
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
@@ -315,11 +315,11 @@ def test_exact_going_down_the_dual_alone_finds_the_same(skin, control, monkeypat
     c, x, weight, y = real(4, 24)
     gap = random_gaps(np.random.default_rng(8), x, 4, 1e-6)
     state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
-    first = strips._linearised(*_smooth_case(skin, c, x, weight, gap + 1e-4 * y[:, None], control)) \
+    first = strips_solve._linearised(*_smooth_case(skin, c, x, weight, gap + 1e-4 * y[:, None], control)) \
         if isinstance(skin, ExponentialSkin | HertzSkin) else None
-    monkeypatch.setattr(strips, "_active_set", lambda *a: None)
-    monkeypatch.setattr(strips, "_newton", lambda *a: None)
-    monkeypatch.setattr(strips, "_linearised", lambda *a: first)
+    monkeypatch.setattr(strips_solve, "_active_set", lambda *a: None)
+    monkeypatch.setattr(strips_solve, "_newton", lambda *a: None)
+    monkeypatch.setattr(strips_solve, "_linearised", lambda *a: first)
     other = press_strips(c, x, weight, y, gap, 1e-4, LOAD, skin=skin, **control)
     assert np.abs(other.force - state.force).max() <= 1e-10 * LOAD
     assert other.delta == pytest.approx(state.delta, rel=1e-9)
@@ -330,7 +330,7 @@ def _smooth_case(skin, c, x, weight, gap, control):
     if isinstance(skin, ExponentialSkin):
         skin = ExponentialSkin(skin.u0, MEAN)
     target = np.array([LOAD] + ([control["moment"]] if control else []))
-    motions, spring, scale = strips._holder(x, target.size, control.get("spring", 0.0))
+    motions, spring, scale = strips_solve.holder_motions(x, target.size, control.get("spring", 0.0))
     return skin, c, x, weight, gap, motions, target / scale, spring
 
 
