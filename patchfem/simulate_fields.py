@@ -14,7 +14,8 @@ def write_fields(result, path: Path) -> dict:
     patch, fields = result.patch, result.fields
     times = fields["time"]
     interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
-    low, high = _body(patch, fields, "lower"), _body(patch, fields, "upper")
+    loads = [_loads(patch, fields, side) for side in ("lower", "upper")]
+    low, high = (_body(patch, fields, side, motion) for side, motion in zip(("lower", "upper"), _motions(patch, loads)))
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].shares(other["error"])[0]
     joined = [interface] if patch.pair.joint is None else \
@@ -39,8 +40,32 @@ def _moved(interface: dict, x, nodes) -> dict:
             for name, rows in interface.items()}
 
 
-def _body(patch, fields: dict, side: str) -> dict:
-    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface."""
+def _loads(patch, fields: dict, side: str) -> tuple:
+    """(shear, normal) (1 + f, n) [N/m] on the nodes of a piece: the pressed state, then the shear of every frame."""
+    sign, at = (-1.0, 0) if side == "lower" else (1.0, 1)
+    force = patch.pieces.interface.weight / patch.pieces.interface.width
+    tau = fields.get("shear_stress", np.zeros((len(fields["time"]), force.size)))
+    shear = patch.pair.forces(np.concatenate([np.zeros((1, force.size)), -sign * tau * force]))[at]
+    normal = np.zeros_like(shear)
+    normal[0] = patch.pair.forces(patch.pressure.sigma_n * force)[at]
+    return shear, normal
+
+
+def _motions(patch, loads: list) -> list:
+    """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
+    from .contact import elasticity, substructure
+
+    pair = patch.pair
+    how = elasticity.displacement if isinstance(pair.piece, elasticity.Piece) else substructure.displacement
+    if pair.upper is pair.piece:
+        both = how(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
+        return np.split(both, 2)
+    return [how(piece, *load) for piece, load in zip((pair.piece, pair.upper), loads)]
+
+
+def _body(patch, fields: dict, side: str, u) -> dict:
+    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
+    u: of `_motions`."""
     from .contact import bond
     from .contact.elasticity import von_mises
     from .contact.recovery import cells_of, indicator, recovery
@@ -48,12 +73,7 @@ def _body(patch, fields: dict, side: str) -> dict:
     lower = side == "lower"
     piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
     sign = -1.0 if lower else 1.0
-    force = patch.pieces.interface.weight / patch.pieces.interface.width
-    tau = fields.get("shear_stress", np.zeros((len(fields["time"]), force.size)))
-    shear = patch.pair.forces(np.concatenate([np.zeros((1, force.size)), -sign * tau * force]))[0 if lower else 1]
-    normal = np.zeros_like(shear)
-    normal[0] = patch.pair.forces(patch.pressure.sigma_n * force)[0 if lower else 1]
-    points, blocks, interface, u, stress = _inside(piece, grid, shear, normal)
+    points, blocks, interface, stress = _inside(piece, grid, u)
     u, stress, cells = u[:1] + u[1:], stress[:1] + stress[1:], cells_of(piece)
     error = indicator(recovery(cells), u, stress)
     bonded = bond.at(cells, bond.bond_line(cells, u), grid.x)
@@ -62,7 +82,7 @@ def _body(patch, fields: dict, side: str) -> dict:
     move, stress = u * [1.0, sign], stress * np.array([1.0, 1.0, 1.0, sign])
     if not lower:
         p = patch.pressure
-        move[..., 0] += fields.get("holder_slide", np.zeros(len(tau)))[:, None] - p.rotation * points[:, 1]
+        move[..., 0] += fields.get("holder_slide", np.zeros(len(move)))[:, None] - p.rotation * points[:, 1]
         move[..., 1] += p.rotation * points[:, 0] - p.approach
     blocks = [block if not lower else block[:, ::-1] for block in blocks]
     return {"points": points * [1.0, sign], "blocks": blocks, "interface": interface, "displacement": move,
@@ -70,17 +90,15 @@ def _body(patch, fields: dict, side: str) -> dict:
             "mises": von_mises(stress), "error": error, "bond": bonded}
 
 
-def _inside(piece, grid, shear, normal) -> tuple:
-    """(points (n, 2) as x and depth, blocks of cells, interface nodes, displacement, cell stress) of a piece."""
+def _inside(piece, grid, u) -> tuple:
+    """(points (n, 2) as x and depth, blocks of cells, interface nodes, cell stress) of a piece displaced by u."""
     from .contact import elasticity
 
     if isinstance(piece, elasticity.Piece):
         rows = grid.depth.size
         points = np.stack([np.repeat(grid.x, rows), np.tile(grid.depth, grid.x.size)], axis=1)
-        u = elasticity.displacement(piece, shear, normal)
-        return points, [piece.cells], np.arange(0, len(points), rows), u, elasticity.cell_stress(piece, u)[0]
+        return points, [piece.cells], np.arange(0, len(points), rows), elasticity.cell_stress(piece, u)[0]
     from .contact import substructure
 
-    u = substructure.displacement(piece, shear, normal)
     blocks = [block for block in (grid.triangles, grid.quads) if len(block)]
-    return grid.points, blocks, grid.interface, u, substructure.cell_stress(piece, u)[0]
+    return grid.points, blocks, grid.interface, substructure.cell_stress(piece, u)[0]

@@ -86,7 +86,8 @@ def write(result: Result, path: Path) -> dict:
 def resolved(scene) -> str:
     """The scene in SI with every default written out, also those that follow from other keys."""
     contact, friction = scene.contact, scene.friction
-    if contact is not None and contact.element_size is None and contact.mesh is None:
+    graded = scene.kind == "patch" and contact.profile is None  # its mesh follows from the tolerance
+    if contact is not None and contact.element_size is None and contact.mesh is None and not graded:
         from .simulate_bodies import AUTOMATIC_CELLS
 
         contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .contact.slip import normal_stiffness, tangential_stiffness
+from .contact.slip import normal_stiffness, rotational_stiffness, tangential_stiffness
 from .core import Measure, Outcome
 from .simulate_patch import Patch, solve
 
 UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "moment": "N m", "rotation": "rad",
          "approach": "m", "contact_half_width": "m", "pressure_centre": "m", "loaded_fraction": "1",
-         "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1", "pressure_centre_lateral": "m",
-         "roll_moment": "N m"}
+         "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1", "rotational_stiffness": "N m rad-1",
+         "pressure_centre_lateral": "m", "roll_moment": "N m"}
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
 BANDED = ("approach", "pressure_peak", "normal_stiffness", "tangential_stiffness")
 
@@ -78,6 +78,7 @@ def values(patch: Patch) -> dict:
     out["loaded_fraction"] = p.load / (area * peak) if touching else 0.0
     out["normal_stiffness"] = normal_stiffness(patch.pieces.normal, patch.active) if touching else 0.0
     out["tangential_stiffness"] = tangential_stiffness(patch.pieces.tangential, patch.active) if touching else 0.0
+    out["rotational_stiffness"] = rotational_stiffness(patch.pieces.normal, x, patch.active) if touching else 0.0
     if patch.strips is not None:
         from .simulate_strips import strip_values
 
@@ -131,7 +132,8 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
     snap = cell / max(2 * cell, mine["contact_fraction"] * length) if cell else 0.0
     least = {"contact_fraction": cell / length, "normal_load": 1e-10 * mine["normal_load"],
              "contact_half_width": cell / 2, "normal_stiffness": snap / 4 * mine["normal_stiffness"],
-             "tangential_stiffness": snap / 4 * mine["tangential_stiffness"]}
+             "tangential_stiffness": snap / 4 * mine["tangential_stiffness"],
+             "rotational_stiffness": snap / 4 * mine["rotational_stiffness"]}
     out = {}
     for name, value in mine.items():
         error = None

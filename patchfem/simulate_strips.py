@@ -41,6 +41,20 @@ def _smooth(skin) -> bool:
     return skin is not None and hasattr(skin, "log_pressure")
 
 
+def rotational_stiffness(state, c, x, weight) -> float:
+    """-dM/d(rotation) [N m/rad] of all strips at fixed approach and contact set; c (m, m) [m/N], weight (m,) of one."""
+    from .contact import slip
+
+    out = 0.0
+    for strip, force in enumerate(state.force):
+        stiff = None if state.stiffness is None else state.stiffness[strip] * weight
+        active = force > 0 if stiff is None else stiff > 1e-12 * (state.stiffness.max() * weight.max())
+        if active.any():
+            skin = 0.0 if stiff is None else np.diag(1 / np.where(active, stiff, 1.0))
+            out += slip.rotational_stiffness(c + skin, x, active)
+    return out
+
+
 def strip_values(patch, peak_of) -> dict:
     """name -> value of what strips change: peak of any strip, share of the area, stiffnesses, and the lateral place of
     the pressure with its roll moment. peak_of: largest pressure of one strip from (x, pressure)."""
@@ -51,9 +65,11 @@ def strip_values(patch, peak_of) -> dict:
            "roll_moment": state.roll_moment}
     out["pressure_peak"] = max(peak_of(patch.x, row) for row in state.pressure)
     if not state.load > 0:
-        return out | {"loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0}
+        return out | {"loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0,
+                      "rotational_stiffness": 0.0}
     out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     out["normal_stiffness"] = strips_tangent(pieces.normal * count, weight, state)
+    out["rotational_stiffness"] = rotational_stiffness(state, pieces.normal * count, patch.x, weight)
     out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state, ratio)
     return out

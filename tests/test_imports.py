@@ -86,8 +86,20 @@ def scene(tmp_path):
 def test_exact_a_patch_needs_no_motion(scene):
     modules = loaded(FROM_PYTHON, scene(PATCH))
     absent(modules, "friction", "structure", "dynamics", "response", "simulate_rig", "simulate_march",
-           "simulate_kernels", "compiled")
+           "simulate_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
+           "contact.mortar", "contact.substructure", "contact.fronts", "contact.halfspace", "contact.partial_slip",
+           "contact.maps", "contact.recovery", "mesh.anymesh", "mesh.rounded", "export")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor", "skfem"} <= modules
+
+
+@pytest.mark.parametrize("table, module", [
+    ('[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n', "contact.skin"),
+    ("[contact.strips]\ncount = 2\n", "contact.strips"),
+], ids=["skin", "strips"])
+def test_exact_an_effect_brings_its_own_module(scene, table, module):
+    modules = loaded(FROM_PYTHON, scene(PATCH + table))
+    assert f"patchfem.{module}" in modules
+    absent(modules, *{"contact.mortar", "surface", "contact.partial_slip"})
 
 
 def test_exact_a_rubbing_point_needs_no_patch(scene):

@@ -216,6 +216,12 @@ def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
     return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
 
 
+def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:
+    """-dM/d(rotation) [N m/rad] about x = 0 at fixed approach and fixed contact set; x (m,) [m]."""
+    index = np.flatnonzero(active)
+    return float(np.linalg.solve(normal[np.ix_(index, index)], x[index]) @ x[index])
+
+
 def normal_stiffness(normal: np.ndarray, active: np.ndarray) -> float:
     """dN/d(approach) [N/m] at fixed rotation and fixed contact set."""
     return tangential_stiffness(normal, active)
