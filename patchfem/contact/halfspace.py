@@ -94,29 +94,40 @@ def press_periodic(compliance_k, gap, length: float, load: float, limit: int | N
 def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tuple:
     """Pressure, closing and iterations; waves[0] = 0."""
     n = gap.size
-    pressure, direction = np.full(n, mean), np.zeros(n)
+    pressure, direction, sunk = np.full(n, mean), np.zeros(n), None
     old, own = 0.0, irfft(waves, n)[0]  # own: what a point sinks under its own pressure
     for count in range(1, limit + 1):
-        sunk = irfft(waves * rfft(pressure), n)
+        carried = sunk is not None
+        if not carried:
+            sunk = irfft(waves * rfft(pressure), n)
         opening = gap + sunk
         touching = pressure > 0
         closing = opening[touching].mean()
         opening -= closing
         depth = np.ptp(sunk) + mean * waves[1]
         if max(np.abs(opening[touching]).max(), -opening.min()) <= tolerance * depth:
-            return pressure, float(closing), count
+            if not carried:
+                return pressure, float(closing), count
+            sunk, old = None, 0.0  # confirmed from the pressure itself before it counts
+            continue
         size = opening[touching] @ opening[touching]
         direction = np.where(touching, opening + (size / old if old > 0 else 0.0) * direction, 0.0)
         answer = irfft(waves * rfft(direction), n)
-        answer -= answer[touching].mean()
-        bend = answer[touching] @ direction[touching]
+        bend = (answer[touching] - answer[touching].mean()) @ direction[touching]
         if not bend > 0 and opening.min() >= 0:  # round-off: nothing left to gain
             return pressure, float(closing), count
         # a lone touching point has no direction; its neighbours enter by their own compliance
         step = (opening[touching] @ direction[touching]) / bend if bend > 0 else 1 / own
-        pressure = np.maximum(pressure - step * direction, 0.0)
+        pressure = pressure - step * direction
+        clipped = pressure.min() < 0
+        if clipped:
+            np.maximum(pressure, 0.0, out=pressure)
         entering = (pressure == 0) & (opening < 0)
-        old = 0.0 if entering.any() else size  # directions are conjugate on one touching set only
-        pressure[entering] -= step * opening[entering]
-        pressure *= mean / pressure.mean()
+        enters = entering.any()
+        old = 0.0 if enters else size  # directions are conjugate on one touching set only
+        if enters:
+            pressure[entering] -= step * opening[entering]
+        scale = mean / pressure.mean()
+        pressure *= scale
+        sunk = None if clipped or enters or count % 50 == 0 else (sunk - step * answer) * scale
     return pressure, float(closing), limit
