@@ -45,7 +45,7 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
         patch, *coarse = solve_all(scene, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         warnings += [*_strained(scene, patch), *patch.notes]
-        if patch.pair.coupling > 0.02:
+        if patch.pair.coupling > 0.02 and scene.kind != "patch":
             warnings.append("the pieces are unlike: what shear does to the normal closing, and the load to the slide, "
                             f"is left out; it is {patch.pair.coupling:.2g} of what shear does to the slide")
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":

@@ -77,7 +77,7 @@ def values(patch: Patch) -> dict:
     touching = p.outcome is not Outcome.NO_CONTACT
     out["loaded_fraction"] = p.load / (area * peak) if touching else 0.0
     out["normal_stiffness"] = normal_stiffness(patch.pieces.normal, patch.active) if touching else 0.0
-    out["tangential_stiffness"] = tangential_stiffness(patch.pieces.tangential, patch.active) if touching else 0.0
+    out["tangential_stiffness"] = shear_stiffness(patch) if touching else 0.0
     out["rotational_stiffness"] = rotational_stiffness(patch.pieces.normal, x, patch.active) if touching else 0.0
     if patch.strips is not None:
         from .simulate_strips import strip_values
@@ -100,6 +100,16 @@ def plane_band(scene, patch: Patch) -> list:
     parts = [f"{name} by {100 * (theirs[name] / mine[name] - 1):+.2g} %" for name in BANDED if mine[name]]
     return [f"plane {contact.plane} is assumed for pieces {ratio:.2g} times as wide as tall; the truth lies towards "
             f"plane {other}, which would change {', '.join(parts)}"]
+
+
+def shear_stiffness(patch: Patch) -> float:
+    """dT/d(slide) [N/m] in stick at held approach and rotation; unlike pieces with the closing that shear causes."""
+    if not patch.pair.closing.any():
+        return tangential_stiffness(patch.pieces.tangential, patch.active)
+    from .contact.partial_slip import operators_of
+    from .contact.tangent import operating_tangent
+
+    return operating_tangent(operators_of(patch.pieces, patch.pair.closing), patch.active).tangential
 
 
 def edge_cells(x, active) -> np.ndarray:
