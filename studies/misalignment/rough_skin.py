@@ -14,8 +14,9 @@ surface has round peaks, 2.7e13 when equally high; and peaks of unequal height l
 One unknown per peak gives these; the ridges resolved by 2^18 points agree to 0.7 %, orders of the heights differ by 10
 to 20 %, and peaks that do not feel each other (Greenwood-Williamson) are 2 % softer, 13 % where only 4 of 1024 touch.
 1e13 Pa/m is the scatter of ridges by 4 to 5 um uniform or 0.2 um Gaussian, of peaks by 0.68 um uniform or 0.13 um
-Gaussian. The hottest peak is under 5.2 GPa when equally high, 11 GPa (about the hardness of carbide) at 50 nm Gaussian,
-46 GPa at 5 um: so a bedded surface has 2e13 to 3e13, a fresh one less than 1e13 and no elastic peaks.
+Gaussian; p/k_n, the u0 of an exponential law, is 0.50, 0.36, 0.29 of a Gaussian scatter of 0.2, 1, 5 um. The hottest
+peak bears 5.2 GPa when all are equally high, 11 GPa (about the hardness of carbide) at 50 nm Gaussian, 46 GPa at 5 um:
+so a bedded surface has 1.8e13 to 2.7e13, a fresh one less than 1e13 and peaks that yield, which this leaves out.
 
 The bare pieces open at 9.28e-6 rad, and a skin adds 2 p/(k_n L), a rigid pad's opening, to 1 %: 9.36e-6 rad at 1e15
 Pa/m, 9.47e-6 at 4.5e14, 1.34e-5 at 2.7e13, 2.06e-5 at 1e13, 1.2e-4 at 1e12, 2.4e-4 at 5e11. Above 1e14 the skin does

@@ -68,6 +68,19 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
         assert abs(two[name].value - value) <= two[name].error <= 0.2 * value
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
+def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
+    from patchfem.simulate_grading import solve_graded
+    from patchfem.simulate_measures import measures
+
+    found = tilted.case(angle, skin)
+    ours, other = tilted.measured(found), measures(*solve_graded(found))
+    for name in ("contact_fraction", "loaded_fraction", "pressure_peak", "pressure_centre", "normal_stiffness",
+                 "tangential_stiffness"):
+        assert abs(ours[name].value - other[name].value) <= ours[name].error + other[name].error
+
+
 def test_always_a_free_piece_keeps_less_than_the_kern(tilted, fixtures):
     for offset, fraction in ((0.15, 1.0), (1 / 3, 0.445)):
         found = coarse(tilted, fixtures.free(offset))
@@ -190,6 +203,9 @@ def test_exact_separate_peaks_of_uniform_heights(asperities):
     """Greenwood and Williamson's integral over uniform heights, here by quadrature of the single peaks."""
     for shape in ("uniform", "gaussian"):
         assert asperities.separate(1e-10, shape) == pytest.approx(asperities.separate(0.0, shape), rel=1e-3)
+    for scatter, share in ((0.2e-6, 0.50), (1e-6, 0.36), (5e-6, 0.29)):
+        decay = asperities.MEAN / asperities.separate(scatter, "gaussian")
+        assert decay / scatter == pytest.approx(share, abs=0.006)
     heights = 1e-6 * (np.arange(20000) + 0.5) / 20000
     modulus = exact.combined_modulus(*asperities.CARBIDE)
     rate = 4 / 3 * modulus * asperities.RADIUS**0.5 / asperities.WAVE**2
