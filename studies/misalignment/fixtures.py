@@ -1,37 +1,57 @@
 """How much of the patch touches when the pieces are misaligned, and what does the fixture decide?
 
-The fixture decides. With a rigid fixture the rig's pieces lose full contact at about 1e-5 rad and touch on half of the
-patch at 3.0e-5 rad, that is 0.38 um over its 12.7 mm, on a fifth at 1.1e-4 rad. A holder of 1e4 N m/rad lets half of it
-touch up to 7.6e-5 rad, one of 1e3 up to 4.9e-4, one of 1e2 up to 4.6e-3 rad (59 um). So "rubbing on a portion of the
-area" (the report's conclusion 5) follows from a machining error of half a micrometre in a fixture stiffer than about
-1e5 N m/rad, and tells nothing about the error as long as the stiffness of the fixture is not known. The smooth elastic
-pieces alone are meant here: a rough skin, which would spread the contact, is not in these numbers.
+The fixture decides. With a rigid one the rig's smooth pieces lose full contact at 9.3e-6 rad and touch on half of the
+patch at 2.9e-5 rad, that is 0.37 um over its 12.7 mm, on a fifth at 1.1e-4 rad:
+
+  tilt      in contact        mean/peak  peak MPa    centre mm  K_n N/um    K_t N/um
+  1e-6      1                 0.700      1.025       -0.207     1850 ± 3    404 ± 2
+  1e-5      0.936 ± 0.006     0.373      1.923       -2.072     1825 ± 5    404 ± 2
+  1e-4      0.219 ± 0.005     0.0862     8.32        -5.324     534 ± 2     229 ± 1
+  1e-3      0.0241 ± 0.0006   0.0118     60.9        -6.241     170 ± 1     120 ± 1
+  1e-2      0.00168 ± 0.0001  0.0009     790 ± 10    -6.342     96 ± 1      84 ± 1
+
+A holder's spring gives way until its moment is that of the pressure, so every row is met later: half contact at 3.4e-5
+rad with 1e5 N m/rad, 7.5e-5 with 1e4, 4.9e-4 with 1e3 and 4.6e-3 rad (59 um) with 1e2. A piece free to rotate keeps
+full contact under a load line up to 0.15 lengths from its middle and touches on 0.445 ± 0.006 of the patch at a third,
+where a rigid pad on springs has L/6 and 0.5 (the kern). No skin is in these numbers: see `skins.py`.
 
 Run: python studies/misalignment/fixtures.py
 """
 
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from patchfem import scene
-from patchfem.simulate_bodies import grid_of
-from patchfem.simulate_measures import values
-from patchfem.simulate_patch import solve
+sys.path.insert(0, str(Path(__file__).parent))
+import tilted
 
-SCENE = Path(__file__).parents[1] / "rig" / "rig.toml"
-TILTS = 10.0 ** np.arange(-6, -1.5, 0.5)
+from patchfem.core import Measure
+from patchfem.simulate_measures import values
+from patchfem.simulate_patch import pressed
+
 SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)  # N m/rad; None: a rigid fixture
-NAMES = ("contact_fraction", "pressure_peak", "pressure_centre", "normal_stiffness", "tangential_stiffness", "rotation")
+OFFSETS = (0.05, 0.1, 1 / 6, 0.2, 0.25, 0.3, 1 / 3, 0.4, 0.45, 0.49)  # of the load line of a free piece, in lengths
+COLUMNS = {"contact_fraction": ("contact", 1), "loaded_fraction": ("loaded", 1), "pressure_peak": ("peak MPa", 1e-6),
+           "pressure_centre": ("centre mm", 1e3), "rotation": ("rotation mrad", 1e3),
+           "normal_stiffness": ("K_n N/um", 1e-6), "tangential_stiffness": ("K_t N/um", 1e-6)}
+
+
+def held(angle: float, spring: float | None, skin: str = "bare"):
+    """Scene of a holder at the neutral angle [rad] with its spring [N m/rad], None: rigid."""
+    more = () if spring is None else (f"holder.rotational_stiffness={spring!r} N m/rad",)
+    return tilted.case(float(angle), skin, *more)
+
+
+def free(offset: float, skin: str = "bare"):
+    """Scene of a piece free to rotate, the load line `offset` lengths from its middle towards the fine edge."""
+    return tilted.case(None, skin, f"load_line.offset={-12.7 * offset!r} mm")
 
 
 def case(angle: float, spring: float | None) -> dict:
-    """Static measures of the rig's pieces at one tilt [rad] of the holder and one holder stiffness [N m/rad]."""
-    sets = [f"contact.tilt.angle={angle!r} rad"]
-    if spring is not None:
-        sets.append(f"contact.holder.rotational_stiffness={spring!r} N m/rad")
-    found = scene.load(SCENE, sets)
-    return {name: value for name, value in values(solve(found, grid_of(found))).items() if name in NAMES}
+    """Values of the measures at one neutral angle [rad] of the holder and one stiffness [N m/rad] of it."""
+    return values(pressed(held(angle, spring), tilted.pair(1)))
 
 
 def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
@@ -46,17 +66,31 @@ def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
     return float(np.sqrt(low * high))
 
 
-def main(tilts=TILTS, springs=SPRINGS) -> dict:
-    """{(tilt, spring): measures}, printed as a table of contact fractions with peak, centre and stiffness."""
-    out = {}
-    for spring in springs:
-        print("rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad")
-        for angle in tilts:
-            found = out[angle, spring] = case(float(angle), spring)
-            print(f"  tilt {angle:8.1e}  contact {found['contact_fraction']:.4f}  "
-                  f"peak {found['pressure_peak'] / 1e6:8.3f} MPa  centre {found['pressure_centre'] * 1e3:7.3f} mm  "
-                  f"K_n {found['normal_stiffness']:.3e}  K_t {found['tangential_stiffness']:.3e} N/m  "
-                  f"rotation {found['rotation']:.2e}")
+def line(found: dict) -> str:
+    """The measures of a case in a row, value and error; no error where it is below a thousandth."""
+    out = []
+    for name, (head, scale) in COLUMNS.items():
+        one = found[name]
+        error = f" ±{one.error * scale:.1g}" if one.error > 1e-3 * abs(one.value) else ""
+        out.append(f"{head} {one.value * scale:.4g}{error}")
+    return "  ".join(out)
+
+
+def table(title: str, named: str, cases: dict, measured: Callable = tilted.measured) -> dict:
+    """{key: measures} of {key: scene}, printed as they come."""
+    print(title)
+    out: dict[float, dict[str, Measure]] = {}
+    for key, found in cases.items():
+        out[key] = measured(found)
+        print(f"  {named} {key:8.3g}  {line(out[key])}", flush=True)
+    return out
+
+
+def main(tilts=tilted.TILTS, springs=SPRINGS, offsets=OFFSETS) -> dict:
+    """{spring or "free": {tilt [rad] or offset [lengths]: measures}}, printed."""
+    out = {spring: table("rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad", "tilt rad",
+                         {tilt: held(tilt, spring) for tilt in tilts}) for spring in springs}
+    out["free"] = table("free to rotate", "offset/length", {offset: free(offset) for offset in offsets})
     return out
 
 

@@ -1,0 +1,122 @@
+"""A rough skin peak by peak: three ways to find its stiffness, none of which shares its equations with another.
+
+Crests lie one WAVE apart with the curvature of the report's 80 um waves, either as ridges across the whole width (plane
+strain) or as round peaks both ways. `one_each` has one unknown force per peak: its own Hertz (peaks) or Westergaard
+(ridges) closing, and what the forces of the others sink it by, summed over the waves of the coated half planes.
+`explicit` resolves the ridges themselves; `separate` is Greenwood and Williamson's peaks, which do not feel each other.
+"""
+
+from functools import cache
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from patchfem import closed_forms as exact
+from patchfem.contact.halfspace import press_periodic, wave_numbers
+from patchfem.contact.skin_laws import HertzSkin
+from patchfem.contact.unilateral import solve_forces
+
+CARBIDE, TITANIUM, COATING = (250e9, 0.24), (121e9, 0.32), 152.4e-6  # rig.toml
+MEAN = 26 * 4.4482216152605 / 12.7e-3**2  # 0.717 MPa, the mean pressure of the rig
+WAVE, HEIGHT = 80e-6, 15.5e-6  # report, 4.D: 80 micron scale, amplitude 13 to 18 micron
+RADIUS = WAVE**2 / (4 * np.pi**2 * HEIGHT)  # 10.5 um, of a crest
+LATTICE = -3.9002649  # sum of 1/r over a square lattice less its mean
+
+
+def depths(count: int, scatter: float, shape: str, seed: int = 0) -> np.ndarray:
+    """(count,) depths [m] of peaks below the highest, in random order: the quantiles of a `uniform` height between 0
+    and `scatter`, or of a `gaussian` one of that deviation."""
+    share = (np.random.default_rng(seed).permutation(count) + 0.5) / count
+    depth = scatter * (share if shape == "uniform" else norm.ppf(share))
+    return depth - depth.min()
+
+
+def closing_of_waves(k, coat: tuple = CARBIDE) -> np.ndarray:
+    """Closing of both coated faces per pressure of the wave k [1/m]; 0 for k = 0."""
+    k = np.asarray(k, float)
+    out = np.zeros(k.shape)
+    out[k > 0] = 2 * exact.layered_compliance(k[k > 0], coat, TITANIUM, COATING)
+    return out
+
+
+@cache
+def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.ndarray:
+    """(count,) closing at each ridge per force on the first [m2/N], less what equal forces on all of them close."""
+    step = 2 * np.pi / WAVE
+    around = step * np.arange(-shells, shells + 1)
+    waves = closing_of_waves(np.abs(step * np.fft.fftfreq(count)[:, None] + around), coat)
+    return np.fft.ifft((waves - closing_of_waves(np.abs(around), coat)).sum(axis=1)).real / WAVE
+
+
+@cache
+def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndarray:
+    """(side, side) closing at each peak of a square lattice per force on the first [m/N], without its own Hertz one."""
+    step, modulus = 2 * np.pi / WAVE, exact.combined_modulus(*coat)
+    qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
+    waves = np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))  # of the waves beyond the shells
+    for i in range(-shells, shells + 1):
+        for j in range(-shells, shells + 1):
+            if np.hypot(i, j) <= shells:
+                waves = waves + closing_of_waves(np.hypot(qx + i * step, qy + j * step), coat)
+                waves -= closing_of_waves(step * np.hypot(i, j), coat)
+    return np.fft.ifft2(waves / WAVE**2 + LATTICE / (np.pi * modulus * WAVE)).real
+
+
+def own_ridge(force, modulus: float) -> tuple:
+    """(closing [m], its slope) of one of equal ridges under force [N/m] (Westergaard's solution)."""
+    full = exact.westergaard_full_pressure(WAVE, HEIGHT, modulus) * WAVE
+    return HEIGHT * force / full * (1 - np.log(force / full)), -HEIGHT / full * np.log(force / full)
+
+
+def own_peak(force, modulus: float) -> tuple:
+    """(closing [m], its slope) of a round peak under force [N] (Hertz)."""
+    closing = (9 * force**2 / (16 * RADIUS * modulus**2)) ** (1 / 3)
+    return closing, 2 / 3 * closing / force
+
+
+def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: float = MEAN) -> tuple:
+    """(k_n [Pa/m] = dp/d(closing), forces (count,)) of peaks at `depth` (count,) under the pressure `mean` [Pa]."""
+    count, modulus = depth.size, exact.combined_modulus(*coat)
+    number = np.arange(count)
+    if round_peaks:
+        side, own, cell = round(count**0.5), own_peak, WAVE**2
+        i, j = np.divmod(number, side)
+        c = between_peaks(side, coat)[(i[:, None] - i) % side, (j[:, None] - j) % side]
+    else:
+        own, cell = own_ridge, WAVE
+        c = between_ridges(count, coat)[(number[:, None] - number) % count]
+    force, last, total = np.full(count, mean * cell), 0.0, np.array([mean * cell * count])
+    while np.abs(force - last).max() > 1e-11 * force.max():  # secants of the peaks' own closing: at least 1/3 each time
+        last, soft = force, np.maximum(force, 1e-9 * force.max())
+        force = solve_forces(c + np.diag(own(soft, modulus)[0] / soft), number.astype(float), depth, total)[0]
+    live = np.flatnonzero(force > 0)
+    tangent = c[np.ix_(live, live)] + np.diag(own(force[live], modulus)[1])
+    return float(np.linalg.solve(tangent, np.ones(live.size)).sum() / (count * cell)), force
+
+
+def explicit(depth, points: int, coat: tuple = CARBIDE, mean: float = MEAN, change: float = 0.02) -> float:
+    """k_n [Pa/m] of ridges at `depth` (count,), their waves resolved by `points`: pressed twice, 2 % to either side."""
+    length = WAVE * depth.size
+    x = np.arange(points) * (length / points)
+    gap = HEIGHT * (1 - np.cos(2 * np.pi * x / WAVE)) + depth[np.round(x / WAVE).astype(int) % depth.size]
+    waves = closing_of_waves(wave_numbers(points, length), coat)
+    low, high = (press_periodic(waves, gap, length, mean * (1 + by) * length).closing for by in (-change, change))
+    return 2 * change * mean / (high - low)
+
+
+def separate(scatter: float, shape: str, coat: tuple = CARBIDE) -> float:
+    """k_n [Pa/m] of round peaks that do not feel each other: one height, `uniform` or `gaussian` heights."""
+    modulus, density = exact.combined_modulus(*coat), WAVE**-2
+    rate = 4 / 3 * modulus * RADIUS**0.5 * density
+    if scatter == 0:
+        return 1.5 * rate ** (2 / 3) * MEAN ** (1 / 3)
+    if shape == "gaussian":
+        law = HertzSkin(RADIUS, density, scatter, modulus)
+        return float(law.stiffness(law.separation(np.array([MEAN])))[0])
+
+    def carried(power: float, depth: float) -> float:
+        return rate * (depth**power - max(depth - scatter, 0.0) ** power) / scatter
+
+    depth = brentq(lambda d: carried(2.5, d) / 2.5 - MEAN, 0, 1e-4, xtol=1e-18)
+    return carried(1.5, depth)

@@ -1,0 +1,92 @@
+"""Which misalignment does "rubbing on only a portion of the area" (the report's conclusion 5) imply?
+
+The report gives no portion, in words or in the captions of its photographs, so here is the misalignment for each. A
+portion f rubs (bears a tenth of the mean pressure or more) at theta(f) + M(f)/K, K the rotational stiffness of the
+holder, exactly; the two numbers of each skin, to 1 % (the last row 2 %):
+
+  f      bare                 linear 1e13 Pa/m     peaks 0.2 um         exponential 2.5 um
+  0.9    1.0e-5 rad 0.25 N m  2.3e-5 rad 0.26 N m  4.2e-5 rad 0.34 N m  8.3e-4 rad 0.40 N m
+  0.5    2.9e-5     0.46      7.4e-5     0.48      1.07e-4    0.53      1.8e-3     0.57
+  0.2    1.1e-4     0.63      4.0e-4     0.63      3.9e-4     0.66      5.7e-3     0.68
+  0.05   5.1e-4     0.71      5.1e-3     0.71      2.3e-3     0.72      3.0e-2     0.72
+
+So half of the patch means 0.37 um over its 12.7 mm in a rigid fixture without a skin and 23 um with the softest; a
+holder of 1e3 N m/rad makes it 4.9e-4 to 2.4e-3 rad, one of 1e2 4.6e-3 to 7.5e-3 rad whatever the skin. Holders with
+which a given misalignment leaves between 5 and 90 %, in N m/rad:
+
+  1e-4 rad (1.3 um)             2.8e3 and more   3.4e3 and more   5.9e3 and more   none: it all rubs
+  4e-4 rad (5 um)               640 and more     700 and more     960 and more     none: it all rubs
+  2e-3 rad (25 um, 0.001 in)    125 to 480       133 and more     175 and more     345 and more
+  1e-2 rad (127 um)             25 to 75         26 to 144        34 to 93         44 and more
+
+The report's rocking mode at 73 Hz, were it the block on this spring with a radius of gyration of 40 mm (assumed), is
+298 N m/rad: half of the patch then means 1.6 to 1.9 mrad, 20 to 24 um, on all but the exponential skin (3.7 mrad). An
+error of a machinist's 0.001 in and that mount explain conclusion 5; a rigid mount explains it with a hundredth.
+
+Run: python studies/misalignment/conclusion_5.py
+"""
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+import tilted
+from scipy.optimize import brentq
+
+from patchfem.simulate_patch import pressed
+
+PORTIONS = (0.9, 0.5, 0.2, 0.05)
+SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)  # N m/rad
+TOLERANCES = (1e-5, 1e-4, 4e-4, 2e-3, 1e-2)  # rad; over 12.7 mm: 0.13, 1.3, 5, 25 (0.001 in) and 127 um
+ROCKING = 0.884 * (40e-3 * 2 * np.pi * 73) ** 2  # N m/rad: report's 73 Hz, rig.toml's mass, its assumed gyration
+
+
+@cache
+def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
+    """(tilt [rad], moment [N m]) under which a rigid fixture leaves `portion` of the patch rubbed; more: as in
+    `tilted.case`."""
+    def press(log_tilt: float):
+        return pressed(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
+
+    tilt = brentq(lambda log_tilt: tilted.rubbed(press(log_tilt)) - portion, -6, -1.3, xtol=1e-5)
+    return 10**tilt, -press(tilt).pressure.moment
+
+
+def neutral(portion: float, skin: str, spring: float | None, halvings: int = 2) -> float:
+    """Misalignment [rad] of the holder that leaves `portion` rubbed: the tilt left plus what the spring gave way."""
+    tilt, moment = rigid(portion, skin, halvings)
+    return tilt + (moment / spring if spring is not None else 0.0)
+
+
+def springs_for(tolerance: float, skin: str, most: float = 0.9, least: float = 0.05, halvings: int = 2) -> tuple | None:
+    """(least, largest) stiffness [N m/rad] of a holder with which a misalignment of `tolerance` [rad] rubs a portion
+    between `most` and `least`; the largest may be infinite; None: no holder does."""
+    (first, gives), (last, holds) = rigid(most, skin, halvings), rigid(least, skin, halvings)
+    if tolerance <= first:
+        return None
+    return gives / (tolerance - first), holds / (tolerance - last) if tolerance > last else np.inf
+
+
+def main(skins=tuple(tilted.SKINS), portions=PORTIONS, springs=SPRINGS, tolerances=TOLERANCES) -> dict:
+    """{(skin, portion, spring): misalignment [rad]} and {(skin, tolerance): springs_for}, printed."""
+    out = {}
+    for skin in skins:
+        for portion in portions:
+            for spring in springs:
+                out[skin, portion, spring] = neutral(portion, skin, spring)
+            row = "  ".join(f"{out[skin, portion, s]:.3g}" for s in springs)
+            print(f"{skin:12} {100 * portion:3.0f} % rubbed at {row} rad  (rigid, then {springs[1:]} N m/rad)")
+        for tolerance in tolerances:
+            found = out[skin, tolerance] = springs_for(tolerance, skin)
+            print(f"{skin:12} {tolerance:.0e} rad, {12.7e3 * tolerance:5.2f} um: "
+                  + ("none" if found is None else f"{found[0]:.3g} to {found[1]:.3g} N m/rad"), flush=True)
+    return out
+
+
+if __name__ == "__main__":
+    found = main()
+    print(f"rocking at 73 Hz: {ROCKING:.0f} N m/rad: half at", {
+        skin: round(1e3 * neutral(0.5, skin, ROCKING), 2) for skin in tilted.SKINS}, "mrad")

@@ -1,0 +1,71 @@
+"""The rig's pieces under any misalignment: condensed once on three graded meshes, pressed as often as wanted.
+
+What the studies beside this file share. Columns grow from 0.3 um at the edge that stays closed by 1.5 % each on the
+finest mesh, so a contact edge is as sharp at 1e-2 rad as at 1e-6; the errors are those of `simulate_measures` from
+cells two and four times as long.
+"""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from patchfem import scene
+from patchfem.mesh.grading import Layout, columns
+from patchfem.mesh.tensor import TensorGrid, finer, graded_depth
+from patchfem.simulate_bodies import Pair, condensed
+from patchfem.simulate_measures import measures
+from patchfem.simulate_patch import Patch, pressed
+
+RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
+TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[0]  # [contact] alone: the patch at rest
+TILTS = tuple(10.0 ** np.arange(-6, -1.5, 0.5))
+RUBBED = 0.1  # share of the mean pressure from which a place counts as rubbed
+SKINS = {
+    "bare": (),
+    "linear": ('law="linear"', "normal_stiffness=1e13 Pa/m", "tangential_ratio=0.8"),
+    "exponential": ('law="exponential"', "decay_length=2.5 um", "tangential_ratio=0.8"),
+    "peaks": ('law="hertz"', "radius=10.5 um", "density=156 1/mm^2", "height_deviation=0.2 um", "tangential_ratio=0.8"),
+}  # peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
+
+
+def case(angle: float | None = None, skin: str = "bare", *more: str) -> scene.Scene:
+    """Scene of the pieces with a skin of SKINS; angle [rad], None: free to rotate; more: further key=value of contact,
+    None for a free angle."""
+    sets = [f"asperities.{text}" for text in SKINS[skin]] + list(more)
+    if angle is not None:
+        sets.append(f"tilt.angle={angle!r} rad")
+    text = TEXT if angle is not None else TEXT.partition("[contact.tilt]")[0]
+    return scene.loads(text, RIG, [f"contact.{one}" for one in sets])
+
+
+@cache
+def pair(halvings: int = 2) -> Pair:
+    """The condensed pieces on the coarsest mesh (110 columns) with its cells halved so many times."""
+    contact = case(0.0).contact
+    half = contact.length / 2
+    x = columns(Layout(contact.length, (-half,), (-half, half), 1.2e-6, half / 30, half / 30, 0.06))
+    depth, rows = graded_depth(contact.height, x[1] - x[0], contact.coating.thickness, 1.25, 2)
+    grid = TensorGrid(x, depth, rows)
+    for _ in range(halvings):
+        grid = finer(grid)
+    return condensed(case(0.0), grid)
+
+
+def patches(found: scene.Scene) -> tuple:
+    """The Patch of a scene of `case` on the finest mesh, on cells twice and four times as long."""
+    return tuple(pressed(found, pair(k)) for k in (2, 1, 0))
+
+
+def measured(found: scene.Scene) -> dict:
+    """name -> Measure (value and error) of a scene of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
+    three = patches(found)
+    return measures(*three) | {"rubbed": rubbed(three[0])}
+
+
+def rubbed(patch: Patch, share: float = RUBBED) -> float:
+    """Portion of the length that bears at least `share` of the mean pressure, its edges found between the nodes."""
+    x, sigma = patch.x, patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum()
+    low, high = np.minimum(sigma[:-1], sigma[1:]), np.maximum(sigma[:-1], sigma[1:])
+    part = np.clip(high / np.maximum(high - low, 1e-300), 0.0, 1.0)
+    return float(np.diff(x) @ part / np.ptp(x))

@@ -1,0 +1,233 @@
+"""The sentences of the misalignment studies, from a cheap share of their runs, beside closed forms and identities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_studies import study
+
+from patchfem import closed_forms as exact
+from patchfem.simulate_measures import values
+from patchfem.simulate_patch import pressed
+
+LOAD, LENGTH = 26 * 4.4482216152605, 12.7e-3
+
+
+@pytest.fixture(scope="module")
+def fixtures():
+    return study("misalignment/fixtures.py")
+
+
+@pytest.fixture(scope="module")
+def tilted(fixtures):
+    return fixtures.tilted
+
+
+@pytest.fixture(scope="module")
+def conclusion():
+    return study("misalignment/conclusion_5.py")
+
+
+@pytest.fixture(scope="module")
+def roll():
+    return study("misalignment/roll.py")
+
+
+@pytest.fixture(scope="module")
+def rough():
+    return study("misalignment/rough_skin.py")
+
+
+@pytest.fixture(scope="module")
+def asperities(rough):
+    return rough.asperities
+
+
+# ---- fixtures and skins
+
+def coarse(tilted, found):
+    return values(pressed(found, tilted.pair(1)))
+
+
+def test_always_the_table_of_the_rigid_fixture(tilted, fixtures):
+    for tilt, fraction, peak, centre in ((1e-5, 0.936, 1.923, -2.072), (1e-4, 0.219, 8.32, -5.324),
+                                         (1e-2, 0.00168, 790, -6.342)):
+        found = coarse(tilted, fixtures.held(tilt, None))
+        assert found["contact_fraction"] == pytest.approx(fraction, rel=0.03)
+        assert found["pressure_peak"] == pytest.approx(1e6 * peak, rel=0.02)
+        assert found["pressure_centre"] == pytest.approx(1e-3 * centre, rel=2e-3)
+
+
+def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
+    from patchfem.simulate_measures import measures
+
+    found = fixtures.held(1e-3, None)
+    two = measures(pressed(found, tilted.pair(1)), pressed(found, tilted.pair(0)))
+    best = {"contact_fraction": 0.02406, "pressure_peak": 60.85e6, "normal_stiffness": 170e6}  # three meshes
+    for name, value in best.items():
+        assert abs(two[name].value - value) <= two[name].error <= 0.2 * value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
+def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
+    from patchfem.simulate_grading import solve_graded
+    from patchfem.simulate_measures import measures
+
+    found = tilted.case(angle, skin)
+    ours, other = tilted.measured(found), measures(*solve_graded(found))
+    for name in ("contact_fraction", "loaded_fraction", "pressure_peak", "pressure_centre", "normal_stiffness",
+                 "tangential_stiffness"):
+        assert abs(ours[name].value - other[name].value) <= ours[name].error + other[name].error
+
+
+def test_always_a_free_piece_keeps_less_than_the_kern(tilted, fixtures):
+    for offset, fraction in ((0.15, 1.0), (1 / 3, 0.445)):
+        found = coarse(tilted, fixtures.free(offset))
+        assert found["contact_fraction"] == pytest.approx(fraction, abs=0.02)
+        assert found["pressure_centre"] == pytest.approx(-offset * LENGTH, rel=1e-9)
+    assert coarse(tilted, fixtures.free(0.16))["contact_fraction"] < 1 == exact.kern_fraction(0.16, 1.0)
+
+
+def test_always_the_soft_skin_keeps_its_stiffness(tilted, fixtures):
+    even, tipped = ({skin: coarse(tilted, fixtures.held(tilt, None, skin)) for skin in tilted.SKINS}
+                    for tilt in (1e-6, 1e-2))
+    for skin, left in (("bare", 0.052), ("linear", 0.05), ("peaks", 0.112), ("exponential", 0.824)):
+        ratio = tipped[skin]["normal_stiffness"] / even[skin]["normal_stiffness"]
+        assert ratio == pytest.approx(left, rel=0.03)
+
+
+def test_exact_skin_far_softer_than_the_pieces_is_a_rigid_wedge(tilted):
+    found = coarse(tilted, tilted.case(5e-2, "exponential", "asperities.decay_length=500 um"))
+    fraction, centre = exact.wedge_skin(5e-2, LENGTH, 500e-6)
+    assert found["loaded_fraction"] == pytest.approx(fraction, rel=3e-4)
+    assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
+    stiffer = coarse(tilted, tilted.case(1e-3, "exponential"))["loaded_fraction"]
+    assert stiffer / exact.wedge_skin(1e-3, LENGTH, 2.5e-6)[0] == pytest.approx(1.04, abs=0.005)
+
+
+# ---- conclusion 5
+
+def test_exact_a_spring_adds_what_it_gives_way(tilted, conclusion, fixtures):
+    for skin in tilted.SKINS:
+        for spring in (1e4, 300.0):
+            angle = conclusion.neutral(0.5, skin, spring, 0)
+            found = pressed(fixtures.held(angle, spring, skin), tilted.pair(0))
+            assert tilted.rubbed(found) == pytest.approx(0.5, abs=1e-4)
+            assert found.pressure.rotation == pytest.approx(conclusion.rigid(0.5, skin, 0)[0], rel=1e-3)
+
+
+def test_always_misalignment_that_each_portion_means(conclusion):
+    wanted = {("bare", 0.5): (2.9e-5, 0.46), ("linear", 0.5): (7.4e-5, 0.48), ("peaks", 0.5): (1.07e-4, 0.53),
+              ("exponential", 0.5): (1.8e-3, 0.57), ("bare", 0.2): (1.13e-4, 0.63), ("linear", 0.2): (4.0e-4, 0.63)}
+    for (skin, portion), (tilt, moment) in wanted.items():
+        found = conclusion.rigid(portion, skin, 1)
+        assert found == (pytest.approx(tilt, rel=0.015), pytest.approx(moment, rel=0.015))
+    assert round(conclusion.ROCKING) == 298
+    assert conclusion.neutral(0.5, "bare", conclusion.ROCKING, 1) == pytest.approx(1.57e-3, rel=0.01)
+
+
+def test_always_holders_that_a_thousandth_of_an_inch_allows(conclusion):
+    least, most = conclusion.springs_for(2e-3, "bare", halvings=1)
+    assert (least, most) == (pytest.approx(125, rel=0.02), pytest.approx(480, rel=0.02))
+    assert conclusion.springs_for(2e-3, "linear", halvings=1)[1] == np.inf
+    assert conclusion.springs_for(4e-4, "exponential", halvings=1) is None
+
+
+# ---- roll
+
+def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
+    pair = tilted.pair(0)
+    k = values(pressed(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
+    for angle in (5e-6, 1e-4):
+        fraction, centre, _, _ = exact.wedge_linear(angle, LOAD, LENGTH, LENGTH, k)
+        found = values(pressed(roll.rolled(angle, 128, "bare"), pair))
+        assert found["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
+        assert found["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
+
+
+def test_always_yaw_moments_of_a_roll(roll):
+    for skin, angle, moment in (("bare", 1e-5, 0.074), ("bare", 1e-4, 0.173), ("linear", 1e-5, 0.0346),
+                                ("exponential", 1e-3, 0.133)):
+        found = roll.case(angle, 16, skin)
+        assert found["yaw"] == pytest.approx(moment, rel=0.01)
+        assert found["yaw"] == pytest.approx(0.3 * LOAD * abs(found["pressure_centre_lateral"].value), rel=1e-9)
+    assert roll.roll_for(3.8e-3, "bare") == pytest.approx(2.7e-5, rel=0.02)
+
+
+# ---- the rough skin
+
+def test_exact_equal_ridges_and_equal_peaks(asperities):
+    flat, modulus = np.zeros(16), exact.combined_modulus(*asperities.CARBIDE)
+    closed = exact.westergaard_stiffness(asperities.MEAN, asperities.WAVE, asperities.HEIGHT, modulus)
+    found = asperities.one_each(flat)[0]
+    assert found == pytest.approx(closed, rel=1e-12) and found == pytest.approx(4.48e14, rel=2e-3)
+    assert asperities.one_each(flat, coat=(600e9, 0.22))[0] == pytest.approx(9.9e14, rel=2e-3)
+    force = asperities.MEAN * asperities.WAVE**2
+    slope = 2 / 3 * (9 / (16 * asperities.RADIUS * modulus**2 * force)) ** (1 / 3)
+    lattice = asperities.LATTICE / (np.pi * modulus * asperities.WAVE)
+    found = asperities.one_each(flat, True)[0]
+    assert found == pytest.approx(1 / (slope + lattice) / asperities.WAVE**2, rel=1e-3)
+    assert found == pytest.approx(2.74e13, rel=2e-3)
+
+
+def test_exact_every_second_peak_is_a_lattice_of_twice_the_step(asperities):
+    """One material, so that the closed forms of the wider lattice hold: 2 ln 2 P/(pi E*) more for ridges (Westergaard
+    at twice the wave and the same crest), and the lattice sum of 1/r for peaks."""
+    modulus = exact.combined_modulus(*asperities.TITANIUM)
+    more = asperities.between_ridges(16, asperities.TITANIUM)[::2].sum()
+    assert more == pytest.approx(2 * np.log(2) / (np.pi * modulus), rel=1e-4)
+    sunk = asperities.between_peaks(8, asperities.TITANIUM)[::2, ::2].sum()
+    assert sunk == pytest.approx(asperities.LATTICE / (np.pi * modulus * 2 * asperities.WAVE), rel=2e-4)
+
+
+@pytest.mark.parametrize("scatter", [1e-6, 5e-6])
+def test_exact_one_force_per_ridge_is_the_resolved_ridge(asperities, scatter):
+    depth = asperities.depths(32, scatter, "uniform")
+    assert asperities.one_each(depth)[0] == pytest.approx(asperities.explicit(depth, 2**15), rel=0.01)
+
+
+def test_always_scatter_that_makes_1e13(rough, asperities):
+    for scatter, shape in ((4.5e-6, "uniform"), (0.2e-6, "gaussian")):
+        many = [asperities.one_each(asperities.depths(160, scatter, shape, seed))[0] for seed in range(5)]
+        assert np.median(many) == pytest.approx(1e13, rel=0.15)
+    for scatter, shape in ((0.68e-6, "uniform"), (0.127e-6, "gaussian")):
+        assert asperities.separate(scatter, shape) == pytest.approx(1e13, rel=0.01)
+    found = rough.row(0.2e-6, "gaussian", side=16, seeds=1)
+    assert found["separate"] == pytest.approx(7.2e12, rel=2e-3)
+    assert found["peaks"] == pytest.approx(found["separate"], rel=0.02)
+    assert found["touching"] == pytest.approx(0.18, abs=0.01)
+
+
+def test_exact_separate_peaks_of_uniform_heights(asperities):
+    """Greenwood and Williamson's integral over uniform heights, here by quadrature of the single peaks."""
+    for shape in ("uniform", "gaussian"):
+        assert asperities.separate(1e-10, shape) == pytest.approx(asperities.separate(0.0, shape), rel=1e-3)
+    for scatter, share in ((0.2e-6, 0.50), (1e-6, 0.36), (5e-6, 0.29)):
+        decay = asperities.MEAN / asperities.separate(scatter, "gaussian")
+        assert decay / scatter == pytest.approx(share, abs=0.006)
+    heights = 1e-6 * (np.arange(20000) + 0.5) / 20000
+    modulus = exact.combined_modulus(*asperities.CARBIDE)
+    rate = 4 / 3 * modulus * asperities.RADIUS**0.5 / asperities.WAVE**2
+    depth = np.linspace(0, 0.4e-6, 4001)
+    carried = np.array([rate * (np.maximum(d - heights, 0) ** 1.5).mean() for d in depth[::40]])
+    slope = np.gradient(carried, depth[::40])
+    assert asperities.separate(1e-6, "uniform") == pytest.approx(
+        np.interp(asperities.MEAN, carried, slope), rel=2e-3)
+
+
+def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
+    own = rough.opening(None, 1)
+    assert own == pytest.approx(9.28e-6, rel=3e-3)
+    for k in (1e15, 1e13, 5e11):
+        rigid = exact.wedge_opening(LOAD, LENGTH, LENGTH, k)
+        assert own < rough.opening(k, 1) == pytest.approx(own + rigid, rel=0.01)
+
+
+def test_always_the_picture_names_its_curves(tmp_path):
+    picture = study("misalignment/picture.py")
+    text = picture.main(tmp_path / "x.svg", np.array([1e-5, 1e-4])).read_text()
+    for word in ("misalignment [mrad]", "height over the patch [um]", *picture.FIXTURES.values(),
+                 *picture.SKINS.values()):
+        assert word in text
+    assert np.all(np.diff(picture.portions(None, "bare", 10.0 ** np.arange(-5.5, -2), 0)) < 0)
