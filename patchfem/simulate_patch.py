@@ -14,7 +14,6 @@ from .simulate_bodies import Pair, bodies_of, condensed
 
 SHEAR_MODES = 8  # modes a shear reduction starts from
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
-BEARING = 1e-9  # share of the largest nodal force from which a node of a smooth skin counts as bearing
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,9 +45,8 @@ class Patch:
 
     @property
     def active(self) -> np.ndarray:
-        """(m,) bool: the contact set; of a smooth skin, whose pressure is nowhere zero, the nodes that bear."""
-        force = self.pressure.sigma_n * self.pieces.interface.weight
-        return force > (BEARING * force.max() if self.skin is not None else 0.0)
+        """(m,) bool: the contact set."""
+        return self.pressure.sigma_n > 0
 
 
 def shape_side(contact) -> str:

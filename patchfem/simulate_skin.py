@@ -6,6 +6,8 @@ from .contact import skin, skin_laws
 from .core import Compliance, Pressure, frozen_array
 from .simulate_bodies import piece_of
 
+BEARING = 1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
+
 
 def skin_law(contact):
     """The smooth law of a scene's asperities: ExponentialSkin or HertzSkin."""
@@ -29,6 +31,12 @@ def mean_stiffness(contact, pressure: float) -> float:
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
 
+def borne(pressure) -> np.ndarray:
+    """Pressure (..., m) [Pa] of a smooth skin without the nodes below BEARING of the largest: the law never ends, but
+    what it leaves there is less than the balance of the load is solved to, and further out less than any number."""
+    return np.where(pressure > BEARING * pressure.max(), pressure, 0.0)
+
+
 def behind_skin(contact, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
     """(Compliance with the skin linearised at the operating point, Pressure, SkinState) of a smooth skin.
 
@@ -39,10 +47,10 @@ def behind_skin(contact, pieces: Compliance, gap, angle: float, moment, spring: 
     load = contact.load if by is None else None
     state = skin.solve(skin_law(contact), pieces.normal, interface.x, interface.weight, gap, load,
                        moment if by is None else None, by, angle, spring=spring if by is None else 0.0)
-    answer = Pressure(state.pressure, state.separation, state.delta, state.theta, state.load, state.moment,
-                      state.outcome, state.iterations, state.residuals)
+    answer = Pressure(frozen_array(borne(state.pressure)), state.separation, state.delta, state.theta, state.load,
+                      state.moment, state.outcome, state.iterations, state.residuals)
     stiff = np.maximum(state.stiffness * interface.weight, 1e-300)
-    crush = np.diag(1 / np.maximum(stiff, 1e-12 * stiff.max()))  # nodes that carry nothing stay finite
+    crush = np.diag(1 / np.maximum(stiff, BEARING * stiff.max()))  # nodes that carry nothing stay finite
     ratio = contact.asperities.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
     return Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)), answer, state

@@ -4,6 +4,7 @@ import numpy as np
 
 from .contact.strips import press_strips, strip_offsets, strips_tangent
 from .core import Compliance, Pressure, frozen_array
+from .simulate_skin import borne
 
 
 def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
@@ -18,7 +19,7 @@ def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: fl
                          strip_offsets(contact.width, count), gap, contact.strips.roll,
                          contact.load if by is None else None, moment if by is None else None, by, angle,
                          spring if by is None else 0.0, skin)
-    mean = state.pressure.mean(axis=0)
+    mean = (borne(state.pressure) if _smooth(skin) else state.pressure).mean(axis=0)
     answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
                       state.moment, state.outcome, state.iterations, state.residuals)
     return pieces, answer, skin if _smooth(skin) else None, state
@@ -61,7 +62,9 @@ def strip_values(patch, peak_of) -> dict:
     state, pieces = patch.strips, patch.pair.compliance
     count = len(state.offsets)
     weight = pieces.interface.weight / count
-    out = {"contact_fraction": state.fraction, "pressure_centre_lateral": state.centre_y,
+    pressed = borne(state.pressure) if _smooth(patch.skin) else state.pressure
+    fraction = float((pressed > 0).mean(axis=0) @ weight / weight.sum())
+    out = {"contact_fraction": fraction, "pressure_centre_lateral": state.centre_y,
            "roll_moment": state.roll_moment}
     out["pressure_peak"] = max(peak_of(patch.x, row) for row in state.pressure)
     if not state.load > 0:

@@ -23,7 +23,7 @@ from .skin_laws import ExponentialSkin, LinearSkin
 from .threads import one_thread
 from .unilateral import LIMIT, solve_forces
 
-FLOOR = -600.0  # log pressure below which an approach does not reach the skin
+FLOOR = -300.0  # log pressure below which an approach does not reach the skin
 
 
 @dataclass(frozen=True, eq=False, slots=True)
