@@ -127,7 +127,8 @@ def _write_netcdf(result: Result, path: Path, text: str) -> None:
     patch = result.patch
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
-    write(dataset(histories, modal, fields, x, weight), path, summary_of(result), text, versions())
+    strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
+    write(dataset(histories, modal, fields, x, weight, strips), path, summary_of(result), text, versions())
 
 
 def report_data(result: Result) -> dict:

@@ -5,6 +5,8 @@ from math import pi, sqrt
 
 from .effects import EFFECTS, absent
 
+CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
@@ -68,6 +70,8 @@ def _sizes(scene) -> tuple:
 
         size = contact.element_size or contact.length / AUTOMATIC_CELLS
         points = round(contact.length / size) + 1
+        if scene.kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None):
+            points = CHOSEN_POINTS
         unknowns |= {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
     if scene.structure is not None:
         unknowns["modes"] = len(scene.structure.mode)

@@ -112,6 +112,24 @@ def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
     assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
 
 
+def test_exact_strips_are_written_one_by_one(tmp_path):
+    import xarray as xr
+
+    from patchfem.simulate_files import write
+
+    found = scene(TILT.format(1e-5) + '[contact.strips]\ncount = 3\nroll = "0.01 mrad"\n',
+                  'load = "26 lbf"\nelement_size = "0.5 mm"')
+    write(run(plan(found), estimate=False), tmp_path)
+    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
+        assert data.strip_normal_stress.dims == ("strip", "x") and data.strip_offset.values[1] == 0.0
+        carried = (data.strip_normal_stress * data.weight / 3).sum()
+        assert float(carried) == pytest.approx(LOAD, rel=1e-10)
+        assert np.abs(data.strip_normal_stress.mean("strip") - data.normal_stress[0]).max() <= 1e-9 * 1e6
+    summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
+    lateral = float((data.strip_normal_stress * data.weight / 3 * data.strip_offset).sum()) / LOAD
+    assert summary["measures"]["pressure_centre_lateral"]["value"] == pytest.approx(lateral, rel=1e-9)
+
+
 def test_exact_strips_without_roll_are_the_patch():
     tables = TILT.format(1e-4)
     one, strips = solved(tables)[1], solved(tables + "[contact.strips]\ncount = 4\n")[1]

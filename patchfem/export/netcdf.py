@@ -16,6 +16,7 @@ LONG = {
     "normal_load": ("N", "normal load on the interface"),
     "modal_coordinate": ("m", "modal coordinate"),
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
+    "strip_normal_stress": ("Pa", "normal stress at the nodes of every strip, compression positive"),
     "gap": ("m", "remaining gap"),
     "shear_stress": ("Pa", "frictional shear stress, positive against positive slip"),
     "slip": ("m", "irreversible local slip"),
@@ -23,11 +24,11 @@ LONG = {
 }
 
 
-def dataset(histories: dict, modal, fields: dict, x, weight) -> xr.Dataset:
+def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None) -> xr.Dataset:
     """Dataset of a run.
 
     histories: name -> (k,) with "time"; modal: (names, (k, n)) or None; fields: name -> (f, m) with "time", or {};
-    x, weight: (m,) or None.
+    x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a patch in strips.
     """
     data, coords = {}, {}
     if histories:
@@ -49,6 +50,9 @@ def dataset(histories: dict, modal, fields: dict, x, weight) -> xr.Dataset:
                 data[name] = (("frame", "x"), values, flags)
             elif np.ndim(values) == 2:
                 data[name] = (("frame", "x"), values, _attributes(name))
+    if strips is not None:
+        coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "place of the strip over the width"})
+        data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
     return xr.Dataset(data, coords)
 
 
