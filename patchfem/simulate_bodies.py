@@ -9,8 +9,8 @@ from .contact import cache
 from .contact.elasticity import Layers, assemble, interface_compliance
 from .core import Compliance, Interface, PatchfemError, frozen_array
 from .mesh.tensor import TensorGrid, graded_grid
+from .simulate_plan import AUTOMATIC_CELLS
 
-AUTOMATIC_CELLS = 200
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
 
 

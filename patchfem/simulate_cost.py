@@ -5,7 +5,7 @@ from time import perf_counter
 
 from .core import NotConverged, PatchfemError
 from .simulate import plan, run
-from .simulate_bodies import AUTOMATIC_CELLS
+from .simulate_plan import AUTOMATIC_CELLS
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes")
 LEVELS = 5  # values of a knob, each twice as fine as the one before

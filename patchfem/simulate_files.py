@@ -88,7 +88,7 @@ def resolved(scene) -> str:
     contact, friction = scene.contact, scene.friction
     graded = scene.kind == "patch" and contact.profile is None  # its mesh follows from the tolerance
     if contact is not None and contact.element_size is None and contact.mesh is None and not graded:
-        from .simulate_bodies import AUTOMATIC_CELLS
+        from .simulate_plan import AUTOMATIC_CELLS
 
         contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:

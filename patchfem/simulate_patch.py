@@ -11,8 +11,8 @@ from .contact.unilateral import press, press_by
 from .core import Compliance, PatchfemError, Pressure, frozen_array
 from .mesh.tensor import TensorGrid, coarser
 from .simulate_bodies import Pair, bodies_of, condensed
+from .simulate_plan import SHEAR_MODES
 
-SHEAR_MODES = 8  # modes a shear reduction starts from
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
 
 

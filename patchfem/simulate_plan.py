@@ -5,6 +5,8 @@ from math import pi, sqrt
 
 from .effects import EFFECTS, absent
 
+AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
+SHEAR_MODES = 8  # modes a shear reduction starts from
 CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance
 
 
@@ -66,8 +68,6 @@ def _sizes(scene) -> tuple:
     unknowns, chain = {}, {}
     contact = scene.contact
     if contact is not None:
-        from .simulate_bodies import AUTOMATIC_CELLS
-
         size = contact.element_size or contact.length / AUTOMATIC_CELLS
         points = round(contact.length / size) + 1
         if scene.kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None):
@@ -133,8 +133,6 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
             each = list_cost(scene, settings, drive)[1] / steps
             unknowns["bond_list_about"] = int(list_cost(scene, settings, drive)[0])
         elif shear:
-            from .simulate_patch import SHEAR_MODES
-
             unknowns["shear_modes"] = settings.shear_modes or SHEAR_MODES
             each = 4e-8 * unknowns.get("interface_points", 1) * (1 + unknowns["shear_modes"] / 4)
         elif settings.per_point:

@@ -30,7 +30,7 @@ def profile_gap(scene, x) -> tuple:
 
 def asked_size(contact, size: float) -> float:
     """Element size [m] that decides what a profile may hold: the scene's own, not that of a coarser comparison mesh."""
-    from .simulate_bodies import AUTOMATIC_CELLS
+    from .simulate_plan import AUTOMATIC_CELLS
 
     if contact.mesh is not None:
         return size
