@@ -147,7 +147,7 @@ def _rigid(scene, patch, time, slide, frames):
     if patch is None:
         weight, at_rest, lower, x = np.ones(1), np.array([scene.normal.load]), False, np.zeros(1)
     else:
-        from .simulate_patch import shape_side
+        from .simulate_plan import shape_side
 
         x, weight, at_rest = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
         lower = shape_side(scene.contact) == "lower"
@@ -192,7 +192,7 @@ def _refuse_costly(scene, law, samples: int, points: int, slide) -> None:
 
 
 def _with_shear(scene, patch, time, slide, frames, say):
-    from .simulate_patch import shape_side
+    from .simulate_plan import shape_side
 
     if shape_side(scene.contact) == "lower":
         raise PatchfemError(f"{scene.path}: {scene.contact.gives_way} with the pressure on the lower piece: not "

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from .contact.gaps import crown, step, tilt
 from .contact.unilateral import press, press_by
-from .core import Compliance, PatchfemError, Pressure, frozen_array
+from .core import Compliance, Pressure, frozen_array
 from .mesh.tensor import TensorGrid, coarser
 from .simulate_bodies import Pair, bodies_of, condensed
 from .simulate_plan import SHEAR_MODES
@@ -47,14 +47,6 @@ class Patch:
     def active(self) -> np.ndarray:
         """(m,) bool: the contact set."""
         return self.pressure.sigma_n > 0
-
-
-def shape_side(contact) -> str:
-    """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
-    sides = {part.on for part in (contact.tilt, contact.crown, contact.step, contact.profile) if part is not None}
-    if len(sides) > 1:
-        raise PatchfemError("contact: the shapes lie on different pieces (key `on`); not yet built: put all on one")
-    return sides.pop() if sides else "upper"
 
 
 SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: crown(x, part.radius),

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import pi, sqrt
 
+from .core import PatchfemError
 from .effects import EFFECTS, absent
 
 AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
@@ -196,3 +197,11 @@ def _verdict(scene, groups) -> list:
     if slip is not None:
         out.append(f"the pieces' own shear gives way by about {slip:.2g} m before the patch slips")
     return out
+
+
+def shape_side(contact) -> str:
+    """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
+    sides = {part.on for part in (contact.tilt, contact.crown, contact.step, contact.profile) if part is not None}
+    if len(sides) > 1:
+        raise PatchfemError("contact: the shapes lie on different pieces (key `on`); not yet built: put all on one")
+    return sides.pop() if sides else "upper"

@@ -95,7 +95,7 @@ def choose(scene, per_point: bool = False) -> Settings:
     closed = f is None or (f.law == "coulomb" and not shear)
     side = "upper"
     if contact is not None:
-        from .simulate_patch import shape_side
+        from .simulate_plan import shape_side
 
         side = shape_side(contact)
     if accuracy.method == "exact" and not closed:
@@ -163,7 +163,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
         model = hub.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
         return replace(model, reduction=reduced)
     if settings.per_point:
-        from .simulate_patch import shape_side
+        from .simulate_plan import shape_side
 
         x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
         pattern = (x, sigma) if shape_side(contact) == "lower" else None
