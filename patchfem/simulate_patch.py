@@ -77,11 +77,12 @@ def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
     return pressed(scene, condensed(scene, grid, upper_grid, fresh))
 
 
-def pressed(scene, pair: Pair) -> Patch:
-    """The pair under the shapes, the load and the holder of a scene; the pair serves any number of them."""
+def pressed(scene, pair: Pair, worn=None) -> Patch:
+    """The pair under the shapes, the load and the holder of a scene; the pair serves any number of them. worn (m,) [m]:
+    depth that wear has added to the gap."""
     contact, pieces = scene.contact, pair.compliance
     gap, notes, seconds = gap_of(scene, pieces.interface.x)
-    gap = gap + pair.rise
+    gap = gap + pair.rise if worn is None else gap + pair.rise + worn
     angle = contact.tilt.angle if contact.tilt is not None and contact.tilt.on == "upper" else 0.0
     begin = perf_counter()
     turns = contact.load_line is not None or spring_of(contact) > 0

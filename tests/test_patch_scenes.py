@@ -237,6 +237,13 @@ def test_exact_the_same_pair_serves_every_load_and_tilt():
         assert again == pytest.approx(anew, rel=1e-12, abs=1e-18)
 
 
+def test_exact_worn_depth_is_a_shape_like_any_other():
+    found, crown = scene(), scene('[contact.crown]\nradius = "5 m"\n')
+    pair = condensed(found, *bodies_of(found))
+    worn = pressed(found, pair, pair.compliance.interface.x**2 / 10)
+    assert values(worn) == pytest.approx(values(pressed(crown, pair)), rel=1e-12, abs=1e-18)
+
+
 def test_exact_the_plane_band_is_the_other_plane_state():
     found = scene(TILT.format(1e-5))
     patch = solve(found, *bodies_of(found))
