@@ -107,7 +107,8 @@ def graded_grid(length: float, height: float, element_size: float, coating: floa
 
 
 def coarser(grid: TensorGrid) -> TensorGrid:
-    """The same piece with its cells merged two by two in both directions; a single one that is left over stays."""
+    """The same piece with its cells merged two by two in both directions, an odd number of them as evenly as it goes: a
+    single thin row left over at a face would be better there than what it stands for."""
     nx, coat = grid.x.size - 1, grid.coating_rows
     if nx % 2:
         x = np.linspace(grid.x[0], grid.x[-1], nx // 2 + 2)
@@ -118,7 +119,9 @@ def coarser(grid: TensorGrid) -> TensorGrid:
 
 
 def _every_second(levels) -> np.ndarray:
-    return levels[::2] if levels.size % 2 else np.concatenate([levels[:-1:2], levels[-1:]])
+    if levels.size % 2:
+        return levels[::2]
+    return np.interp(np.linspace(0, levels.size - 1, levels.size // 2 + 1), np.arange(levels.size), levels)
 
 
 def finer(grid: TensorGrid) -> TensorGrid:

@@ -65,3 +65,11 @@ def test_exact_depths_reach_the_coating_and_the_far_face():
     depth, rows = graded_depth(5.0, 0.01, 0.3, 1.2, 2)
     assert depth[0] == 0 and depth[rows] == 0.3 and depth[-1] == 5.0 and np.diff(depth).min() > 0
     assert (np.diff(depth)[1:] <= 1.2 * np.diff(depth)[:-1] * (1 + 1e-6)).all()
+
+
+@pytest.mark.parametrize("rows", [9, 10, 33, 34])
+def test_exact_merged_rows_go_on_growing_whether_even_or_odd(rows):
+    depth = np.concatenate([[0.0], np.cumsum(1.1 ** np.arange(rows))])
+    half = np.diff(coarser(TensorGrid(np.linspace(-1, 1, 5), depth, 0)).depth)
+    assert half.size == (rows + 1) // 2 and half.sum() == pytest.approx(depth[-1])
+    assert (half[1:] / half[:-1] >= 1.15).all() and (half[1:] / half[:-1] <= 1.22).all()
