@@ -155,7 +155,8 @@ def _grids(scene, x, growth: float) -> list:
 def _grid(scene, x, side: str, growth: float) -> TensorGrid:
     height, _, coating = piece_of(scene.contact, side)
     depth, rows = graded_depth(height, float(np.diff(x).min()), coating.thickness if coating else 0.0, growth, 2)
-    return TensorGrid(frozen_array(x), _no_taller(depth, max(scene.contact.length / 4, height / 24)), rows)
+    most = max(scene.contact.length / 4, height / 24) * np.log(growth) / np.log(GROWTH)
+    return TensorGrid(frozen_array(x), _no_taller(depth, most), rows)
 
 
 def _no_taller(depth, most: float) -> np.ndarray:

@@ -15,7 +15,7 @@ UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "mo
          "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1", "pressure_centre_lateral": "m",
          "roll_moment": "N m"}
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
-GROWING, SLOWEST, DOUBTFUL, SECOND = 1.3, 1.5, 2.5, 4.0  # ratios of successive changes that are believed
+GROWING, SLOWEST, DOUBTFUL, SECOND, LUCKY = 1.3, 1.5, 2.5, 4.0, 6.0  # ratios of successive changes that are believed
 FEW = 3  # nodes of a contact that no mesh of these cells resolves
 ROUND = 1e-12  # round-off, relative
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
@@ -116,10 +116,11 @@ def remainder(last: float, before: float, nested: bool = False) -> float:
     """What is still to come after the changes `before` and `last` of a value under two halvings of the mesh.
 
     A geometric series whose ratio is taken from them, no worse than 1.5 (1.3 where the changes grow) and no better than
-    2.5; second order, a ratio of 4, is believed where every cell was halved (`nested`) and the changes have one sign. A
-    last change that is small by chance, its parts against one another, counts as what the first one leaves.
+    2.5; second order, a ratio of 4, is believed where every cell was halved (`nested`), the changes have one sign and
+    their ratio is below 6. A last change that is small by chance, its parts against one another, counts as what the
+    first one leaves.
     """
-    best = SECOND if nested and last * before > 0 else DOUBTFUL
+    best = SECOND if nested and last * before > 0 and abs(before) < LUCKY * abs(last) else DOUBTFUL
     before = abs(before)
     last = max(abs(last), before / best)
     ratio = min(max(before / last, SLOWEST if before > last else GROWING), best) if last > 0 else best
@@ -171,7 +172,7 @@ def _snap(patch: Patch, mine: dict) -> dict:
         return {}
     few = cell * (1 + 2 / max(patch.active.sum(), 1))
     share = few / max(2 * cell, mine["contact_fraction"] * length)
-    return {"contact_fraction": 1.5 * few / length, "contact_half_width": 0.75 * few,
+    return {"contact_fraction": 2 * few / length, "contact_half_width": few,
             "normal_stiffness": share / 2 * mine["normal_stiffness"],
             "tangential_stiffness": share / 2 * mine["tangential_stiffness"]}
 
@@ -206,11 +207,12 @@ def _least(patch: Patch, mine: dict) -> dict:
     peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell else 0.0)
     if count <= FEW and cell:
         peak = max(peak, _wedge(patch))
-    turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap)) + abs(mine["rotation"]) * aside * turns
+    moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
+    turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
-            "rotation": turned / length, "approach": ROUND * np.ptp(patch.gap)}
+            "rotation": turned / length, "approach": ROUND * (np.ptp(patch.gap) + moved)}
 
 
 def _corner_layer(patch: Patch) -> float:
