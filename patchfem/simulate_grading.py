@@ -113,18 +113,19 @@ def _base(scene) -> Base:
         if found is None:
             break
         span, places, cell = found
-        layout = _layout(size, span, places)
+        layout = _layout(size, span, places, scene.accuracy.tolerance)
         if cell <= (span[1] - span[0]) / 64:  # the places are known better than the coarsest cells there
             break
     return Base(layout)
 
 
-def _layout(length: float, span, places) -> Layout:
+def _layout(length: float, span, places, tolerance: float) -> Layout:
+    """Coarsest columns: an edge of the contact is known to about half a cell of the finest, a quarter as long."""
     wide = span[1] - span[0]
     if len(places) > MOST_PLACES:
         return Layout(length, (), span, length / 64, length / 64, length / 64, 0.0)
     inside = min(wide / 6, length / 24)
-    least = max(inside / 96, LEAST * length)
+    least = max(min(inside / 64, tolerance * wide), inside / 800, LEAST * length)
     return Layout(length, tuple(places), tuple(span), least, max(inside, least), length / 12, 0.6)
 
 

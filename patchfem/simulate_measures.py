@@ -17,7 +17,7 @@ UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "mo
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
 GROWING, SLOWEST, DOUBTFUL, SECOND, LUCKY = 1.3, 1.5, 2.5, 4.0, 6.0  # ratios of successive changes that are believed
 FEW = 3  # nodes of a contact that no mesh of these cells resolves
-ROUND = 1e-12  # round-off, relative
+ROUND = 5e-12  # round-off, relative
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
 BANDED = ("approach", "pressure_peak", "normal_stiffness", "tangential_stiffness")
 
@@ -151,14 +151,14 @@ def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
 
 
 def _changes(fine: Patch, coarse: Patch, coarsest: Patch | None) -> dict:
-    """name -> (change from the coarse mesh to the fine one, from the coarsest to the coarse one), less the snapping of
-    the contact edges on both meshes; the second 0 without a coarsest mesh."""
+    """name -> (change from the coarse mesh to the fine one, from the coarsest to the coarse one), less half of what the
+    contact edges leave open on both meshes; the second 0 without a coarsest mesh."""
     found = [values(patch) for patch in (fine, coarse, coarsest) if patch is not None]
     snaps = [_snap(patch, value) for patch, value in zip((fine, coarse, coarsest), found, strict=False)]
     out = {}
     for name in found[0]:
         steps = [a[name] - b[name] for a, b in pairwise(found)]
-        noise = [a.get(name, 0.0) + b.get(name, 0.0) for a, b in pairwise(snaps)]
+        noise = [(a.get(name, 0.0) + b.get(name, 0.0)) / 2 for a, b in pairwise(snaps)]
         left = [float(np.sign(step) * max(0.0, abs(step) - cut)) for step, cut in zip(steps, noise, strict=True)]
         out[name] = (*left, 0.0)[:2]
     return out
