@@ -1,11 +1,13 @@
 """Measures of a static patch with their errors from coarser meshes."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from .contact.slip import normal_stiffness, rotational_stiffness, tangential_stiffness
 from .core import Measure, Outcome
+from .mesh.tensor import TensorGrid
 from .simulate_patch import Patch, solve
 
 UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "moment": "N m", "rotation": "rad",
@@ -13,6 +15,10 @@ UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "mo
          "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1", "rotational_stiffness": "N m rad-1",
          "pressure_centre_lateral": "m", "roll_moment": "N m"}
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
+GROWING, SLOWEST, DOUBTFUL, SECOND, LUCKY = 1.3, 1.5, 2.5, 4.0, 6.0  # ratios of successive changes that are believed
+FEW = 3  # nodes of a contact that no mesh of these cells resolves
+ROUND = 5e-12  # round-off, relative
+CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
 BANDED = ("approach", "pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
@@ -117,39 +123,125 @@ def edge_cells(x, active) -> np.ndarray:
     return np.diff(x)[active[1:] != active[:-1]]
 
 
-def remainder(last: float, before: float) -> float:
+def remainder(last: float, before: float, nested: bool = False) -> float:
     """What is still to come after the changes `before` and `last` of a value under two halvings of the mesh.
 
-    A geometric series whose ratio is taken from them, no better than second order and no worse than 1.5.
+    A geometric series whose ratio is taken from them, no worse than 1.5 (1.3 where the changes grow) and no better than
+    2.5; second order, a ratio of 4, is believed where every cell was halved (`nested`), the changes have one sign and
+    their ratio is below 6. A last change that is small by chance, its parts against one another, counts as what the
+    first one leaves.
     """
-    last = max(last, before / 4)
-    ratio = min(max(before / last, 1.5), 4.0) if last > 0 else 4.0
+    best = SECOND if nested and last * before > 0 and abs(before) < LUCKY * abs(last) else DOUBTFUL
+    before = abs(before)
+    last = max(abs(last), before / best)
+    ratio = min(max(before / last, SLOWEST if before > last else GROWING), best) if last > 0 else best
     return last / (ratio - 1)
 
 
 def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -> dict:
-    """name -> Measure; the error is three times what the changes between the three meshes leave to come (`remainder`),
-    at least what the snapping of the contact edge to a node costs."""
+    """name -> Measure; the error is three times what the changes between the three meshes leave to come (`remainder`)
+    and what the snapping of the contact edges to nodes costs, at least what no change between meshes shows."""
     mine = values(fine)
-    second = values(coarse) if coarse is not None else {}
-    third = values(coarsest) if coarsest is not None else second
-    cells = edge_cells(fine.x, fine.active)
-    cell = float(max(cells.max(), cells.sum() / 2)) if cells.size else 0.0
-    length = fine.pieces.interface.length
-    floors = {"contact_fraction": max(cell, np.diff(fine.x).min()) / length, "contact_half_width": 1e-12,
-              "pressure_centre": 1e-12, "pressure_centre_lateral": 1e-12, "roll_moment": 1e-10, "rotation": 1e-12,
-              "moment": 1e-10, "approach": 1e-13}
-    snap = cell / max(2 * cell, mine["contact_fraction"] * length) if cell else 0.0
-    least = {"contact_fraction": cell / length, "normal_load": 1e-10 * mine["normal_load"],
-             "contact_half_width": cell / 2, "normal_stiffness": snap / 4 * mine["normal_stiffness"],
-             "tangential_stiffness": snap / 4 * mine["tangential_stiffness"],
-             "rotational_stiffness": snap / 4 * mine["rotational_stiffness"]}
-    out = {}
-    for name, value in mine.items():
-        error = None
-        if second:
-            error = 3 * remainder(abs(value - second[name]), abs(second[name] - third[name]))
-            error = max(error, least.get(name, 0.0), 1e-12 * abs(value))
-            error = 0.0 if mine["normal_load"] == 0 else error
-        out[name] = Measure(value, UNITS[name], error, floors.get(name, 0.0))
+    floors = _floors(fine)
+    if coarse is None:
+        return {name: Measure(value, UNITS[name], None, floors.get(name, 0.0)) for name, value in mine.items()}
+    nested = coarsest is not None and _halved(fine, coarse) and _halved(coarse, coarsest)
+    snap, least, out = _snap(fine, mine), _least(fine, mine), {}
+    for name, (last, before) in _changes(fine, coarse, coarsest).items():
+        error = 3 * remainder(last, before, nested) + snap.get(name, 0.0)
+        error = max(error, least.get(name, 0.0), 1e-12 * abs(mine[name])) if mine["normal_load"] > 0 else 0.0
+        out[name] = Measure(mine[name], UNITS[name], float(error), floors.get(name, 0.0))
     return out
+
+
+def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
+    """name -> power of the cell length with which the error of a measure falls, from 1/2 to 2; 1 where unknown."""
+    changes = {name: np.abs(pair) for name, pair in _changes(fine, coarse, coarsest).items()}
+    return {name: float(np.clip(np.log2(before / last), 0.5, 2.0)) if last > 0 and before > 0 else 1.0
+            for name, (last, before) in changes.items()}
+
+
+def _changes(fine: Patch, coarse: Patch, coarsest: Patch | None) -> dict:
+    """name -> (change from the coarse mesh to the fine one, from the coarsest to the coarse one), less half of what the
+    contact edges leave open on both meshes; the second 0 without a coarsest mesh."""
+    found = [values(patch) for patch in (fine, coarse, coarsest) if patch is not None]
+    snaps = [_snap(patch, value) for patch, value in zip((fine, coarse, coarsest), found, strict=False)]
+    out = {}
+    for name in found[0]:
+        steps = [a[name] - b[name] for a, b in pairwise(found)]
+        noise = [(a.get(name, 0.0) + b.get(name, 0.0)) / 2 for a, b in pairwise(snaps)]
+        left = [float(np.sign(step) * max(0.0, abs(step) - cut)) for step, cut in zip(steps, noise, strict=True)]
+        out[name] = (*left, 0.0)[:2]
+    return out
+
+
+def _snap(patch: Patch, mine: dict) -> dict:
+    """What a contact edge between two nodes leaves open, in the measures that count nodes; nothing for a smooth skin,
+    whose pressure has no edge."""
+    cell, length = _cell(patch), patch.pieces.interface.length
+    if not cell or patch.skin is not None:
+        return {}
+    few = cell * (1 + 2 / max(patch.active.sum(), 1))
+    share = few / max(2 * cell, mine["contact_fraction"] * length)
+    return {"contact_fraction": 2 * few / length, "contact_half_width": few,
+            "normal_stiffness": share / 2 * mine["normal_stiffness"],
+            "tangential_stiffness": share / 2 * mine["tangential_stiffness"],
+            "rotational_stiffness": 3 * share / 2 * mine["rotational_stiffness"]}
+
+
+def _halved(fine: Patch, coarse: Patch) -> bool:
+    """Whether every cell of the coarse grids was split in two."""
+    pairs = ((fine.pair.grid, coarse.pair.grid), (fine.pair.upper_grid, coarse.pair.upper_grid))
+    return all(isinstance(a, TensorGrid) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
+               for a, b in pairs)
+
+
+def _cell(patch: Patch) -> float:
+    """Length [m] of the cell in which the contact ends, on the average of the ends where they are many; 0 if full."""
+    cells = edge_cells(patch.x, patch.active)
+    return float(max(cells.max(), cells.sum() / 2)) if cells.size else 0.0
+
+
+def _floors(fine: Patch) -> dict:
+    length = fine.pieces.interface.length
+    return {"contact_fraction": max(_cell(fine), np.diff(fine.x).min()) / length, "contact_half_width": 1e-12,
+            "pressure_centre": 1e-12, "pressure_centre_lateral": 1e-12, "roll_moment": 1e-10, "rotation": 1e-12,
+            "moment": 1e-10, "approach": 1e-13}
+
+
+def _least(patch: Patch, mine: dict) -> dict:
+    """Errors that three meshes may agree to hide: a contact of few nodes, the layer at a loaded corner of a coating
+    thinner than the cells there, round-off."""
+    length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
+    count = max(int(patch.active.sum()), 1)
+    aside = cell / (2 * count**2) if count <= FEW else 0.0
+    turns = "moment_balance" in patch.pressure.residuals
+    peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell else 0.0)
+    if count <= FEW and cell:
+        peak = max(peak, _wedge(patch))
+    moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
+    turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
+    fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
+    return {"normal_load": 1e-10 * load, "pressure_peak": peak, "loaded_fraction": peak * fullness,
+            "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
+            "rotation": turned / length, "approach": ROUND * (np.ptp(patch.gap) + moved)}
+
+
+def _corner_layer(patch: Patch) -> float:
+    """Pressure [Pa] that the free end of a coating may add at a loaded corner, unresolved by cells longer than it is
+    thick; it falls with the square of the cells."""
+    thick = [grid.coating for grid in (patch.pair.grid, patch.pair.upper_grid) if grid.coating > 0]
+    sigma, cells = patch.pressure.sigma_n, np.diff(patch.x)
+    if not thick or patch.pieces is not patch.pair.compliance:  # a skin evens the pressure out
+        return 0.0
+    return max(CORNER * s * min(1.0, (h / min(thick))**2) for s, h in ((sigma[0], cells[0]), (sigma[-1], cells[-1])))
+
+
+def _wedge(patch: Patch) -> float:
+    """Pressure [Pa] that the gap just beside a contact of few nodes allows at most: E* times its slope there."""
+    x, active = patch.x, patch.active
+    ends = np.flatnonzero(active[1:] != active[:-1])
+    slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[ends].max()
+    bending = [(1 - nu**2) / young for piece in (patch.pair.piece, patch.pair.upper)
+               for young, nu in (max(piece.layers.coating, piece.layers.substrate),)]
+    return float(slope / sum(bending))

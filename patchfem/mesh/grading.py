@@ -32,10 +32,10 @@ class Layout:
         beside = np.maximum(0.0, np.maximum(self.span[0] - x, x - self.span[1]))
         return np.minimum(out, self.inside + self.slope * beside)
 
-    def halved(self) -> "Layout":
-        """The layout whose cells are half as long everywhere."""
-        return replace(self, least=self.least / 2, inside=self.inside / 2, largest=self.largest / 2,
-                       slope=self.slope / 2)
+    def times(self, share: float) -> "Layout":
+        """The layout whose cells are `share` as long everywhere."""
+        return replace(self, least=self.least * share, inside=self.inside * share, largest=self.largest * share,
+                       slope=self.slope * share)
 
 
 def columns(layout: Layout, times: int = 1) -> np.ndarray:

@@ -1,0 +1,162 @@
+"""The error of every static measure against the same scene on meshes twice as fine, twice over.
+
+`python tests/test_error_bars.py graded 0 40` prints the coverage and the widths of forty random scenes.
+"""
+
+import sys
+
+import numpy as np
+import pytest
+
+from patchfem import simulate_grading as grading
+from patchfem.mesh.tensor import TensorGrid, coarser, finer
+from patchfem.scene import loads
+from patchfem.simulate_bodies import condensed
+from patchfem.simulate_measures import measures, remainder, values
+from patchfem.simulate_patch import pressed, solve_all
+
+PIECE = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+substrate = "Ti-8Al-1Mo-1V"
+"""
+ALWAYS = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}
+LEAST_WORK = 1e8  # of the graded meshes here: two levels finer stay affordable
+
+
+def settings(seed: int, kind: str) -> list:
+    """A random scene: load, coating, tilt, crown or step, holder or load line, unlike pieces, plane state, skin."""
+    r, out = np.random.default_rng(seed), []
+
+    def wide(low, high):
+        return 10 ** r.uniform(np.log10(low), np.log10(high))
+
+    out.append(f"contact.load={wide(1, 1e4):.6g} N")
+    if coated := r.random() < 0.8:
+        out.append(f"contact.coating.thickness={wide(1e-5, 5e-4):.4g} m")
+        out.append(f"contact.coating.material={r.choice(['WC-Co', 'steel', 'WC-Co sintered'])}")
+    if tilted := r.random() < 0.6:
+        out.append(f"contact.tilt.angle={wide(1e-6, 3e-3):.4g} rad")
+    draw = r.random()
+    if draw < 0.4:
+        out.append(f"contact.crown.radius={wide(1e-2, 30):.4g} m")
+    elif draw < 0.55:
+        out += [f"contact.step.height={wide(1e-7, 1e-5):.3g} m", f"contact.step.at={r.uniform(-5, 5):.3g} mm"]
+    draw = r.random()
+    if draw < 0.25:
+        out.append(f"contact.holder.rotational_stiffness={wide(1e2, 1e6):.3g} N m/rad")
+        if r.random() < 0.3:
+            out.append(f"contact.load_line.offset={r.uniform(-5, 5):.3g} mm")
+    elif draw < 0.4 and not tilted:
+        out.append(f"contact.load_line.offset={r.uniform(-6, 6):.3g} mm")
+    draw = r.random()
+    if draw < 0.15:
+        out.append("contact.upper.coating=none" if coated else "contact.upper.substrate=steel")
+    elif draw < 0.25:
+        out.append(f"contact.upper.height={wide(3e-3, 2e-2):.3g} m")
+    if r.random() < 0.3:
+        out.append("contact.plane=stress")
+    draw = r.random()
+    if draw < 0.15:
+        out += ["contact.asperities.law=linear", f"contact.asperities.normal_stiffness={wide(1e11, 1e15):.3g} Pa/m"]
+    elif draw < 0.3:
+        out += ["contact.asperities.law=exponential", f"contact.asperities.decay_length={wide(1e-8, 3e-6):.3g} m"]
+    if kind == "uniform":
+        out.append(f"contact.element_size={12.7 / r.integers(40, 130):.6g} mm")
+    return [*out, "accuracy.tolerance=1e-2"]
+
+
+def compared(seed: int, kind: str) -> dict:
+    """name -> (value, error, truth) of a random scene; the truth is what two splits of every cell lead to."""
+    scene = loads(PIECE, "a.toml", settings(seed, kind))
+    series = solve_all(scene)
+    found = measures(*series)
+    grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
+    same = grids[0] is grids[1]
+    for _ in range(2):
+        grids = [finer(grid) for grid in grids[:2 - same]]
+        finest.append(values(pressed(scene, condensed(scene, *grids))))
+    return {name: (m.value, m.error, limit(*(value[name] for value in finest))) for name, m in found.items()}
+
+
+def limit(first, second, third) -> float:
+    """Where a series under two halvings goes, if its changes have one sign and shrink; else its last value."""
+    before, last = second - first, third - second
+    if before * last <= 0 or abs(before) < 1.15 * abs(last):
+        return third
+    return third + last / (min(max(before / last, 1.2), 4.0) - 1)
+
+
+def missed(value, error, truth) -> bool:
+    return not abs(truth - value) <= error + 1e-11 * abs(value)
+
+
+def widths(rows) -> list:
+    """Error over true error of (value, error, truth), where the true error is more than round-off."""
+    return [error / abs(truth - value) for value, error, truth in rows if abs(truth - value) > 1e-9 * abs(value)]
+
+
+@pytest.fixture
+def small(monkeypatch):
+    monkeypatch.setattr(grading, "MOST_WORK", LEAST_WORK)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [(kind, seed) for kind, seeds in ALWAYS.items() for seed in seeds])
+def test_always_the_errors_hold_the_finer_mesh(kind, seed, small):
+    """Scenes that a rule of three meshes alone misses: symmetry up to round-off, full contact, a few nodes."""
+    for name, row in compared(seed, kind).items():
+        assert not missed(*row), (name, row)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "first"), [("uniform", 0), ("graded", 3000)])
+def test_always_nineteen_of_twenty_errors_hold_the_finer_mesh(kind, first, small):
+    """Forty random scenes: every measure covered in 95 % of them, half of the errors within 20 times the true one."""
+    rows = campaign(kind, first, 40)
+    for name, found in rows.items():
+        assert np.mean([missed(*row) for row in found]) <= 0.05, name
+        if name in ("contact_fraction", "pressure_peak", "approach", "normal_stiffness", "tangential_stiffness"):
+            assert np.median(widths(found)) <= 20, name
+
+
+def campaign(kind: str, first: int, count: int) -> dict:
+    """name -> [(value, error, truth)] of the scenes from seed `first` on."""
+    rows = {}
+    for seed in range(first, first + count):
+        for name, row in compared(seed, kind).items():
+            rows.setdefault(name, []).append(row)
+    return rows
+
+
+@pytest.mark.parametrize(("ratio", "nested", "width"), [(4, True, 1), (2, True, 1), (2, False, 1), (1.5, False, 1)])
+def test_exact_the_remainder_of_a_geometric_series(ratio, nested, width):
+    """Changes 1, 1/r, 1/r^2 ... leave 1/(r (r - 1)) after the second."""
+    assert remainder(1 / ratio, 1.0, nested) == pytest.approx(width / (ratio * (ratio - 1)), rel=1e-12)
+
+
+@pytest.mark.parametrize("last", [0.0, 1e-9, -0.1, -0.4])
+def test_always_a_change_small_by_chance_is_not_believed(last):
+    """After a change of one, one of the other sign or of none leaves at least what order log2(2.5) would."""
+    assert remainder(last, 1.0, nested=last < 0) >= 0.4 / 1.5 * (1 - 1e-12)
+
+
+def test_always_changes_that_grow_leave_more_than_the_last():
+    assert remainder(2.0, 1.0) > 2 * remainder(2.0, 4.0) and remainder(2.0, 1.0) > 6.0
+
+
+def test_exact_second_order_is_believed_of_split_grids_alone():
+    """`coarser` merges an odd number of rows as evenly as it goes: not the grid whose split is the fine one."""
+    grid = TensorGrid(np.linspace(-1, 1, 9), np.array([0.0, 1.0, 2.0, 4.0]), 0)
+    twice, half = finer(grid), coarser(grid)
+    assert half.depth == pytest.approx([0.0, 1.5, 4.0])
+    assert twice.depth.size == 2 * grid.depth.size - 1 and grid.depth.size != 2 * half.depth.size - 1
+
+
+if __name__ == "__main__":
+    grading.MOST_WORK = LEAST_WORK
+    for name, found in campaign(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])).items():
+        cover, ratio = 1 - np.mean([missed(*row) for row in found]), widths(found) or [0.0]
+        print(f"{name:24s} coverage {cover:.3f}  width over true error: median {np.median(ratio):.3g}, "
+              f"nine in ten below {np.quantile(ratio, 0.9):.3g}")
