@@ -159,8 +159,15 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
     from .simulate_bodies import bodies_of
+    from .simulate_plan import chosen_mesh
 
-    low, high = bodies_of(found)
+    if chosen_mesh(found):
+        from .simulate_patch import solve_all
+
+        pair = solve_all(found)[0].pair
+        low, high = pair.grid, None if pair.upper is pair.piece else pair.upper_grid
+    else:
+        low, high = bodies_of(found)
     write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
         print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")
@@ -208,7 +215,8 @@ def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float
                 for name, error in zip(names, cells))
         print(f"{one.label:<16} {one.seconds:9.3f}  " + "  ".join(text))
     for name in names:
-        print(f"  {name}: {'no run' if best[name] is None else best[name]} is the quickest within {tolerance:g}")
+        print(f"  {name}: " + (f"no setting meets {tolerance:g}" if best[name] is None else
+                               f"{best[name]} is the quickest within {tolerance:g}"))
 
 
 @app.command

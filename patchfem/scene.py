@@ -99,8 +99,9 @@ def load(path: str | Path, sets: Iterable[str] = ()) -> Scene:
 
 def _files(found: Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the scene names."""
-    named = [("contact.mesh", found.contact and found.contact.mesh), ("measured.file", found.measured and
-                                                                      found.measured.file)]
+    profile = found.contact and found.contact.profile
+    named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
+             ("measured.file", found.measured and found.measured.file)]
     return [(key, file) for key, file in named if file]
 
 

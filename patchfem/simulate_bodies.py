@@ -9,7 +9,7 @@ from .contact import cache
 from .contact.elasticity import Layers, assemble, interface_compliance
 from .core import Compliance, Interface, PatchfemError, frozen_array
 from .mesh.tensor import TensorGrid, graded_grid
-from .simulate_plan import AUTOMATIC_CELLS
+from .simulate_plan import AUTOMATIC_CELLS, piece_of
 
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
 
@@ -44,16 +44,6 @@ class Pair:
         if self.joint is None:
             return nodal, nodal
         return self.joint.forces(nodal)
-
-
-def piece_of(contact, side: str) -> tuple:
-    """(height, substrate, coating or None) of one piece, its own table before the common keys."""
-    own = getattr(contact, side)
-    height, substrate, coating = contact.height, contact.substrate, contact.coating
-    if own is not None:
-        height, substrate = own.height or height, own.substrate or substrate
-        coating = None if own.coating == "none" else own.coating or coating
-    return height, substrate, coating
 
 
 def layers_of(contact, side: str) -> Layers:

@@ -13,6 +13,7 @@ from .effects import EFFECTS
 from .export.results import Folder
 from .export.summary import summary, write_json
 from .simulate import Result, run
+from .simulate_plan import chosen_mesh
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
@@ -86,8 +87,8 @@ def write(result: Result, path: Path) -> dict:
 def resolved(scene) -> str:
     """The scene in SI with every default written out, also those that follow from other keys."""
     contact, friction = scene.contact, scene.friction
-    graded = scene.kind == "patch" and contact.profile is None  # its mesh follows from the tolerance
-    if contact is not None and contact.element_size is None and contact.mesh is None and not graded:
+    free = contact is not None and contact.element_size is None and contact.mesh is None
+    if free and not chosen_mesh(scene):
         from .simulate_plan import AUTOMATIC_CELLS
 
         contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})

@@ -8,9 +8,10 @@ import numpy as np
 from .core import Outcome, frozen_array
 from .mesh.grading import Layout, columns
 from .mesh.tensor import TensorGrid, finer, graded_depth
-from .simulate_bodies import condensed, piece_of, unlike
+from .simulate_bodies import condensed, unlike
 from .simulate_measures import measures, order
 from .simulate_patch import Patch, pressed
+from .simulate_plan import piece_of
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
 MOST_COLUMNS = 400  # of the finest grid

@@ -11,7 +11,7 @@ from .contact.unilateral import press, press_by
 from .core import Compliance, Pressure, frozen_array
 from .mesh.tensor import TensorGrid, coarser
 from .simulate_bodies import Pair, bodies_of, condensed
-from .simulate_plan import SHEAR_MODES
+from .simulate_plan import SHEAR_MODES, chosen_mesh
 
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
 
@@ -93,6 +93,8 @@ def pressed(scene, pair: Pair, worn=None) -> Patch:
     if contact.shear is None:
         giving = frozen_array(giving - pair.compliance.tangential)
     ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
+    if strips is not None:
+        notes = (*notes, strips.note)
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
         notes = (*notes, f"contact.mesh: {pair.joint.reason}")
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
@@ -139,9 +141,10 @@ def _closed_by(contact, pieces: Compliance, gap, angle: float) -> tuple:
         low, top = top, top + 2
     while low == top or short(low) >= 0:
         if low == bottom:
-            still = press(pieces, gap, 0.0, rotation=angle)
+            apart = contact.model_copy(update={"load": 0.0, "approach": None, "load_line": None, "holder": None})
+            pieces, still, skin, strips = _under(apart, pieces, gap, angle)
             open_ = frozen_array(gap - min(distance, gap.min()))
-            return pieces, replace(still, gap=open_, approach=distance), None, None
+            return pieces, replace(still, gap=open_, approach=distance), skin, strips
         low, top = max(low - 2, bottom), low
     brentq(short, low, top, xtol=1e-13, rtol=1e-14)
     return tried[-1]
@@ -194,9 +197,7 @@ def solve_all(scene, estimate: bool = True, fresh: bool = False) -> tuple:
     for. A mesh of any cells has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense
     anew, whatever is kept on disk.
     """
-    contact = scene.contact
-    free = contact.element_size is None and contact.mesh is None and contact.profile is None
-    if estimate and scene.kind == "patch" and free:
+    if estimate and chosen_mesh(scene):
         from .simulate_grading import solve_graded
 
         return solve_graded(scene, fresh)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import pi, sqrt
 
-from .core import PatchfemError
+from .core import Missing, PatchfemError
 from .effects import EFFECTS, absent
 
 AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
@@ -62,7 +62,25 @@ def plan(scene, per_point: bool = False) -> Plan:
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
     groups = _groups(scene, chain)
     return Plan(scene, scene.kind, named, tuple(absent(named)), engine, unknowns, steps, round(seconds, 2), size, chain,
-                groups, tuple(_verdict(scene, groups)))
+                groups, tuple(_verdict(scene, groups, size)))
+
+
+def free_bytes() -> float:
+    """Memory [bytes] that a run may still take; infinite where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            known = dict(line.split(":", 1) for line in file)
+        return 1024.0 * int(known["MemAvailable"].split()[0])
+    except (OSError, KeyError, ValueError):
+        return float("inf")
+
+
+def refuse_size(what: Plan) -> None:
+    """Missing where a run would need more memory than there is."""
+    free = free_bytes()
+    if what.bytes > free:
+        raise Missing(f"{what.scene.path}: about {what.bytes / 1e9:.3g} GB are needed, {free / 1e9:.3g} GB are free; "
+                      "make contact.element_size larger or the run shorter")
 
 
 def _sizes(scene) -> tuple:
@@ -71,7 +89,7 @@ def _sizes(scene) -> tuple:
     if contact is not None:
         size = contact.element_size or contact.length / AUTOMATIC_CELLS
         points = round(contact.length / size) + 1
-        if scene.kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None):
+        if chosen_mesh(scene):
             points = CHOSEN_POINTS
         unknowns |= {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
     if scene.structure is not None:
@@ -97,26 +115,44 @@ def _sizes(scene) -> tuple:
     return unknowns, chain
 
 
+def chosen_mesh(scene) -> bool:
+    """Whether the tolerance chooses the mesh: of a static patch without an element size, a mesh file or a profile."""
+    contact = scene.contact
+    return scene.kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None)
+
+
+def piece_of(contact, side: str) -> tuple:
+    """(height, substrate, coating or None) of one piece, its own table before the common keys."""
+    own = getattr(contact, side)
+    height, substrate, coating = contact.height, contact.substrate, contact.coating
+    if own is not None:
+        height, substrate = own.height or height, own.substrate or substrate
+        coating = None if own.coating == "none" else own.coating or coating
+    return height, substrate, coating
+
+
+def _bars(contact, softness) -> float:
+    """Sum over the layers of both pieces of thickness * softness(material), all pairs together, per area [m/N]."""
+    total = 0.0
+    for height, substrate, coat in (piece_of(contact, side) for side in ("lower", "upper")):
+        total += (height - (coat.thickness if coat else 0.0)) * softness(substrate)
+        total += coat.thickness * softness(coat.material) if coat else 0.0
+    return total / (contact.pairs * contact.length * contact.width)
+
+
 def nominal_load(scene) -> float:
-    """The load of a scene [N]; for a prescribed approach that of two uncoated bars in series, an upper estimate."""
+    """The load of a scene [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
     contact = scene.contact
     if contact is None:
         return scene.normal.load if scene.normal is not None else 0.0
     if contact.load is not None:
         return contact.load
-    modulus = contact.substrate.young / (1 - contact.substrate.poisson**2)
-    return contact.pairs * contact.approach.distance * modulus * contact.length * contact.width / (2 * contact.height)
+    return contact.approach.distance / _bars(contact, lambda m: (1 - m.poisson**2) / m.young)
 
 
 def block_shear(contact) -> float:
-    """Shear stiffness [N/m] of two blocks in series, layer by layer: an upper estimate of the solved one."""
-    def compliance(material, height):
-        return height * 2 * (1 + material.poisson) / material.young
-
-    coat = contact.coating
-    one = compliance(contact.substrate, contact.height - (coat.thickness if coat else 0.0))
-    one += compliance(coat.material, coat.thickness) if coat else 0.0
-    return contact.pairs * contact.length * contact.width / (2 * one)
+    """Shear stiffness [N/m] of two blocks in series, layer by layer; short blocks held at both faces are stiffer."""
+    return 1 / _bars(contact, lambda m: 2 * (1 + m.poisson) / m.young)
 
 
 def _rig_cost(scene, per_point, unknowns) -> tuple:
@@ -165,13 +201,12 @@ def _groups(scene, chain) -> dict:
         if f is not None:
             out["slip_length"] = f.static * load / stiff
         if contact.tilt is not None and load > 0:
-            modulus = contact.substrate.young / (1 - contact.substrate.poisson**2)
-            approach = load / contact.pairs * 2 * contact.height / (modulus * contact.length * contact.width)
+            approach = load * _bars(contact, lambda m: (1 - m.poisson**2) / m.young)
             out["tilt_over_first_opening"] = abs(contact.tilt.angle) * contact.length / (2 * approach)
     return {k: v for k, v in out.items() if v is not None}
 
 
-def _verdict(scene, groups) -> list:
+def _verdict(scene, groups, size: int) -> list:
     out = []
     d = groups.get("D")
     if d is not None:
@@ -181,6 +216,8 @@ def _verdict(scene, groups) -> list:
             out.append(f"D = {d:.3g} between pi/4 and 1: stick-slip at resonance")
         else:
             out.append(f"D = {d:.3g} below pi/4: at resonance friction alone does not bound the motion")
+    if size > free_bytes():
+        out.append(f"run will refuse: about {size / 1e9:.3g} GB are needed, {free_bytes() / 1e9:.3g} GB are free")
     tilt = groups.get("tilt_over_first_opening")
     if tilt is not None:
         part = min(1.0, 1 / sqrt(tilt)) if tilt > 1 else 1.0

@@ -4,7 +4,7 @@ import numpy as np
 
 from .contact import skin, skin_laws
 from .core import Compliance, Pressure, frozen_array
-from .simulate_bodies import piece_of
+from .simulate_plan import piece_of
 
 BEARING = 1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .contact.strips import press_strips, strip_offsets, strips_tangent
+from .contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from .core import Compliance, Pressure, frozen_array
 from .simulate_skin import borne
 
@@ -15,8 +15,8 @@ def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: fl
     count, interface = contact.strips.count, pieces.interface
     skin = law_of(contact)
     by = contact.approach.distance if contact.approach is not None else None
-    state = press_strips(pieces.normal * count, interface.x, interface.weight / count,
-                         strip_offsets(contact.width, count), gap, contact.strips.roll,
+    one, _, weight = one_strip(pieces, count)
+    state = press_strips(one, interface.x, weight, strip_offsets(contact.width, count), gap, contact.strips.roll,
                          contact.load if by is None else None, moment if by is None else None, by, angle,
                          spring if by is None else 0.0, skin)
     mean = (borne(state.pressure) if _smooth(skin) else state.pressure).mean(axis=0)

@@ -150,8 +150,16 @@ def test_exact_a_crown_read_from_a_profile_is_the_crown(tmp_path):
     tables = profile(tmp_path, x, x**2 / 2 / 5.0)
     read, crown = (solved(part, path=tmp_path / "scene.toml")[1]
                    for part in (tables, '[contact.crown]\nradius = "5 m"\n'))
-    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness"):
-        assert read[name] == pytest.approx(crown[name], rel=1e-5), name
+    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness", "approach"):
+        assert read[name] == pytest.approx(crown[name], rel=1e-5 if name != "approach" else 5e-3), name
+
+
+def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
+    patch, found = solved(profile(tmp_path, x, 1e-3 * x), path=tmp_path / "scene.toml")
+    flat = solved()[1]
+    assert any("levelled, a slope of 0.001 rad is taken out" in note for note in patch.notes)
+    assert found["pressure_peak"] == pytest.approx(flat["pressure_peak"], rel=1e-3)
 
 
 def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
@@ -162,7 +170,7 @@ def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(t
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
     assert any("left to the law of the asperities" in note for note in patch.notes)
     box = np.sinc(0.127e-3 / 50e-6)  # of the average over a cell
-    assert np.abs(patch.gap[1:-1]).max() == pytest.approx(1e-7 * abs(box), rel=0.02)
+    assert np.ptp(patch.gap[1:-1]) / 2 == pytest.approx(1e-7 * abs(box), rel=0.02)
 
 
 # --------------------------------------------------------------------------------------------------- pieces that differ
@@ -250,8 +258,9 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     [sentence] = plane_band(found, patch)
     stress = values(solve(scene(TILT.format(1e-5) + "", 'load = "26 lbf"\nelement_size = "0.127 mm"\nplane = "stress"'),
                           *bodies_of(found)))
-    change = 100 * (stress["approach"] / values(patch)["approach"] - 1)
-    assert f"approach by {change:+.2g} %" in sentence and change > 3
+    mine = values(patch)
+    assert f"approach by {stress['approach'] - mine['approach']:+.2g} m" in sentence
+    assert f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %" in sentence
     wide = loads(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.127 mm"', material=STEEL, tables="")
                  .replace('width = "12.7 mm"', 'width = "60 mm"'))
     assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
@@ -323,3 +332,40 @@ def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
         found = measures(*solve_all(loads(text.format(size))))
         for name, value in truth.items():
             assert abs(found[name].value - value) <= found[name].error <= 60 * abs(found[name].value - value), name
+
+
+def test_exact_the_count_of_strips_is_in_the_bars():
+    """A crowned pad under a roll in 4 strips against 64: the bar of 4 holds the difference."""
+    tables = '[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {}\nroll = "0.02 mrad"\n'
+    keys = 'load = "26 lbf"\nelement_size = "0.25 mm"'
+    few, many = (run(plan(scene(tables.format(count), keys))).measures for count in (4, 64))
+    for name in ("pressure_centre_lateral", "roll_moment", "pressure_peak", "contact_fraction"):
+        assert 0 < abs(few[name].value - many[name].value) <= few[name].error, name
+
+
+def test_refuses_a_run_that_the_memory_cannot_hold():
+    from patchfem.core import Missing
+
+    found = plan(scene(keys='load = "26 lbf"\nelement_size = "1 nm"'))
+    assert any("run will refuse" in sentence for sentence in found.verdict)
+    with pytest.raises(Missing, match="GB are needed"):
+        run(found)
+
+
+@pytest.mark.parametrize("tables, keys, said", [
+    ('[contact.upper]\nsubstrate = {young = "1 MPa", poisson = 0.3, density = "1 kg/m^3"}\n', "", "lowest Young"),
+    ('[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.499, density = "1 kg/m^3"}\n', "", "cells lock"),
+    ("", 'element_size = "3 mm"', "no error is estimated on 5 elements"),
+])
+def test_always_what_leaves_the_model_is_said(tables, keys, said):
+    found = run(plan(scene(tables, 'load = "26 lbf"\n' + (keys or 'element_size = "0.5 mm"'))))
+    assert any(said in text for text in found.warnings)
+
+
+def test_exact_the_chain_of_a_plan_knows_both_pieces():
+    soft = '[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.3, density = "1 kg/m^3"}\n[contact.shear]\n'
+    rub = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "triangle"\namplitude = "1 um"\n' \
+          'speed = "1 mm/s"\n'
+    chain = plan(scene(soft + rub)).chain
+    bars = 1 / (HEIGHT * 2.6 / 210e9 + HEIGHT * 2.6 / 1e9) * LENGTH * WIDTH
+    assert chain["pieces_shear"] == pytest.approx(bars, rel=1e-9)

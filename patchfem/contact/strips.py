@@ -48,6 +48,11 @@ class StripsState:
     iterations: int
     residuals: MappingProxyType
 
+    @property
+    def note(self) -> str:
+        """What the answer leaves out, in words."""
+        return NEGLECTED
+
     def yaw_moment(self, friction: float) -> float:
         """Moment mu sum f y [N m] about +z of friction on the upper piece while all of it slides towards +x."""
         return friction * self.roll_moment

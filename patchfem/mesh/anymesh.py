@@ -206,6 +206,9 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
     wrong = (np.abs(slope) > STEEP) | hollow
     if wrong.any() or not flat.any():
         off = int(np.argmax(np.abs(y))) if not flat.any() else int(np.argmax(wrong))
+        if not flat.any() and not wrong.any():
+            raise PatchfemError(f"{where}: no node of {name} lies on y = 0, where rounded faces touch; the nearest is "
+                                f"{abs(y).min():.6g} m off it")
         raise PatchfemError(f"{where}: {name} is not the straight line y = 0, with edges rounded away by a slope up to "
                             f"{STEEP:g}: the node at x = {x[off]:.6g} m lies {abs(y[off]):.6g} m off it; shapes belong "
                             "into the gap ([contact.crown], [contact.tilt])")

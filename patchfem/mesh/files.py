@@ -129,7 +129,9 @@ def _load(path: Path, known: tuple = (".msh",)):
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)
-    except (Exception, SystemExit) as error:
+    except SystemExit:
+        raise PatchfemError(f"{path}: not a readable {path.suffix} file (its reader gave up)") from None
+    except Exception as error:
         raise PatchfemError(f"{path}: not a readable {path.suffix} file ({type(error).__name__}: {error})") from None
 
 
