@@ -84,10 +84,12 @@ def main(names=NAMES, columns: int = COLUMNS, rows: int = ROWS) -> list:
     out = []
     for name in names:
         done = subprocess.run([sys.executable, __file__, name, str(columns), str(rows), "--once"], text=True,
-                              env=os.environ | one, stdout=subprocess.PIPE)
+                              env=os.environ | one, capture_output=True)
         if done.returncode == 0:
             out.append(json.loads(done.stdout))
             print(done.stdout, end="", flush=True)
+        else:
+            print(f"{name}: left out, {done.stderr.strip().splitlines()[-1].partition(': ')[2]}", flush=True)
     return out
 
 
