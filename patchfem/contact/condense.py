@@ -40,25 +40,17 @@ def sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
 
 
 def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
-    """As `sweep` at half its cost, for a piece that is its own mirror image and has a column in the middle.
+    """As `sweep` at half its cost, for a piece that is its own mirror image.
 
-    Motion that is even inward and odd along x and motion the other way round do not mix: each is that of the right half
-    with what it forbids held in the middle. A force on the right is half the sum of its even and its odd pair.
+    Motion that is even inward and odd along x and motion the other way round do not mix: each is that of the right
+    half, with what it forbids held in a middle column, or with the left neighbour of the first column its own image.
+    A force on the right is half the sum of its even and its odd pair.
     """
     diagonal, upper = _blocks(matrix, columns)
-    middle, size = columns // 2, diagonal.shape[1]
+    middle = columns // 2
     sign = np.tile([-1.0, 1.0], columns - middle)  # parity of (along x, inward) in even motion
-    halves = []
-    for held in (0, 1):
-        block, first = diagonal[middle:].copy(), upper[middle:].copy()
-        block[0] /= 2
-        gone = np.arange(held, size, 2)
-        strength = np.abs(np.diag(block[0])).max()
-        block[0][gone], block[0][:, gone], first[0][gone] = 0.0, 0.0, 0.0
-        block[0][gone, gone] = strength
-        half = _swept(block, first)
-        half[held], half[:, held] = 0.0, 0.0
-        halves.append(half / 2)
+    halves = [_half(diagonal[middle:], upper[middle:], None if columns % 2 else upper[middle - 1], held)
+              for held in (0, 1)]
     same, across = halves[0] + halves[1], sign[:, None] * (halves[0] - halves[1])
     right = slice(2 * middle, None)
     out = np.empty((2 * columns, 2 * columns))
@@ -69,6 +61,29 @@ def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
     out[np.ix_(np.arange(2 * columns)[right], left)] = across.T
     out[np.ix_(left, left)] = sign[:, None] * same * sign
     return out
+
+
+def _half(diagonal, upper, bridge, held: int) -> np.ndarray:
+    """Half the compliance of the right half in even (held 0: nothing moves along x in the middle) or odd motion.
+
+    bridge: the block between the two middle columns, None where one stands in the middle.
+    """
+    size = diagonal.shape[1]
+    first, rest = diagonal[0].copy(), upper
+    if bridge is not None:
+        first += (1 - 2 * held) * np.tile([-1.0, 1.0], size // 2)[:, None] * bridge
+        return _swept(np.concatenate([first[None], diagonal[1:]]), upper) / 2
+    first /= 2
+    gone = np.arange(held, size, 2)
+    strength = np.abs(np.diag(first)).max()
+    first[gone], first[:, gone] = 0.0, 0.0
+    first[gone, gone] = strength
+    if len(upper):
+        rest = upper.copy()
+        rest[0][gone] = 0.0
+    half = _swept(np.concatenate([first[None], diagonal[1:]]), rest)
+    half[held], half[:, held] = 0.0, 0.0
+    return half / 2
 
 
 def _swept(diagonal, upper) -> np.ndarray:

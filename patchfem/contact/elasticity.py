@@ -125,6 +125,6 @@ def interface_compliance(piece: Piece) -> tuple:
     """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (nx, nx) [m2/N], read-only."""
     from .condense import mirrored_sweep, sweep
 
-    mirrored = piece.x.size % 2 and np.abs(piece.x + piece.x[::-1]).max() <= 1e-13 * np.ptp(piece.x)
+    mirrored = np.abs(piece.x + piece.x[::-1]).max() <= 1e-13 * np.ptp(piece.x)
     both = (mirrored_sweep if mirrored else sweep)(piece.matrix, piece.x.size)
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))

@@ -29,7 +29,7 @@ def test_exact_sweep_of_a_piece_is_the_dense_inverse(cells):
     assert np.abs(sweep(matrix, cells + 1) - wanted).max() <= 1e-9 * np.abs(wanted).max()
 
 
-@pytest.mark.parametrize("cells", [2, 4, 30])
+@pytest.mark.parametrize("cells", [2, 3, 4, 5, 30, 31])
 def test_exact_halves_of_a_mirrored_piece_give_the_whole(cells):
     grid = graded_grid(6e-3, 3e-3, 6e-3 / cells, COATING)
     matrix = assemble(grid.x, grid.depth, grid.coating_rows, COATED).matrix
