@@ -3,9 +3,9 @@
 Both solve the same discrete problem (waves of a half plane, Polonsky and Keer's iteration): at half of the closing load
 p(0) is wrong by 7e-7, 1e-8 and 2e-9 and p(x) by 3.4e-3, 8.4e-4 and 2.1e-4 in the mean square at 256, 1024 and 4096
 points in either program, in the same number of iterations (64, 117, 214). At the same tolerance of 1e-10 Tamaas 2.9.0
-needs 0.7, 5.5 and 38 ms, patchfem 2.9, 7.0 and 24 ms. As exact as the grid allows is Tamaas at looser tolerances,
-which patchfem refuses to hand out (residual above 1e-9): 0.6, 2.5 and 25 ms, that is 0.21, 0.36 and 1.0 of patchfem's
-time. The compiled loop wins on short rows, where NumPy pays 45 us per iteration for calls, and is even at 4096.
+needs 0.7, 4.6 and 39 ms, patchfem 2.6, 5.7 and 18 ms. As exact as the grid allows is Tamaas at looser tolerances,
+which patchfem refuses to hand out (residual above 1e-9): 0.5, 2.0 and 25 ms, that is 0.18, 0.35 and 1.4 of patchfem's
+time. The compiled loop wins on short rows, where NumPy pays 40 us per iteration for calls, and loses from 4096 on.
 
 Finite elements: patchfem has no periodic pieces, but half a wave between two lines of symmetry is the same problem
 without approximation. p(0) is wrong by 1.6e-4, 4e-5 and 3e-5 with 16, 32 and 64 cells per half wave, p(x) by 3.1e-2,

@@ -2,11 +2,10 @@
 
 All of accuracy but one: Hertz p(0) 4.5e-5 and half width 2.7e-4 at a/16, a tilted punch 2.0e-3 at 65 nodes with order
 1.9, Westergaard p(0) 1.6e-5 (waves) and 3.2e-5 (finite elements) from 30 to 99 % of the closing load, layers 2.9e-4,
-the shear identity 2e-13, complementarity 2e-16. Missed is Westergaard at 5 % of the closing load, 2.2e-4 and 6.3e-4,
-where 9 of 64 points touch; finite elements reach 1.4e-4 with 128 cells. Of the times, in CPU seconds of a machine
-shared with other work: 0.22 and 3.3 s to condense 400 and 1600 nodes (wanted 0.2 and 2), cold solves 11 and
-500 ms (10 and 100; the slow one is a tilt of 1e-5 rad, nine steps near full contact, all others stay below 105 ms), a
-further tilt 1.8 ms (1.5) and 1000 of them 3.2 s (2); 1.5 ms of each is the look-up of the BLAS libraries.
+the shear identity 4e-14, complementarity 1e-16. Missed is Westergaard at 5 % of the closing load, 2.2e-4 and 6.3e-4,
+where 9 of 64 points touch; finite elements reach 1.4e-4 with 128 cells. All of the times, in CPU seconds: 0.16 and
+1.3 s to assemble and condense 400 and 1600 nodes (wanted 0.2 and 2), cold solves 2 and 43 ms (10 and 100), a further
+tilt 0.23 ms (1.5), 1000 points of loads and tilts 0.5 s (2).
 
 Run: python studies/targets/contact.py [--accuracy]
 """
