@@ -167,7 +167,15 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
         error = 3 * remainder(last, before, nested) + snap.get(name, 0.0)
         error = max(error, least.get(name, 0.0), 1e-12 * abs(mine[name])) if mine["normal_load"] > 0 else 0.0
         out[name] = Measure(mine[name], UNITS[name], float(error), floors.get(name, 0.0))
+    if mine["pressure_peak"] > 0:
+        out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
     return out
+
+
+def _of_peak(fraction: Measure, peak: Measure) -> Measure:
+    """The loaded fraction with at least the relative error of the peak that it is divided by."""
+    share = peak.error / peak.value
+    return replace(fraction, error=max(fraction.error, fraction.value * share / (1 - min(share, 0.5))))
 
 
 def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
@@ -178,14 +186,14 @@ def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
 
 
 def _changes(fine: Patch, coarse: Patch, coarsest: Patch | None) -> dict:
-    """name -> (change from the coarse mesh to the fine one, from the coarsest to the coarse one), less half of what the
-    contact edges leave open on both meshes; the second 0 without a coarsest mesh."""
+    """name -> (change from the coarse mesh to the fine one, from the coarsest to the coarse one), less a quarter of
+    what the contact edges leave open on both meshes; the second 0 without a coarsest mesh."""
     found = [values(patch) for patch in (fine, coarse, coarsest) if patch is not None]
     snaps = [_snap(patch, value) for patch, value in zip((fine, coarse, coarsest), found, strict=False)]
     out = {}
     for name in found[0]:
         steps = [a[name] - b[name] for a, b in pairwise(found)]
-        noise = [(a.get(name, 0.0) + b.get(name, 0.0)) / 2 for a, b in pairwise(snaps)]
+        noise = [(a.get(name, 0.0) + b.get(name, 0.0)) / 4 for a, b in pairwise(snaps)]
         left = [float(np.sign(step) * max(0.0, abs(step) - cut)) for step, cut in zip(steps, noise, strict=True)]
         out[name] = (*left, 0.0)[:2]
     return out
@@ -199,8 +207,8 @@ def _snap(patch: Patch, mine: dict) -> dict:
         return {}
     few = cell * (1 + 2 / max(patch.active.sum(), 1))
     share = few / max(2 * cell, mine["contact_fraction"] * length)
-    return {"contact_fraction": 2 * few / length, "contact_half_width": few,
-            "normal_stiffness": share / 2 * mine["normal_stiffness"],
+    return {"contact_fraction": 2.5 * few / length, "contact_half_width": 1.25 * few,
+            "normal_stiffness": share * mine["normal_stiffness"],
             "tangential_stiffness": share / 2 * mine["tangential_stiffness"],
             "rotational_stiffness": 3 * share / 2 * mine["rotational_stiffness"]}
 
