@@ -17,4 +17,4 @@ Read the package in the order of the physics; each stage imports `core` and itse
 13. `simulate`   the page where the stages meet
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

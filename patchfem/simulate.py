@@ -76,7 +76,7 @@ def _loose(result: Result) -> list:
     if scene.contact is not None and scene.contact.mesh is not None:
         remedies.append("split the elements of contact.mesh")
     elif scene.contact is not None and chosen_mesh(scene):
-        remedies.append("the chosen mesh is as fine as it gets: raise accuracy.tolerance")
+        remedies.append("the mesh that the tolerance chose reaches no further, their errors stand")
     elif scene.contact is not None:
         remedies.append("lower contact.element_size")
     remedies += ["raise accuracy.steps_per_cycle"] if result.plan.kind in ("rig", "bench") else []
