@@ -18,8 +18,8 @@ from .strips_solve import bare_parts, by_strip, loaded, skin_parts, smooth, soft
 from .threads import one_thread
 from .unilateral import LIMIT
 
-NEGLECTED = ("the strips over the width do not feel each other: the shear between them is neglected; fields and pictures "
-             "show their mean, result.nc every strip")
+NEGLECTED = ("the strips over the width do not feel each other: the shear between them is neglected; fields and "
+             "pictures show their mean, result.nc every strip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
