@@ -72,6 +72,12 @@ class Scene:
         """The effects the scene names: a table, or ``table.key=value`` for the selectors of a table that has them."""
         return effects(self.tables())
 
+    def where(self, key: str) -> str:
+        """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
+        lines = key_lines(self.text)
+        line = lines.get(key) or lines.get(key.rpartition(".")[0])
+        return f"{self.path}:{line}: {key}" if line else f"{self.path}: {key}"
+
     def beside(self, name: str) -> Path:
         """A path written in the scene, which is relative to the scene's own folder."""
         return self.path.parent / name

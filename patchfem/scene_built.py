@@ -87,8 +87,6 @@ def combinations(draft: Draft, kind: str) -> None:
     shear = contact.gives_way if contact is not None else ""
     if kind == "linear" and accuracy and accuracy.method == "march":
         draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
-    if contact is not None:
-        _mesh(draft, contact)
     if kind not in ("bench", "rig") or law is None:
         return
     if shear:
@@ -99,13 +97,6 @@ def combinations(draft: Draft, kind: str) -> None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
         if contact.strips is not None and shear:
             draft.say("contact.strips", f"beside {shear}: leave one of them out; not yet built")
-
-
-def _mesh(draft: Draft, contact: Contact) -> None:
-    if contact.mesh is not None:
-        for name in ("upper", "lower"):
-            if getattr(contact, name) is not None:
-                draft.say(f"contact.{name}", "beside contact.mesh: leave mesh out; not yet built")
 
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:

@@ -75,18 +75,20 @@ def bodies_of(scene) -> tuple:
     except PatchfemError:  # no tensor grid of alike pieces; what is wrong with the file is said by the general reader
         pair = read_pieces(path)
         low, high = pair.lower, pair.upper
-    for body in (low,) if high is None else (low, high):
-        _matches(scene, body)
-    return low, high
+    for side, body in (("lower", low), ("upper", high or low)):
+        _matches(scene, side, body)
+    return low, low if high is None and unlike(contact) else high
 
 
-def _matches(scene, body) -> None:
+def _matches(scene, side: str, body) -> None:
     contact = scene.contact
-    thickness = contact.coating.thickness if contact.coating else 0.0
-    for key, mine, wanted in (("length", body.length, contact.length), ("height", body.height, contact.height),
+    height, _, coating = piece_of(contact, side)
+    thickness = coating.thickness if coating else 0.0
+    for key, mine, wanted in (("length", body.length, contact.length), ("height", body.height, height),
                               ("coating.thickness", body.coating, thickness)):
         if abs(mine - wanted) > 1e-6 * contact.length:
-            raise PatchfemError(f"{scene.path}: contact.{key} is {wanted:.9g} m, the mesh has {mine:.9g} m")
+            raise PatchfemError(f"{scene.where('contact.' + key)}: {wanted:.9g} m, the {side} piece of the mesh has "
+                                f"{mine:.9g} m")
 
 
 def finite_elements(body, layers: Layers):

@@ -32,7 +32,7 @@ def profile_gap(scene, x) -> tuple:
     noise = np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z))  # what levelling leaves of a straight line
     if not noise and (said := too_fine(trace, asked_size(contact, size))) is not None:
         if contact.asperities is None:
-            raise PatchfemError(f"{scene.path}: contact.profile: {said}")
+            raise PatchfemError(f"{scene.where('contact.profile.file')}: {said}")
         notes = (*notes, said.partition(": add")[0] + ": that is averaged out and left to the law of the asperities")
     heights = on_nodes(trace, x)
     return heights - heights.min(), notes

@@ -165,7 +165,8 @@ def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
 def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
-    with pytest.raises(PatchfemError, match=r"contact\.profile: .* % of its height below 2 elements .*element_size"):
+    with pytest.raises(PatchfemError, match=r"scene\.toml:10: contact\.profile\.file: .* % of its height below 2 "
+                                            "elem.*element_size"):
         solved(tables, path=tmp_path / "scene.toml")
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
     assert any("left to the law of the asperities" in note for note in patch.notes)
@@ -199,6 +200,28 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
 
     write_fields(result, tmp_path / "fields.vtkhdf")
     assert (tmp_path / "fields.vtkhdf").stat().st_size > 1e4
+
+
+UNLIKE = '[contact.upper]\nsubstrate = "Ti-8Al-1Mo-1V"\nheight = "{}"\n'
+
+
+@pytest.mark.parametrize("height", ["6.35 mm", "9 mm"])
+def test_exact_a_mesh_of_unlike_pieces_is_the_grids_it_was_made_of(tmp_path, height):
+    tables = TILT.format(2e-5) + UNLIKE.format(height)
+    made = scene(tables, 'load = "26 lbf"\nelement_size = "0.3 mm"')
+    low, high = bodies_of(made)
+    read = scene(tables, meshed(tmp_path, low, high), path=tmp_path / "scene.toml")
+    mine, theirs = values(solve(read, *bodies_of(read))), values(solve(made, low, high))
+    assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-15)
+    alike = scene(TILT.format(2e-5), 'load = "26 lbf"\nelement_size = "0.3 mm"')
+    assert theirs["approach"] > 1.1 * values(solve(alike, *bodies_of(alike)))["approach"]
+
+
+def test_refuses_a_mesh_whose_pieces_are_not_those_of_the_scene(tmp_path):
+    grid = graded_grid(LENGTH, HEIGHT, LENGTH / 20)
+    found = scene(UNLIKE.format("9 mm"), meshed(tmp_path, grid, grid), path=tmp_path / "scene.toml")
+    with pytest.raises(PatchfemError, match=r"scene\.toml:5: contact\.height: 0\.009 m, the upper piece of the mesh"):
+        bodies_of(found)
 
 
 def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_path):
