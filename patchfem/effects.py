@@ -39,6 +39,7 @@ EFFECTS = {
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "friction.law=coulomb": Effect("patchfem.dynamics.events", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
                                    ("pressure",), ("traction",)),
+    "friction.law=tanh": Effect("patchfem.friction.local", "F = mu N tanh(v/v_0) (2.4)", ("pressure",), ("traction",)),
     "friction.law=elastic-plastic": Effect("patchfem.friction.local", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
                                            "reversal)", ("pressure",), ("traction",)),
     "friction.law=nonlocal": Effect("patchfem.friction.quadrature", "tau = -mu_s int phi(R/eps) sigma_n "
@@ -59,7 +60,7 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "friction.law=tanh", "friction.law=convolution", "friction.temperature", "slide.kind=dwell", "slide.kind=file",
+    "friction.law=convolution", "friction.temperature", "slide.kind=dwell", "slide.kind=file",
     "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
     "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",
     "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",

@@ -217,6 +217,9 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         fields = _rig_fields(scene, settings, patch, raw, drive)
     extra["book"] = raw.book
+    if scene.friction is not None and scene.friction.law == "tanh":
+        warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
+                    f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
     warnings = [*warnings, raw.message] if raw.message else warnings
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 

@@ -77,7 +77,7 @@ def steps_of(scene) -> int:
 
 def law_for(scene):
     """The NumPy law object of a bench."""
-    from .friction.local import Coulomb, ElasticPlastic
+    from .friction.local import Coulomb, ElasticPlastic, Rate
     from .friction.quadrature import Quadrature
     from .friction.recursion import Recursion
 
@@ -86,6 +86,8 @@ def law_for(scene):
         return Coulomb(f.kinetic)
     if f.law == "elastic-plastic":
         return ElasticPlastic(f.static, f.bond_length)
+    if f.law == "tanh":
+        return Rate(f.static, f.reference_speed)
     law = bonds_of(scene)
     if law.reading == "stretch" and law.order == 1:
         return Recursion(law)

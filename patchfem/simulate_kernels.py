@@ -14,6 +14,7 @@ from .simulate_step_kernels import (
     JENKINS,
     LIST,
     POINTS,
+    RATE,
     Contact,
     Modes,
     Steps,
@@ -26,8 +27,8 @@ from .simulate_step_kernels import (
     solve_modes,
 )
 
-__all__ = ["COULOMB", "JENKINS", "LIST", "POINTS", "Contact", "Modes", "Steps", "Work", "contact_state", "follow_path",
-           "march"]
+__all__ = ["COULOMB", "JENKINS", "LIST", "POINTS", "RATE", "Contact", "Modes", "Steps", "Work", "contact_state",
+           "follow_path", "march"]
 
 
 @njit(error_model="numpy")
@@ -94,6 +95,8 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
         for k in range(n):
             v1 += slide[k] * state[k, 1]
         held[0] = used
+        if kind == RATE:
+            held[0] = c.force[0] * np.tanh(v1 / c.force[1])
         rows[i, 2 * n + 4] = used
         ledger[8] += used * dq
         if kind == COULOMB and dq == 0.0:

@@ -8,6 +8,7 @@ import numpy as np
 from .compiled import load_kernels
 from .core import BaseSine, Missing, ModalBasis, Outcome, Response
 
+RATE = 4  # kind of a force that follows the speed, as in simulate_kernels
 LIST_CAPACITY = 20_000  # bonds of a shared list; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
@@ -49,6 +50,11 @@ class ContactModel:
 def coulomb_model(static: float, kinetic: float) -> ContactModel:
     """Rigid Coulomb contact with static and kinetic friction force [N]."""
     return ContactModel(0, static, {"force": [static, kinetic, static]})
+
+
+def rate_model(limit: float, speed: float) -> ContactModel:
+    """Friction limit*tanh(v/speed) of eq. 2.4, limit [N], speed v_0 [m/s]."""
+    return ContactModel(RATE, limit, {"force": [limit, speed, limit]})
 
 
 def jenkins_model(stiffness, yield_slide) -> ContactModel:

@@ -111,7 +111,8 @@ def _sizes(scene) -> tuple:
         area = contact.length * contact.width * contact.pairs
         chain["asperities"] = skin.tangential_ratio * mean_stiffness(contact, load / area) * area
     if f is not None and load > 0:
-        chain["bonds"] = f.static * load / f.bond_length if f.bond_length else "rigid until it slips"
+        rigid = "none: it creeps" if f.law == "tanh" else "rigid until it slips"
+        chain["bonds"] = f.static * load / f.bond_length if f.bond_length else rigid
     return unknowns, chain
 
 

@@ -151,6 +151,8 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
         if f.law == "coulomb":
             return hub.coulomb_model(limit, f.kinetic * load)
         return hub.jenkins_model([limit / length], [length])
+    if f.law == "tanh":
+        return hub.rate_model(limit, f.reference_speed)
     law = law_of(scene, drive.acceleration / drive.omega)
     if law.reading == "report" or law.order != 1:
         from .friction.quadrature import cutoff
@@ -235,7 +237,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, drive.omega), work,
                                  modes.mass * modes.omega[0]**2)
     length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
-    stuck = values["slip_amplitude"] < (1e-3 * length if model.kind else 1e-300)
+    held = 1e-3 * length if model.kind else 1e-300
+    stuck = scene.friction.law != "tanh" and values["slip_amplitude"] < held  # a law of the speed never holds
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, w, window_amplitudes(done.amplitudes, settings.window),
                steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,

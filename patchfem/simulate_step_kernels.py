@@ -1,9 +1,10 @@
 """One step of a contact, compiled: its memory, the solve for the slide increment and the commit.
 
-A contact is one of four kinds, chosen by an integer outside the point loop:
+A contact is one of five kinds, chosen by an integer outside the point loop:
 0 rigid Coulomb (set-valued), 1 parallel Jenkins elements, 2 bond points with shear modes (possibly none),
-3 one shared bond list. Over a step the modes move exactly under the path-mean of the friction force along the straight
-increment of slide, which does exactly the work of the law: the sum of all energies never rises by itself.
+3 one shared bond list, 4 a force that follows the speed (eq. 2.4). Over a step the modes move exactly under the
+path-mean of the friction force along the straight increment of slide, which does exactly the work of the law: the sum
+of all energies never rises by itself.
 """
 
 from typing import NamedTuple
@@ -23,14 +24,15 @@ from .friction.kernels import (
     list_step,
 )
 
-COULOMB, JENKINS, POINTS, LIST = 0, 1, 2, 3
+COULOMB, JENKINS, POINTS, LIST, RATE = 0, 1, 2, 3, 4
 
 
 class Contact(NamedTuple):
     """Memory and numbers of a contact; a kind leaves the arrays it does not use empty.
 
-    force: (static or scale, kinetic, bound) [N]. Jenkins: stretch, stiffness, limit (t,). Points: weight (m,) =
-    mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, source (m,), shear modes psi (m, r), kappa (r,), b (r,).
+    force: (static or scale, kinetic, bound) [N]; of a rate law (limit [N], v_0 [m/s], limit). Jenkins: stretch,
+    stiffness, limit (t,). Points: weight (m,) = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, source (m,),
+    shear modes psi (m, r), kappa (r,), b (r,).
     List: bondlist (7, capacity), now (5,), tally = (bonds, cut-off, merge width), law. growth of eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
     """
@@ -106,6 +108,9 @@ def scalar_force(dq, kind, c, eps, v0, dt):
     """Path-mean friction force [N] and slope [N/m] for a rigid slide increment; `c` is the contact tuple."""
     if kind == JENKINS:
         return jenkins_mean(dq, c.stretch, c.stiffness, c.limit)
+    if kind == RATE:
+        part = np.tanh(dq / (dt * c.force[1]))
+        return c.force[0] * part, c.force[0] * (1 - part * part) / (dt * c.force[1])
     if kind == POINTS:
         force, slope = 0.0, 0.0
         for j in range(c.weight.size):
@@ -305,7 +310,7 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     for i in range(y.size):
         last[1, i] = last[0, i]
         last[0, i] = y[i]
-    if kind == COULOMB:
+    if kind == COULOMB or kind == RATE:
         return force * dq, True
     if kind == JENKINS:
         return jenkins_step(dq, c.stretch, c.stiffness, c.limit), True
@@ -337,7 +342,7 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
 @njit(error_model="numpy", cache=True)
 def contact_state(kind, c, q, held):
     """(friction force [N], stored energy [J], irreversible slip [m]) of the contact as it stands."""
-    if kind == COULOMB:
+    if kind == COULOMB or kind == RATE:
         return held, 0.0, q
     if kind == JENKINS:
         force, energy, slip, total = 0.0, 0.0, 0.0, 0.0

@@ -280,7 +280,7 @@ def test_refuses_another_shape_of_table(text, says):
 
 UNBUILT = [
     (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
-    (BENCH, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "friction.law"),
+    (BENCH, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
     (BENCH, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
     (RIG, ["friction.spread=5 um"], "friction.spread"),
     (RIG, ["friction.breakaway=0.1"], "friction.breakaway"),

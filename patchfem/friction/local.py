@@ -1,4 +1,4 @@
-"""Laws without memory of the path: Coulomb, and the elastic-plastic law 3.12 with the reversal the report left out.
+"""Laws of the last increment: Coulomb, the rate law 2.4, and the elastic-plastic law 3.12 with its reversal.
 
 As printed, 3.12 sets dF/dt = 0 for |F| > mu N and so never unloads; here it is zero only while sliding goes on.
 A law is start(sigma) -> state and step(state, dq, s0, s1, dt) -> Step; stepping never changes the state it was given.
@@ -34,6 +34,34 @@ class Coulomb:
             return Step(state, np.zeros_like(s0), state)
         mean = self.kinetic * (s0 + s1) / 2 * np.sign(dq)
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
+
+    def traction(self, state):
+        """Traction (m,) [Pa] at the end of the last step."""
+        return state
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]: none."""
+        return np.zeros_like(state)
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Eq. 2.4 per point: tau = mu sigma tanh(v/v_0), taken at the mean speed of a step. It never holds: under a steady
+    share f of the limit it creeps at v_0 atanh(f)."""
+
+    static: float
+    speed: float
+
+    def start(self, sigma):
+        """State: the last traction (m,) [Pa], 0 before any motion."""
+        return np.zeros_like(sigma)
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] in dt [s] under pressure s0 -> s1 (m,) [Pa]; a jump in no time has no speed
+        limit."""
+        part = np.tanh(dq / (dt * self.speed)) if dt > 0 else np.sign(dq)
+        mean = self.static * (s0 + s1) / 2 * part
+        return Step(mean, mean * dq, self.static * s1 * part)
 
     def traction(self, state):
         """Traction (m,) [Pa] at the end of the last step."""
