@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from test_run import PATCH, POINT, SHEAR, cli
 
 from patchfem import simulate_bench as bench
@@ -128,6 +128,24 @@ def test_exact_the_direct_quadrature_rests_alike(sets):
     found = sliding(POINT + NONLOCAL + DWELL, *sets, "accuracy.steps_per_cycle=1600")
     after = found.force[found.slide >= 39.999e-6] / (0.3 * found.load[0])
     assert after.max() == pytest.approx(breakaway(0.3)[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_exact_the_printed_law_grows_its_force_at_rest(order):
+    """Every bond grows its own length from 0 on the way and then at rest; the force is their sum, by quadrature."""
+    found = sliding(POINT + NONLOCAL + DWELL, "friction.reading=report", f"friction.order={order}", steps=1200)
+    rest = np.flatnonzero(np.diff(found.slide) == 0)
+    slow, _ = healed(0)
+    for k in (*rest, rest[-1] + 1):
+        left = np.exp(-A_S * (found.time[k] - 0.04) / FLOOR)
+
+        def force(y, left=left):
+            own = LENGTH - (LENGTH + slow * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * left
+            return (y / own)**order * np.exp(-y / own)
+
+        truth = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
+        assert found.force[k] / (0.3 * found.load[0]) == pytest.approx(truth, rel=2e-5)
+    assert found.force[rest[-1] + 1] > 1.2 * found.force[rest[0]]
 
 
 @pytest.mark.parametrize("friction", [COULOMB, ELASTIC])
