@@ -49,6 +49,9 @@ EFFECTS = {
     "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
     "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
     "slide.kind=triangle": Effect("", "q between +- amplitude at constant speed", (), ("motion",)),
+    "slide.kind=dwell": Effect("", "q = speed t, then hold at rest (2.10 with v = 0), then on at the same speed", (),
+                               ("motion",)),
+    "slide.kind=file": Effect("patchfem.response.paths", "q straight between the rows of a table", (), ("motion",)),
     "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
                         ("modes",)),
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
@@ -60,7 +63,7 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "friction.law=convolution", "friction.temperature", "slide.kind=dwell", "slide.kind=file",
+    "friction.law=convolution", "friction.temperature",
     "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
     "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",
     "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",

@@ -107,6 +107,7 @@ def _files(found: Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the scene names."""
     profile = found.contact and found.contact.profile
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
+             ("slide.file", found.slide and found.slide.file),
              ("measured.file", found.measured and found.measured.file)]
     return [(key, file) for key, file in named if file]
 

@@ -24,8 +24,6 @@ NOT_YET_BUILT: dict[str, str] = {
     "friction.temperature": "",
     "friction.spread": "",
     "friction.breakaway": "",
-    "slide.kind=dwell": "constant, sine or triangle",
-    "slide.kind=file": "constant, sine or triangle",
     "structure.mode.normal": "",
     "structure.mode.pitch": "",
     "structure.mode.lateral": "",

@@ -200,6 +200,14 @@ def _slide(draft: Draft) -> None:
     _needs(draft, "slide", slide, "kind", SLIDES)
     if slide.kind in ("constant", "dwell") and slide.distance == 0.0:
         draft.say("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
+    law = draft.tables.friction
+    if slide.kind == "dwell" and slide.hold and law is not None and _ageless(law):
+        draft.remark("slide.hold has no effect while nothing ages at rest; add friction.rest_growth and slip_growth to "
+                     "law 'nonlocal'")  # fmt: skip
+
+
+def _ageless(law: Friction) -> bool:
+    return law.law in ("coulomb", "elastic-plastic") or (law.law == "nonlocal" and law.rest_growth is None)
 
 
 def _structure(draft: Draft) -> None:

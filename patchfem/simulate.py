@@ -154,12 +154,13 @@ def _fields(patch, time, tau, local, slide) -> dict:
 def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from . import simulate_bench as bench
     from .response.errors import change, step_error, with_errors
+    from .simulate_slide import steps_of
 
     scene = what.scene
     if scene.friction.law == "nonlocal" and scene.friction.order < 0 and scene.friction.initial_bonds > 0:
         warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
                     "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
-    steps = bench.steps_of(scene)
+    steps = steps_of(scene)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(scene, patch, steps, frames, say)
     seconds["bench"] = fine.seconds

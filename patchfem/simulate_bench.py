@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, sqrt
 from time import perf_counter
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from .core import Missing, PatchfemError
 from .friction.law import Bonds
 from .response.measures import harmonic, interface_loop, step_harmonic
+from .simulate_slide import path_of, peak_speed
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -30,49 +30,6 @@ class BenchRun:
     local: np.ndarray
     values: dict
     seconds: float
-
-
-def path_of(slide, steps: int) -> tuple:
-    """(time, slide, first sample of the last cycle, drive omega): the prescribed path at `steps` per cycle.
-
-    A constant slide counts as one cycle. A triangle with a run-in first slides `distance`, then goes back.
-    """
-    if slide.kind == "constant":
-        part = np.linspace(0, 1, steps + 1)
-        return part * slide.distance / slide.speed, part * slide.distance, 0, 0.0
-    count = max(1, round(slide.cycles * steps))
-    number = np.arange(count + 1)
-    if slide.kind == "sine":
-        phase = 2 * np.pi * (number % steps) / steps
-        time = number / (steps * slide.frequency)
-        return time, slide.amplitude * np.sin(phase), max(0, count - steps), 2 * np.pi * slide.frequency
-    quarter = (number % steps) / steps * 4
-    wave = np.where(quarter < 1, quarter, np.where(quarter < 3, 2 - quarter, quarter - 4)) * slide.amplitude
-    period = 4 * slide.amplitude / slide.speed
-    time = number * period / steps
-    if slide.distance:
-        run_in = max(2, ceil(steps * slide.distance / (4 * slide.amplitude)))
-        lead = np.linspace(0, slide.distance, run_in + 1)
-        time = np.concatenate([lead / slide.speed, time[1:] + slide.distance / slide.speed])
-        wave = np.concatenate([lead, slide.distance - wave[1:]])
-        return time, wave, max(0, wave.size - 1 - steps), 2 * np.pi / period
-    return time, wave, max(0, count - steps), 2 * np.pi / period
-
-
-def peak_speed(slide) -> float:
-    """Largest speed of the path [m/s]."""
-    return 2 * np.pi * slide.frequency * slide.amplitude if slide.kind == "sine" else slide.speed
-
-
-def steps_of(scene) -> int:
-    """Steps per cycle (of the whole slide for a constant one), even quarters so that reversals are samples."""
-    pinned = scene.accuracy.steps_per_cycle
-    if pinned is not None:
-        return 4 * ceil(pinned / 4)
-    base = 400 * sqrt(1e-3 / scene.accuracy.tolerance)
-    if scene.slide.kind == "constant" and scene.friction.bond_length:
-        base = max(base, 20 * min(scene.slide.distance / scene.friction.bond_length, 1000))
-    return 4 * ceil(min(max(base, 100), 20_000) / 4)
 
 
 def law_for(scene):
@@ -100,13 +57,13 @@ def bonds_of(scene) -> Bonds:
     f = scene.friction
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
-                 f.rest_speed or 1e-3 * peak_speed(scene.slide), f.initial_bonds)
+                 f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds)
 
 
 def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
     """Slide the interface of a scene along its path with `steps` per cycle; patch None for [normal]."""
     begin = perf_counter()
-    time, slide, first, omega = path_of(scene.slide, steps)
+    time, slide, first, omega = path_of(scene, steps)
     if scene.contact is not None and scene.contact.gives_way:
         out = _with_shear(scene, patch, time, slide, frames, say)
     else:
@@ -141,6 +98,12 @@ def _frame_numbers(count: int, frames: int) -> np.ndarray:
     """Samples of the frames; the first sample is the pressed state, which is a frame of its own."""
     at = np.linspace(0, count - 1, frames + 1).round().astype(int)[1:]
     return np.unique(at[at > 0]) if frames else np.zeros(0, int)
+
+
+def _new_pace(time) -> np.ndarray:
+    """Samples where the length of the time step changes."""
+    step = np.diff(time)
+    return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))
 
 
 def _rigid(scene, patch, time, slide, frames):
@@ -279,12 +242,12 @@ def _points(scene, patch, time, slide, frames, say):
     hub = load_kernels(say)
     contact, work_arrays = model.build(hub)
     at = _frame_numbers(time.size, frames)
-    edges = np.unique(np.concatenate([[0], at, [time.size - 1]]))
+    edges = np.unique(np.concatenate([[0], at, _new_pace(time), [time.size - 1]]))
     forces, burnt = np.zeros((time.size, 3)), np.zeros((time.size, 2))
     states, bad = [], 0
     for a, b in pairwise(edges):
-        bad += hub.follow_path(slide[a:b + 1].copy(), float(time[1] - time[0]), model.kind, contact, work_arrays,
-                               GOAL * model.limit, burnt[a:b + 1], forces[a:b + 1])
+        bad += hub.follow_path(slide[a:b + 1].copy(), float(time[b] - time[a]) / float(b - a), model.kind, contact,
+                               work_arrays, GOAL * model.limit, burnt[a:b + 1], forces[a:b + 1])
         if b in at:
             states.append((slide[b], contact.bonds.copy()))
     if bad:

@@ -53,10 +53,10 @@ def plan(scene, per_point: bool = False) -> Plan:
         engine, steps, more = _rig_cost(scene, per_point, unknowns)
         seconds += more
     elif scene.kind == "bench":
-        from .simulate_bench import path_of, steps_of
+        from .simulate_slide import path_of, steps_of
 
         engine = "bench"
-        steps = path_of(scene.slide, steps_of(scene))[0].size * 2
+        steps = path_of(scene, steps_of(scene))[0].size * 2
         seconds += 6e-5 * steps
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
@@ -195,8 +195,9 @@ def _groups(scene, chain) -> dict:
         if f.bond_length:
             out["drive_amplitude_over_bond_length"] = drive.acceleration / drive.omega**2 / f.bond_length
     if scene.kind == "bench" and f.bond_length:
-        reach = scene.slide.amplitude or scene.slide.distance
-        out["amplitude_over_bond_length"] = reach / f.bond_length
+        from .simulate_slide import amplitude
+
+        out["amplitude_over_bond_length"] = amplitude(scene) / f.bond_length
     if contact is not None:
         stiff = block_shear(contact)
         if f is not None:

@@ -1,0 +1,275 @@
+"""Slides of a bench with a rest in them or read from a table: the path itself, and what ageing at rest must give."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp
+from test_run import PATCH, POINT, SHEAR, cli
+
+from patchfem import simulate_bench as bench
+from patchfem.closed_forms import steady_bond_length
+from patchfem.core import Missing, PatchfemError
+from patchfem.response.paths import read_path
+from patchfem.scene import SceneError, load, loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_slide import path_of, peak_speed, steps_of
+
+SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
+NONLOCAL = """[friction]
+law = "nonlocal"
+static = 0.3
+kinetic = 0.15
+bond_length = "2 um"
+rest_growth = "2e-6 m/s^2"
+slip_growth = "1 um"
+rest_speed = "1 um/s"
+"""
+DWELL = ('[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "0.3 s"\ndistance_after = "20 um"\n')
+COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+ELASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"\n'
+
+
+def healed(hold, scale=1.0):
+    """(bond length when the rest begins, when it ends), 2.10 with v = 0: eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
+    slow = steady_bond_length(SPEED, LENGTH * scale, RATIO, A_S, L_K * scale)
+    return slow, LENGTH * scale - (LENGTH * scale - slow) * np.exp(-A_S * hold / FLOOR)
+
+
+def restart(hold, x, scale=1.0):
+    """F/(mu_s N) at x [m] after a rest: dz/dx = 1 - z/eps with 2.10 along the path, integrated on its own."""
+    slow, start = healed(hold, scale)
+    rate = A_S / SPEED**2 + 1 / (L_K * scale)
+    found = solve_ivp(lambda y, z: 1 - z / (slow + (start - slow) * np.exp(-rate * y)), (0, 20e-6 * scale), [slow],
+                      method="DOP853", rtol=1e-12, atol=1e-18, max_step=1e-7 * scale, dense_output=True)
+    return found.sol(np.clip(x, 0, None))[0] / (LENGTH * scale)
+
+
+def breakaway(hold, scale=1.0):
+    """(largest, last) F/(mu_s N) of the 20 um after a rest."""
+    curve = restart(hold, np.linspace(0, 20e-6, 100_001) * scale, scale)
+    return curve.max(), curve[-1]
+
+
+def sliding(text, *sets, patch=None, steps=None):
+    scene = loads(text, sets=sets)
+    return bench.run(scene, patch, steps or steps_of(scene))
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(text, friction=COULOMB, *sets):
+        (tmp_path / "path.csv").write_bytes(text.encode() if isinstance(text, str) else text)
+        scene = tmp_path / "scene.toml"
+        scene.write_text(POINT + friction + '[slide]\nkind = "file"\nfile = "path.csv"\n', "utf-8")
+        return load(scene, sets)
+    return write
+
+
+# ---- the dwell
+
+def test_exact_the_dwell_is_slide_rest_slide():
+    scene = loads(POINT + NONLOCAL + DWELL)
+    time, slide, first, omega = path_of(scene, 600)
+    speed = np.diff(slide) / np.diff(time)
+    rest = np.abs(np.diff(slide)) < 1e-18
+    assert (first, omega) == (0, 0.0) and peak_speed(scene) == SPEED
+    assert time[-1] == pytest.approx(0.36, rel=1e-12) and slide[-1] == pytest.approx(60e-6, rel=1e-12)
+    assert np.diff(time)[rest].sum() == pytest.approx(0.3, rel=1e-12)
+    assert (np.diff(slide)[rest] == 0).all() and speed[~rest] == pytest.approx(SPEED, rel=1e-9)
+    assert slide[1:][rest] == pytest.approx(40e-6, rel=1e-12)
+
+
+@pytest.mark.parametrize("key, legs", [("slide.hold=0 s", 2), ("slide.distance_after=0 m", 2)])
+def test_exact_a_leg_without_duration_is_left_out(key, legs):
+    scene = loads(POINT + NONLOCAL + DWELL, sets=[key])
+    time, slide, *_ = path_of(scene, 100)
+    assert (np.diff(time) > 0).all()
+    assert np.count_nonzero(np.diff(np.diff(slide) / np.diff(time) > SPEED / 2)) == (1 if "after" in key else 0)
+
+
+@pytest.mark.parametrize("hold", [0.0, 0.03, 0.3, 3.0])
+def test_exact_the_breakaway_follows_the_growth_at_rest(hold):
+    """The peak after the rest over mu_s N, against the same law integrated by a Runge-Kutta method of order 8."""
+    found = sliding(POINT + NONLOCAL + DWELL, f"slide.hold={hold} s", "accuracy.steps_per_cycle=6000")
+    after = found.force[found.slide >= 39.999e-6] / (0.3 * found.load[0])
+    assert after[0] == pytest.approx(healed(hold)[0] / LENGTH, rel=1e-5)
+    assert after.max() == pytest.approx(breakaway(hold)[0], rel=2e-5)
+    assert found.values["friction_ratio_end"] == pytest.approx(0.3 * healed(hold)[0] / LENGTH, rel=1e-4)
+
+
+def test_order_of_the_restart_is_two():
+    """The whole force after the rest, not its largest sample, which jumps from sample to sample."""
+    miss = []
+    for steps in (600, 1200, 2400):
+        found = sliding(POINT + NONLOCAL + DWELL, steps=steps)
+        after = found.slide >= 39.9999e-6
+        truth = restart(0.3, found.slide[after] - 40e-6)
+        miss.append(np.abs(found.force[after] / (0.3 * found.load[0]) - truth).max())
+    assert miss[1:] == pytest.approx([miss[0] / 4, miss[0] / 16], rel=0.02) and miss[2] < 2e-6
+
+
+def test_exact_nothing_moves_at_rest_and_longer_rest_is_stronger():
+    peaks = []
+    for hold in (0.01, 0.1, 1.0):
+        found = sliding(POINT + NONLOCAL + DWELL, f"slide.hold={hold} s")
+        rest = np.flatnonzero(np.diff(found.slide) == 0)
+        assert rest.size and np.ptp(found.force[rest[0]:rest[-1] + 2]) == 0
+        assert found.values["energy_balance"] < 1e-12
+        peaks.append(found.force[rest[-1]:].max())
+    assert peaks[0] < peaks[1] < peaks[2] < 0.3 * 115.66
+
+
+@pytest.mark.parametrize("sets", [["friction.order=0"], ["friction.order=1", "friction.initial_bonds=0"]])
+def test_exact_the_direct_quadrature_rests_alike(sets):
+    """With p = 0 the force obeys the same equation as with p = 1 once the first bonds are forgotten."""
+    found = sliding(POINT + NONLOCAL + DWELL, *sets, "accuracy.steps_per_cycle=1600")
+    after = found.force[found.slide >= 39.999e-6] / (0.3 * found.load[0])
+    assert after.max() == pytest.approx(breakaway(0.3)[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_exact_the_printed_law_grows_its_force_at_rest(order):
+    """Every bond grows its own length from 0 on the way and then at rest; the force is their sum, by quadrature."""
+    found = sliding(POINT + NONLOCAL + DWELL, "friction.reading=report", f"friction.order={order}", steps=1200)
+    rest = np.flatnonzero(np.diff(found.slide) == 0)
+    slow, _ = healed(0)
+    for k in (*rest, rest[-1] + 1):
+        left = np.exp(-A_S * (found.time[k] - 0.04) / FLOOR)
+
+        def force(y, left=left):
+            own = LENGTH - (LENGTH + slow * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * left
+            return (y / own)**order * np.exp(-y / own)
+
+        truth = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
+        assert found.force[k] / (0.3 * found.load[0]) == pytest.approx(truth, rel=2e-5)
+    assert found.force[rest[-1] + 1] > 1.2 * found.force[rest[0]]
+
+
+@pytest.mark.parametrize("friction", [COULOMB, ELASTIC])
+def test_exact_a_law_without_age_forgets_the_rest(friction):
+    found = sliding(POINT + friction + DWELL)
+    rest = np.flatnonzero(np.diff(found.slide) == 0)
+    assert found.force[rest[0]:rest[-1] + 2] == pytest.approx(0.3 * found.load[0], rel=1e-12)
+    assert found.values["friction_ratio_end"] == pytest.approx(0.3, rel=1e-12)
+    assert "has no effect" in loads(POINT + friction + DWELL).remarks[-1]
+
+
+def test_exact_points_behind_the_shear_see_the_true_hold():
+    """Bonds a hundred times as long are soft against the pieces, so the resultant is that of one point."""
+    soft = ["friction.bond_length=200 um", "friction.slip_growth=100 um", "slide.distance=4 mm",
+            "slide.distance_after=2 mm", "accuracy.steps_per_cycle=1200"]
+    text = PATCH + SHEAR + NONLOCAL + DWELL
+    result = run(plan(loads(text, sets=soft)), estimate=False)
+    found = result.response
+    rest = np.flatnonzero(np.diff(found.slide) == 0)
+    after = found.force[rest[0]:] / (0.3 * found.load[0])
+    assert after.max() == pytest.approx(breakaway(0.3, 100.0)[0], rel=2e-3)
+    assert np.ptp(found.force[rest[0]:rest[-1] + 2]) < 1e-6 * found.force.max()
+    assert result.response.values["energy_balance"] < 1e-9
+
+
+# ---- the table
+
+def test_exact_a_table_of_the_corners_is_the_triangle(table):
+    rows = "time [ms],displacement [um]\n0,0\n2,10\n6,-10\n8,0\n"
+    found = table(rows, ELASTIC)
+    one = bench.run(found, None, 400)
+    other = sliding(POINT + ELASTIC + '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n', steps=400)
+    top = one.slide.argmax()
+    assert peak_speed(found) == pytest.approx(5e-3) and one.time[top] == pytest.approx(2e-3)
+    up = np.minimum(one.slide[:top + 1] / 2e-6, 1)
+    back = np.maximum(1 - (10e-6 - one.slide[top:one.slide.argmin() + 1]) / 2e-6, -1)
+    assert one.force[:top + 1] == pytest.approx(0.3 * one.load[0] * up, rel=1e-9)
+    assert one.force[top:one.slide.argmin() + 1] == pytest.approx(0.3 * one.load[0] * back, rel=1e-9, abs=1e-9)
+    for name in ("friction_ratio_peak", "friction_ratio_end", "slip_amplitude"):
+        assert one.values[name] == pytest.approx(other.values[name], rel=1e-9)
+    assert "dissipated_energy_per_cycle" not in one.values
+
+
+def test_exact_a_table_with_a_rest_is_the_dwell(table):
+    found = bench.run(table("displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n",
+                            NONLOCAL, "accuracy.steps_per_cycle=600"), None, 600)  # fmt: skip
+    other = sliding(POINT + NONLOCAL + DWELL, steps=600)
+    assert found.force == pytest.approx(other.force, rel=1e-9)
+    assert found.values == pytest.approx(other.values, rel=1e-9, abs=1e-12)
+
+
+def test_always_more_steps_than_rows_and_rows_are_samples(table):
+    time = np.linspace(0, 0.05, 301)
+    rows = "\n".join(f"{t!r},{10e-6 * math.sin(2 * math.pi * 20 * t)!r}" for t in time.tolist())
+    scene = table("time [s],displacement [m]\n" + rows, NONLOCAL, "accuracy.steps_per_cycle=4")
+    for parts in (1, 2, 4):
+        t, q, *_ = path_of(scene, steps_of(scene) // parts)
+        at = np.searchsorted(t, time - 1e-12)
+        assert t[at] == pytest.approx(time, abs=1e-15) and np.diff(at).min() >= 8 // (2 * parts)
+        assert q[at] == pytest.approx(10e-6 * np.sin(2 * np.pi * 20 * time), abs=1e-18)
+    assert peak_speed(scene) == pytest.approx(2 * np.pi * 20 * 10e-6, rel=1e-3)
+
+
+@given(st.lists(st.tuples(st.floats(1e-6, 10), st.floats(-1e-3, 1e-3)), min_size=1, max_size=20),
+       st.integers(1, 500))
+def test_always_the_corners_stand_in_the_cut_path(legs, steps):
+    from patchfem.simulate_slide import _cut
+
+    time = np.append(0, np.cumsum([leg[0] for leg in legs]))
+    slide = np.append(0, [leg[1] for leg in legs])
+    if not slide.any():
+        return
+    t, q = _cut(time, slide, steps)
+    assert (np.diff(t) > 0).all() and np.isin(time, t).all() and t[-1] == time[-1]
+    assert np.abs(np.diff(q)).sum() == pytest.approx(np.abs(np.diff(slide)).sum(), rel=1e-9)
+    assert q[np.searchsorted(t, time)].tolist() == slide.tolist()
+
+
+HEAD = "time [s],displacement [um]\n"
+
+
+@pytest.mark.parametrize("text, says", [
+    ("", ":1: a header like"), ("0,0\n1,1\n", ":1: a header like"), ("time,displacement\n0,0\n1,1\n", ":1: a header"),
+    ("time [s],displacement [um],x [m]\n", ":1: a header"), ("time [s],time [s]\n", ":1: a header"),
+    ("time [s],displacement [N]\n0,0\n1,1\n", ":1: displacement [N]: the unit is not known; one of m, km"),
+    (HEAD, ":1: a path is at least two rows"), (HEAD + "0,0\n\n", ":2: a path is at least two rows"),
+    (HEAD + "0,0\n1,nan\n", ":3: displacement: 'nan' is not a finite number"),
+    (HEAD + "0,0\n1,1e999\n", ":3: displacement: '1e999' is not"), (HEAD + "0,0\n1;1\n", ":3: two cells"),
+    (HEAD + "0,0\n\n1,1\n", ":3: two cells"), (HEAD + "0,0\n1,1,2\n", ":3: two cells"),
+    (HEAD + "0,0\n1,\n", ":3: displacement: '' is not"), (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s does not follow 1 s"),
+    (HEAD + "0,5\n1,1\n", ":2: displacement starts at 5e-06"), (HEAD + "1,0\n2,1\n", ":2: time starts at 1"),
+    (HEAD + "0,0\n1,0\n", "displacement is 0 in every row"), (b"\xff\xfe\x00", "cannot be read"),
+])  # fmt: skip
+def test_refuses_a_broken_table_by_line(table, text, says):
+    scene = table(text)
+    with pytest.raises(PatchfemError) as error:
+        plan(scene)
+    assert "path.csv" in str(error.value) and says in str(error.value)
+
+
+def test_refuses_a_missing_table(table, tmp_path):
+    with pytest.raises(Missing, match="no such path"):
+        read_path(tmp_path / "none.csv")
+    with pytest.raises(SceneError) as error:
+        table(HEAD, COULOMB, "slide.file=none.csv")
+    assert "slide.file: there is no file" in str(error.value)
+    line = (tmp_path / "scene.toml").read_text().split("\n").index('file = "path.csv"') + 1
+    (tmp_path / "path.csv").unlink()
+    with pytest.raises(SceneError, match=f"scene.toml:{line}: slide.file: there is no file"):
+        load(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize("kind", ["dwell", "file"])
+def test_exact_results_of_both_kinds_are_written(tmp_path, kind):
+    text = POINT + NONLOCAL + (DWELL if kind == "dwell" else '[slide]\nkind = "file"\nfile = "path.csv"\n')
+    (tmp_path / "scene.toml").write_text(text, "utf-8")
+    (tmp_path / "path.csv").write_text(HEAD + "0,0\n0.04,40\n0.34,40\n0.36,60\n", "utf-8")
+    answer = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
+    assert answer.code == 0, answer.err
+    result = run(plan(load(tmp_path / "scene.toml")))
+    assert f"slide.kind={kind}" in result.plan.effects
+    peak = result.measures["friction_ratio_peak"]
+    end = result.measures["friction_ratio_end"]
+    best, last = breakaway(0.3)
+    assert abs(peak.value - 0.3 * best) <= peak.error < 1e-3 * peak.value
+    assert abs(end.value - 0.3 * last) <= max(end.error, 1e-9)
+    assert "drift_per_cycle" not in result.measures
