@@ -18,7 +18,7 @@ Bonds older than `cutoff` bond lengths of path are left out; what they could car
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import gammainc, gammainccinv, gammaln
+from scipy.special import gammainc, gammainccinv, gammaln, roots_jacobi
 
 from .law import Bonds, grow, growth_exponents
 from .local import Step
@@ -209,25 +209,48 @@ def _report_strip(state: Strips, rest, law: Bonds) -> np.ndarray:
 
 
 def _gauss_strip(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Four Gauss points on pieces of at most a quarter bond length; weights per unit mu_s sigma."""
-    spans = state.span[rest]
-    pieces = np.maximum(1, np.ceil(np.abs(spans) / (PIECE * state.eps[rest]))).astype(int)
-    owner = np.repeat(np.arange(spans.size), pieces)
-    number = np.arange(owner.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    back = (number[:, None] + (1 - _GAUSS_Y) / 2) / pieces[owner][:, None]  # share of the span behind its end
-    weight = np.abs(spans)[owner][:, None] / pieces[owner][:, None] * _GAUSS_W / 2
-    u = state.now[0] - state.q[rest][owner][:, None] + back * spans[owner][:, None]
-    travel = state.now[1] - state.path[rest][owner][:, None] + back * np.abs(spans)[owner][:, None]
+    """Four Gauss points on pieces of at most a quarter bond length, none across u = 0 where the sign of a bond turns;
+    those beside it with |u|^p as their weight. Weights per unit mu_s sigma."""
+    spans, end = state.span[rest], state.now[0] - state.q[rest]
+    g, h = np.sign(spans), np.abs(spans)
+    turn = np.clip(-g * end, 0.0, h)  # way back along the strip to where u = 0
+    starts, parts = np.concatenate([np.zeros_like(h), turn]), np.concatenate([turn, h - turn])
+    strip = np.tile(np.arange(h.size), 2)[parts > 0]
+    starts, parts = starts[parts > 0], parts[parts > 0]
+    pieces = np.maximum(1, np.ceil(parts / (PIECE * state.eps[rest][strip]))).astype(int)
+    part = np.repeat(np.arange(parts.size), pieces)
+    number = np.arange(part.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    owner, size = strip[part], (parts / pieces)[part]
+    turns = np.abs(turn + g * end) <= 1e-9 * h  # u = 0 there, not only the strip's own end
+    near = turns[owner] & (number == 0) & (starts[part] == turn[owner])
+    far = turns[owner] & (number == pieces[part] - 1) & (starts[part] + parts[part] == turn[owner])
+    bent = law.reading == "stretch"
+    share, weight = _towards(bent & near, bent & far, law.order if bent else 0.0)
+    way = starts[part][:, None] + (number[:, None] + share) * size[:, None]  # behind the strip's end
+    weight = size[:, None] * weight
+    u = end[owner][:, None] + way * g[owner][:, None]
+    travel = state.now[1] - state.path[rest][owner][:, None] + way
     if law.reading == "stretch":
         eps = state.eps[rest][owner][:, None]
-        harm = state.now[2] - state.damage[rest][owner][:, None] + back * np.abs(spans)[owner][:, None] / eps
-        size = np.abs(u) / eps
+        harm = state.now[2] - state.damage[rest][owner][:, None] + way / eps
+        x = np.abs(u) / eps
     else:
-        before = state.gain[:, rest]
+        before, back = state.gain[:, rest], way / h[owner][:, None]
         age = state.now[3] - state.growth[rest][owner][:, None] + back * before[0][owner][:, None]
         born = state.mature[rest][owner][:, None] - back * before[1][owner][:, None]
         eps = np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
-        harm = size = travel / eps
+        harm = x = travel / eps
     with np.errstate(divide="ignore"):
-        f = np.sign(u) * np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm - gammaln(law.order + 1))
+        f = np.sign(u) * np.exp(law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1))
     return np.bincount(owner, ((f * weight).sum(axis=1)), spans.size) / law.length
+
+
+def _towards(near, far, order: float) -> tuple:
+    """Gauss points (k, 4) in (0, 1) and weights of pieces (k,); of pieces that end at u = 0 (near their start or far)
+    those of Gauss and Jacobi with the weight |u|^order, divided by it."""
+    x, w = roots_jacobi(4, 0.0, order)
+    t = (1 + x) / 2
+    w = w / (2**(order + 1) * t**order)
+    near, far = near[:, None], far[:, None]
+    share = np.where(near, t, np.where(far, 1 - t, (1 - _GAUSS_Y) / 2))
+    return share, np.where(near | far, w, _GAUSS_W / 2)

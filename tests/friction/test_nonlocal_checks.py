@@ -617,3 +617,17 @@ def test_exact_no_drift_of_the_stretch_under_a_load_dither_at_a_held_force():
     """Bonds keep the pressure they formed under, so a load that changes at rest moves no force and asks no slide."""
     for size in (0.1, 0.2):
         assert drift(Recursion(Bonds(1.0, 1.0)), (0.5, 0.5), (1 - size, 1 + size)) == 0.0
+
+
+@pytest.mark.parametrize("order, bound", [(0.0, 1e-12), (0.25, 5e-5), (0.5, 2e-5), (1.5, 1e-6), (2.0, 1e-11)])
+def test_exact_a_reversal_of_the_stretch_reading_of_any_order(order, bound):
+    """A slide forth in strips of 1/4 bond length and back by steps that meet no strip's end: `reversal_force`."""
+    law = Bonds(1.0, 1.0, order, "stretch", 1.0, None, None, 1.0, 1.0)
+    engine, one = Quadrature(law, 0.0), np.ones(1)
+    state = engine.start(one)
+    for _ in range(160):
+        state = engine.step(state, 0.25, one, one, 1.0).state
+    for back in np.full(12, 0.171).cumsum():
+        state = engine.step(state, -0.171, one, one, 1.0).state
+        wanted = closed_forms.reversal_force(back, 1.0, order, "stretch", 1.0)
+        assert abs(float(engine.traction(state)[0]) - wanted) <= bound
