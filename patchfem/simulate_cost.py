@@ -81,7 +81,7 @@ def _turned(scene, knob: str):
         for power in range(-3, LEVELS - 3):
             cells = round(middle * 2.0**power)
             if 8 <= cells <= MOST_CELLS:
-                yield f"{length / cells:.4g} m", length / cells, (_sized(scene, length / cells), 0)
+                yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(scene, length / cells), 0)
         return
     from .simulate_rig import choose
 

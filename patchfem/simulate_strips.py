@@ -3,6 +3,7 @@
 import numpy as np
 
 from .contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
+from .contact.strips_solve import smooth
 from .core import Compliance, Pressure, frozen_array
 from .simulate_skin import borne
 
@@ -19,10 +20,10 @@ def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: fl
     state = press_strips(one, interface.x, weight, strip_offsets(contact.width, count), gap, contact.strips.roll,
                          contact.load if by is None else None, moment if by is None else None, by, angle,
                          spring if by is None else 0.0, skin)
-    mean = (borne(state.pressure) if _smooth(skin) else state.pressure).mean(axis=0)
+    mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
     answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
                       state.moment, state.outcome, state.iterations, state.residuals)
-    return pieces, answer, skin if _smooth(skin) else None, state
+    return pieces, answer, skin if smooth(skin) else None, state
 
 
 def law_of(contact):
@@ -36,10 +37,6 @@ def law_of(contact):
     from .simulate_skin import skin_law
 
     return skin_law(contact)
-
-
-def _smooth(skin) -> bool:
-    return skin is not None and hasattr(skin, "log_pressure")
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
@@ -62,7 +59,7 @@ def strip_values(patch, peak_of) -> dict:
     state, pieces = patch.strips, patch.pair.compliance
     count = len(state.offsets)
     weight = pieces.interface.weight / count
-    pressed = borne(state.pressure) if _smooth(patch.skin) else state.pressure
+    pressed = borne(state.pressure) if smooth(patch.skin) else state.pressure
     fraction = float((pressed > 0).mean(axis=0) @ weight / weight.sum())
     out = {"contact_fraction": fraction, "pressure_centre_lateral": state.centre_y,
            "roll_moment": state.roll_moment}

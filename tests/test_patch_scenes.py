@@ -55,16 +55,16 @@ def solved(*args, **kwargs) -> tuple:
 def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     _, found = solved(TILT.format(angle) + SKINS["exponential"], material=RIGID)
     fraction, centre = closed_contact.wedge_skin(angle, LENGTH, 2.5e-6)
-    assert found["loaded_fraction"] == pytest.approx(fraction, rel=2e-4 + 0.1 * (angle * 0.127e-3 / 2.5e-6)**2)
-    assert found["pressure_centre"] == pytest.approx(centre, rel=2e-3)
+    assert found["loaded_fraction"] == pytest.approx(fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6)**2 / 11)
+    assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
     assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)  # k_t follows the pressure
     assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
     _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
     fraction, centre, _, most = closed_contact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
     cell = 0.127e-3 / LENGTH
-    assert found["contact_fraction"] == pytest.approx(fraction, abs=cell)
-    assert found["pressure_centre"] == pytest.approx(centre, abs=2 * cell**2 * LENGTH, rel=5e-3)
-    assert found["pressure_peak"] == pytest.approx(most, rel=0.6 * cell / fraction)
+    assert found["contact_fraction"] == pytest.approx(fraction, abs=0.55 * cell)
+    assert found["pressure_centre"] == pytest.approx(centre, rel=6e-4)
+    assert found["pressure_peak"] == pytest.approx(most, rel=0.05 * cell / fraction)
     assert found["tangential_stiffness"] == pytest.approx(0.8 * 1e13 * found["contact_fraction"] * LENGTH * WIDTH,
                                                           rel=1e-5)
 

@@ -1,7 +1,5 @@
 """Scenes of every kind through the command line: exit codes, the results folder, and what must hold inside it."""
 
-import contextlib
-import io
 import json
 import socket
 import subprocess
@@ -13,13 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from command_line import cli
 from scene_texts import STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from patchfem import closed_forms, simulate_files, simulate_march
-from patchfem.__main__ import NOT_BUILT, main
+from patchfem.__main__ import NOT_BUILT
 from patchfem.core import G_N, Outcome
 from patchfem.effects import EFFECTS, NOT_YET_BUILT
 from patchfem.scene import load, loads
@@ -54,14 +53,6 @@ SCENES = {
     "rig patch": PATCH + SHEAR + NONLOCAL + STRUCTURE + STEPS,
 }  # fmt: skip
 WITH_FIELDS = ["patch", "bench patch", "rig patch"]
-
-
-def cli(*words) -> SimpleNamespace:
-    """Exit code, stdout and stderr of the command line."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
-        main([str(word) for word in words])
-    return SimpleNamespace(code=end.value.code or 0, out=out.getvalue(), err=err.getvalue())
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from .unilateral import solve_forces
 
 
 def smooth(skin) -> bool:
+    """Whether a law carries something at every separation; False for None and the linear skin."""
     return skin is not None and not isinstance(skin, LinearSkin)
 
 

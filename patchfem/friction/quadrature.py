@@ -16,6 +16,7 @@ Bonds older than `cutoff` bond lengths of path are left out; what they could car
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.special import gammainc, gammainccinv, gammaln, roots_jacobi
@@ -245,12 +246,18 @@ def _gauss_strip(state: Strips, rest, law: Bonds) -> np.ndarray:
     return np.bincount(owner, ((f * weight).sum(axis=1)), spans.size) / law.length
 
 
-def _towards(near, far, order: float) -> tuple:
-    """Gauss points (k, 4) in (0, 1) and weights of pieces (k,); of pieces that end at u = 0 (near their start or far)
-    those of Gauss and Jacobi with the weight |u|^order, divided by it."""
+@cache
+def _weighted_points(order: float) -> tuple:
+    """Gauss-Jacobi points (4,) in (0, 1) for the weight t^order at 0, and their weights divided by it."""
     x, w = roots_jacobi(4, 0.0, order)
     t = (1 + x) / 2
-    w = w / (2**(order + 1) * t**order)
+    return t, w / (2**(order + 1) * t**order)
+
+
+def _towards(near, far, order: float) -> tuple:
+    """Gauss points (k, 4) in (0, 1) and weights of pieces (k,); of pieces that end at u = 0 (near their start or far)
+    those with |u|^order as their weight."""
+    t, w = _weighted_points(order)
     near, far = near[:, None], far[:, None]
     share = np.where(near, t, np.where(far, 1 - t, (1 - _GAUSS_Y) / 2))
     return share, np.where(near | far, w, _GAUSS_W / 2)

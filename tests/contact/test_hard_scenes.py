@@ -1,14 +1,12 @@
 """Scenes at the edges of what a patch is: tiny loads, thin and stiff layers, spikes, hardly anything touching."""
 
-import contextlib
-import io
 import json
 
 import numpy as np
 import pytest
+from command_line import cli
 
 from patchfem import simulate_grading
-from patchfem.__main__ import main
 from patchfem.closed_contact import (
     hertz_half_width,
     hertz_peak,
@@ -281,14 +279,6 @@ def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
     assert np.diff(found.patch.x).min() > 0 and found.patch.x.size <= simulate_grading.MOST_COLUMNS
     if name in ("corner", "billionth"):  # the contact lies at the corner that the wedge closes
         assert value(found, "pressure_centre") == pytest.approx(-SIZE / 2, rel=5e-3)
-
-
-def cli(*words) -> tuple:
-    """(exit code, stdout, stderr) of the command line."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
-        main([str(word) for word in words])
-    return end.value.code or 0, out.getvalue(), err.getvalue()
 
 
 def test_always_the_command_line_names_what_was_wrong(tmp_path):

@@ -1,7 +1,8 @@
 """One run for all export tests."""
 
 import pytest
-from exported import BENCH, cli
+from command_line import cli
+from exported import BENCH
 
 
 @pytest.fixture(scope="session")

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
-from patchfem.__main__ import main
 from patchfem.export.vtkhdf import NAME, bodies, write_series
 
 UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "part": "1", "material": "1",
@@ -49,14 +45,6 @@ kind = "triangle"
 amplitude = "10 um"
 speed = "5 mm/s"
 """
-
-
-def cli(*words) -> SimpleNamespace:
-    """Exit code, stdout and stderr of the command line."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
-        main([str(word) for word in words])
-    return SimpleNamespace(code=end.value.code or 0, out=out.getvalue(), err=err.getvalue())
 
 
 def body(sign: float, frames: int, rng) -> dict:

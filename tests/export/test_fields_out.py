@@ -11,7 +11,8 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
-from exported import POINT, UNITS, at, cli, write_small
+from command_line import cli
+from exported import POINT, UNITS, at, write_small
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDataArray
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader

@@ -7,7 +7,8 @@ from dataclasses import replace
 import matplotlib.image
 import numpy as np
 import pytest
-from exported import at, cli, write_small
+from command_line import cli
+from exported import at, write_small
 from hypothesis import given
 from hypothesis import strategies as st
 
