@@ -228,13 +228,15 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
     """Relative residuals of a solved skin, recomputed from its definition alone; `free` rotation beyond the gap's.
 
     Keys: law (largest mismatch of a force, against the largest force and what the law gains over the depth of the
-    gap, or 1e-5 of it for the smooth laws), tension, and force_balance, moment_balance where prescribed.
+    gap, or 1e-5 of it for the smooth laws; pressures below exp(FLOOR) count as none), tension, and force_balance,
+    moment_balance where prescribed.
     """
     opening = gap + free * x - delta + c @ force
     depth = np.ptp(gap) + np.abs(c @ force).max() + abs(free) * np.ptp(x)
     gain = depth * (weight * (skin.k if isinstance(skin, LinearSkin) else 1e-5 * skin.stiffness(opening))).max()
     most = max(force.max(), np.exp(FLOOR))
-    out = {"law": np.abs(force - weight * skin.pressure(opening)).max() / (most + gain),
+    miss = np.abs(force - weight * skin.pressure(opening)) - weight * np.exp(FLOOR)
+    out = {"law": max(0.0, miss.max()) / (most + gain),
            "tension": max(0.0, -force.min()) / most}
     out |= {} if load is None else {"force_balance": abs(force.sum() - load) / load}
     if moment is not None:

@@ -341,6 +341,18 @@ def test_always_any_approach_is_answered(depth, sign, seed, law):
     assert (state.outcome is Outcome.DONE) == (state.load > 0)
 
 
+def test_exact_an_approach_about_the_floor_of_the_pressure_is_answered():
+    c, x, weight = bodies(40)
+    gap = 1e-6 * np.random.default_rng(0).normal(size=x.size)
+    skin = ExponentialSkin(1e-8, 1e6)
+    edge = 1e-8 * (np.log(1e6) + 300)  # the separation at which the pressure is exp(FLOOR)
+    for part in (1 - 1e-3, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-3, 1 + 1e-2):
+        state = solve(skin, c, x, weight, gap, approach=gap.min() - part * edge)
+        assert max(state.residuals.values()) <= LIMIT
+        assert (state.outcome is Outcome.DONE) == (state.load > 0)
+    assert state.outcome is Outcome.NO_CONTACT
+
+
 def test_exact_softened_laws_lead_to_the_same_answer():
     from patchfem.contact.skin import _softening
 
