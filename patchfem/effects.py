@@ -46,6 +46,8 @@ EFFECTS = {
                                     "u/|u| dL1/eps_0 (2.17)", ("pressure",), ("traction",)),
     "friction.reading=stretch": Effect("patchfem.friction.recursion", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.quadrature", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"),
+    "friction.temperature": Effect("patchfem.friction.temperature", "a_s = a_ref exp(T_a (1/T_ref - 1/T_s)), "
+                                   "l_k = l_ref exp(T_l (1/T_s - 1/T_ref)) (2.13)"),
     "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
     "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
     "slide.kind=triangle": Effect("", "q between +- amplitude at constant speed", (), ("motion",)),
@@ -63,7 +65,7 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "friction.law=convolution", "friction.temperature",
+    "friction.law=convolution",
     "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
     "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",
     "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",

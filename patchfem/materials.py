@@ -22,3 +22,17 @@ MATERIALS: dict[str, Elastic] = {
     "WC-Co sintered": Elastic(600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."),
     "steel": Elastic(210e9, 0.30, 7850.0, "Handbook values of plain carbon steel at 20 degC."),
 }
+
+
+class Thermal(NamedTuple):
+    """Thermal conductivity [W m-1 K-1] and heat capacity [J kg-1 K-1] near 20 degC, with the source of the numbers."""
+
+    conductivity: float
+    heat_capacity: float
+    source: str
+
+
+THERMAL: dict[str, Thermal] = {
+    "Ti-8Al-1Mo-1V": Thermal(7.0, 526.0, "Handbook values of the alloy; 2.3e6 J/m3/K by its density."),
+    "steel": Thermal(50.0, 490.0, "Handbook values of plain carbon steel."),
+}

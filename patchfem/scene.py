@@ -26,6 +26,7 @@ from patchfem.scene_rules import (
     drive_unused,
     kinetic_unused,
     method_unused,
+    temperature_unused,
     unused,
 )
 from patchfem.scene_text import effects, toml
@@ -187,7 +188,8 @@ def _contact(contact: tables.Contact) -> tables.Contact:
 
 
 def _law(law: tables.Friction) -> tables.Friction:
-    law = _without(law, unused(law, "law", LAWS) | ({"kinetic"} if kinetic_unused(law) else set()))
+    idle = {"kinetic": kinetic_unused(law), "temperature": temperature_unused(law)}
+    law = _without(law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without})
     return _filled(law, {"kinetic": law.static}) if law.law in ("coulomb", "nonlocal") else law
 
 

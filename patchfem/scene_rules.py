@@ -84,7 +84,7 @@ def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tup
         if not draft.given(f"{at}.{key}"):
             draft.lacks(f"{at}.{key}", f"{selector} '{value}' needs it")
     for key in sorted(unused(table, selector, used)):
-        if draft.given(f"{at}.{key}") and key != "kinetic":
+        if draft.given(f"{at}.{key}") and key not in ("kinetic", "spread"):
             draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")
 
 
@@ -155,6 +155,8 @@ def _normal(draft: Draft) -> None:
     for key in ("frequency", "phase"):
         if draft.given(f"normal.{key}") and not draft.given("normal.amplitude"):
             draft.lacks("normal.amplitude", f"{key} needs it")
+    if draft.given("normal.width") and not draft.given("friction.spread"):
+        draft.remark("normal.width has no meaning without friction.spread and is not used")
 
 
 def _frictions(draft: Draft) -> None:
@@ -173,6 +175,12 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
     elif kinetic_unused(law):
         draft.remark(f"{at}.kinetic has no effect while the bond length is constant; add rest_growth and slip_growth")
+    _spread(draft, at, law)
+    if temperature_unused(law):
+        lacking = "its activations; add rest_activation, slip_activation or both"
+        if law.rest_growth is None:
+            lacking = "growth of the bonds; add rest_growth and slip_growth"
+        draft.remark(f"{at}.temperature has no effect without {lacking}")
     for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
         if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
             draft.lacks(f"{at}.{other}", f"{key} needs it; leave both out for a constant bond length")
@@ -185,6 +193,23 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     if law.static == 0 and contact and contact.gives_way:
         draft.say(f"{at}.static", f"0 beside {contact.gives_way}: no point carries friction; static > 0 is wanted, or "
                                   f"leave out {contact.gives_way}")  # fmt: skip
+
+
+def _spread(draft: Draft, at: str, law: Friction) -> None:
+    if law.spread is None:
+        return
+    if law.law not in ("nonlocal", "convolution", None):
+        draft.say(f"{at}.spread", f"law '{law.law}' has no bonds to spread; spread belongs to nonlocal and convolution")
+    elif at == "friction" and draft.tables.normal is not None and not draft.given("normal.width"):
+        draft.lacks("normal.width", "friction.spread needs it")
+
+
+def temperature_unused(law: Friction) -> bool:
+    """Whether a surface temperature stands where it changes no growth."""
+    if law.temperature is None or law.law != "nonlocal":
+        return False
+    still = not law.temperature.rest_activation and not law.temperature.slip_activation
+    return still or (law.rest_growth is None and law.slip_growth is None)
 
 
 def kinetic_unused(law: Friction) -> bool:

@@ -174,7 +174,7 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
             others.append(change(quarter.values, rough.values))
             seconds["error"] += rough.seconds
     found = with_errors(fine.values, *others, least=1e-10)
-    fields = {}
+    warnings, fields = [*warnings, *_warming(scene, patch, fine)], {}
     if patch is not None:
         from .simulate_measures import measures
 
@@ -183,6 +183,17 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
         fields = _fields(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
     return Result(what, Outcome.DONE, _without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
                   {"engine": "bench", "steps": steps})
+
+
+def _warming(scene, patch, response, work: float | None = None) -> list:
+    """The line on the rise of the surface temperature, where the scene has one."""
+    if scene.friction is None or scene.friction.temperature is None:
+        return []
+    from .simulate_heat import heating
+
+    if work is None:
+        work = float(np.trapezoid(response.force, response.slide))
+    return heating(scene, patch, work, float(response.time[-1]))
 
 
 def _without_errors(found: dict, estimate: bool) -> dict:
@@ -218,6 +229,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         fields = _rig_fields(scene, settings, patch, raw, drive)
     extra["book"] = raw.book
+    warnings = [*warnings, *_warming(scene, patch, raw.response, raw.book["friction"])]
     if scene.friction is not None and scene.friction.law == "tanh":
         warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
                     f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]

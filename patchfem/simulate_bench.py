@@ -9,6 +9,7 @@ import numpy as np
 from .core import Missing, PatchfemError
 from .friction.law import Bonds
 from .response.measures import harmonic, interface_loop, step_harmonic
+from .simulate_acting import acting
 from .simulate_slide import path_of, peak_speed
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
@@ -54,7 +55,7 @@ def law_for(scene):
 
 def bonds_of(scene) -> Bonds:
     """Bond parameters of a bench scene; v_h defaults to 1e-3 of the peak speed."""
-    f = scene.friction
+    f = acting(scene).friction
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds)
@@ -62,7 +63,7 @@ def bonds_of(scene) -> Bonds:
 
 def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
     """Slide the interface of a scene along its path with `steps` per cycle; patch None for [normal]."""
-    begin = perf_counter()
+    begin, scene = perf_counter(), acting(scene)
     time, slide, first, omega = path_of(scene, steps)
     if scene.contact is not None and scene.contact.gives_way:
         out = _with_shear(scene, patch, time, slide, frames, say)

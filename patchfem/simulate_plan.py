@@ -5,6 +5,7 @@ from math import pi, sqrt
 
 from .core import Missing, PatchfemError
 from .effects import EFFECTS, absent
+from .simulate_acting import acting
 
 AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
 SHEAR_MODES = 8  # modes a shear reduction starts from
@@ -44,7 +45,8 @@ def plan(scene, per_point: bool = False) -> Plan:
 
         read_table(scene.beside(scene.measured.file))  # a broken table is named before anything runs
     named = tuple(scene.named())
-    unknowns, chain = _sizes(scene)
+    acted = acting(scene)
+    unknowns, chain = _sizes(acted)
     engine, steps, seconds = "static", 0, 0.25
     if scene.contact is not None:
         cells = unknowns["interface_points"]
@@ -60,7 +62,7 @@ def plan(scene, per_point: bool = False) -> Plan:
         seconds += 6e-5 * steps
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
-    groups = _groups(scene, chain)
+    groups = _groups(acted, chain)
     return Plan(scene, scene.kind, named, tuple(absent(named)), engine, unknowns, steps, round(seconds, 2), size, chain,
                 groups, tuple(_verdict(scene, groups, size)))
 

@@ -20,6 +20,7 @@ from .response.measures import (
     window_amplitudes,
     window_ends,
 )
+from .simulate_acting import acting
 from .structure.modes import basis
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
@@ -82,7 +83,7 @@ def cycles_of(scene, drive: BaseSine) -> float:
 
 def law_of(scene, speed: float) -> Bonds:
     """Bond law of [friction]; `speed` [m/s] sets the default floor v_h = 1e-3 of the peak speed."""
-    f = scene.friction
+    f = acting(scene).friction
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, 1e-12), f.initial_bonds)
@@ -133,6 +134,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     """The ContactModel of a marching scene; patch: the solved Patch or None for [normal]."""
     from . import simulate_march as hub
 
+    scene = acting(scene)
     f, contact = scene.friction, scene.contact
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
@@ -182,7 +184,7 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
     """Closed-form run of a Coulomb scene, or of a structure without friction."""
     from .dynamics.histories import simulate
 
-    f = scene.friction
+    f = acting(scene).friction
     static, kinetic = (f.static * load, f.kinetic * load) if f is not None else (0.0, 0.0)
     travel = scene.structure.travel or np.inf
     begin = perf_counter()

@@ -1,0 +1,18 @@
+"""The weight of a bond across the path (report, 2.15) on a line contact: what a pad of finite width leaves of it.
+
+A bond strip spreads its force over W(eta/rho)/rho = exp(-eta^2/(2 rho^2))/(sqrt(2 pi) rho) across the path. Of a pad of
+width b only points on the pad carry it, so the resultant keeps E = (1/b) int_0^b int_0^b W((y - y1)/rho)/rho dy dy1.
+With the distance t = |y - y1| the double integral is int_0^b 2 (b - t) W(t/rho)/rho dt, and both parts are elementary.
+"""
+
+from math import erf, expm1, pi, sqrt
+
+
+def pad_factor(width: float, spread: float) -> float:
+    """E = erf(x/sqrt 2) - sqrt(2/pi) (1 - exp(-x^2/2))/x [1], x = b/rho, of a pad b = `width` [m] wide under the spread
+    rho [m]; the pressure is uniform across the path.
+    """
+    x = width / spread
+    if x < 1e-8:
+        return x / sqrt(2 * pi)  # the square of x is lost there
+    return erf(x / sqrt(2)) + sqrt(2 / pi) * expm1(-x * x / 2) / x

@@ -1,0 +1,98 @@
+"""The spread of bonds across the path (2.15): the factor of a pad, and scenes with it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import dblquad
+from test_run import PATCH, POINT, SHEAR
+from test_temperature import GROWING, RIG, TRIANGLE
+
+from patchfem import simulate_bench
+from patchfem.friction.spread import pad_factor
+from patchfem.scene import SceneError, loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_acting import acting
+
+NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n'
+SPREAD = ["friction.spread=4 mm"]
+
+
+@pytest.mark.parametrize("ratio, want", [(1, 0.36874638), (3, 0.73429325), (10, 0.92021154), (100, 0.99202115)])
+def test_exact_c11_factor_of_a_pad(ratio, want):
+    assert pad_factor(ratio * 5e-6, 5e-6) == pytest.approx(want, abs=1e-8)
+
+
+@pytest.mark.parametrize("width", [0.05, 0.7, 1.0, 4.0])
+def test_exact_factor_is_the_double_integral_of_the_weight(width):
+    """(1/b) of the weight between all pairs of points on the pad, by two-dimensional quadrature (kink-free halves)."""
+    total, _ = dblquad(lambda y, y1: np.exp(-(y - y1)**2 / 2) / np.sqrt(2 * np.pi), 0, width, 0, lambda y1: y1,
+                       epsabs=1e-13, epsrel=1e-12)
+    assert pad_factor(width, 1.0) == pytest.approx(2 * total / width, rel=1e-11)
+
+
+@given(st.floats(1e-12, 1e12))
+def test_always_between_nothing_and_all_and_growing_with_the_width(ratio):
+    here = pad_factor(ratio, 1.0)
+    assert 0 < here <= 1 and pad_factor(1.01 * ratio, 1.0) >= here
+    assert here <= min(1.0, ratio / np.sqrt(2 * np.pi) * (1 + 1e-12))
+
+
+@pytest.mark.parametrize("law", ["", 'reading = "report"\n', "order = 2\n"])
+def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
+    """12.7 mm of contact.width and the same normal.width give the same factor; kinetic keeps its ratio."""
+    share = pad_factor(12.7e-3, 4e-3)
+    point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
+    for text in (point, PATCH):
+        whole, less = (simulate_bench.run(loads(text + NONLOCAL + law + TRIANGLE, sets=sets), patch_of(text), 80)
+                       for sets in ([], SPREAD))
+        assert less.force == pytest.approx(share * whole.force, rel=1e-12, abs=1e-12 * np.abs(whole.force).max())
+        assert less.values["loop_area"] == pytest.approx(share * whole.values["loop_area"], rel=1e-12)
+        assert less.slip == pytest.approx(whole.slip, rel=1e-9, abs=1e-18)
+
+
+def patch_of(text):
+    if text != PATCH:
+        return None
+    from patchfem.simulate_patch import solve_all
+
+    return solve_all(loads(PATCH + NONLOCAL + TRIANGLE), False)[0]
+
+
+def test_exact_a_growing_law_keeps_its_ratio_of_lengths():
+    scene = loads(PATCH + GROWING + TRIANGLE, sets=SPREAD)
+    before, after = simulate_bench.bonds_of(loads(PATCH + GROWING + TRIANGLE)), simulate_bench.bonds_of(scene)
+    assert after.ratio == pytest.approx(before.ratio, rel=1e-15) and after.length == before.length
+    assert after.static == pytest.approx(pad_factor(12.7e-3, 4e-3) * before.static, rel=1e-15)
+    assert acting(acting(scene)).friction == acting(scene).friction
+
+
+def test_exact_strips_share_the_whole_width():
+    sets = ["contact.strips.count=4"]
+    one, four = (acting(loads(PATCH + NONLOCAL + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
+    assert one.static == four.static == pytest.approx(0.3 * pad_factor(12.7e-3, 4e-3), rel=1e-15)
+
+
+@pytest.mark.parametrize("more", ["", SHEAR])
+def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
+    share = pad_factor(12.7e-3, 4e-3)
+    text = PATCH + more + NONLOCAL + RIG
+    one, two = (run(plan(loads(text, sets=[*sets, "accuracy.steps_per_cycle=400"])), estimate=False).measures
+                for sets in (SPREAD, [f"friction.static={0.3 * share!r}"]))
+    assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
+    assert plan(loads(text, sets=SPREAD)).groups["D"] == pytest.approx(share * plan(loads(text)).groups["D"])
+
+
+def test_refuses_spread_without_a_width_and_for_laws_without_bonds():
+    with pytest.raises(SceneError, match=r"normal.width: missing.*friction.spread needs it"):
+        loads(POINT + NONLOCAL + TRIANGLE, sets=SPREAD)
+    for law in ("coulomb", "tanh", "elastic-plastic"):
+        with pytest.raises(SceneError, match=f"friction.spread: law '{law}' has no bonds to spread") as caught:
+            loads(PATCH + NONLOCAL + TRIANGLE, sets=[*SPREAD, f"friction.law={law}",
+                                                     "friction.reference_speed=1 mm/s"])
+        assert len(caught.value.mistakes) == 1
+
+
+def test_exact_a_width_without_spread_is_remarked():
+    scene = loads(POINT + NONLOCAL + TRIANGLE, sets=["normal.width=1 mm"])
+    assert scene.remarks == ["normal.width has no meaning without friction.spread and is not used"]
