@@ -44,6 +44,8 @@ EFFECTS = {
                                            "reversal)", ("pressure",), ("traction",)),
     "friction.law=nonlocal": Effect("patchfem.friction.quadrature", "tau = -mu_s int phi(R/eps) sigma_n "
                                     "u/|u| dL1/eps_0 (2.17)", ("pressure",), ("traction",)),
+    "friction.law=convolution": Effect("patchfem.friction.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps "
+                                       "sigma_n(x - s sgn v) ds (Oden, Pires)", ("pressure",), ("traction",)),
     "friction.reading=stretch": Effect("patchfem.friction.recursion", "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.quadrature", "phi: (R/eps)^p exp(-R/eps)/Gamma(p+1) (2.14)"),
     "friction.temperature": Effect("patchfem.friction.temperature", "a_s = a_ref exp(T_a (1/T_ref - 1/T_s)), "
@@ -65,7 +67,6 @@ EFFECTS = {
 }
 
 NOT_YET_BUILT = (
-    "friction.law=convolution",
     "structure.stiffening", "structure.bonded", "drive.kind=force", "drive.kind=free", "drive.waveform=step",
     "drive.waveform=sweep", "drive.waveform=levels", "drive.waveform=file", "wear", "accuracy.method=duhamel",
     "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",

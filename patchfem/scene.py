@@ -16,6 +16,7 @@ from typing import Any
 from patchfem import scene_tables as tables
 from patchfem.lines import key_lines
 from patchfem.scene_built import combinations, not_yet_built
+from patchfem.scene_friction import temperature_unused
 from patchfem.scene_read import Draft, apply_set
 from patchfem.scene_rules import (
     ASPERITIES,
@@ -26,7 +27,6 @@ from patchfem.scene_rules import (
     drive_unused,
     kinetic_unused,
     method_unused,
-    temperature_unused,
     unused,
 )
 from patchfem.scene_text import effects, toml

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from patchfem.scene_built import NOT_YET_BUILT
+from patchfem.scene_friction import check_spread, remark_temperature
 from patchfem.scene_tables import Friction, Tables
 from patchfem.scene_types import keys
 
@@ -23,7 +24,7 @@ LAWS: dict[str, tuple[str, str]] = {
         "bond_length",
         "kinetic reading order rest_growth slip_growth rest_speed initial_bonds breakaway spread temperature",
     ),
-    "convolution": ("bond_length", ""),
+    "convolution": ("bond_length", "order spread"),
 }
 SLIDES: dict[str, tuple[str, str]] = {
     "constant": ("speed distance", ""),
@@ -175,17 +176,15 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
     elif kinetic_unused(law):
         draft.remark(f"{at}.kinetic has no effect while the bond length is constant; add rest_growth and slip_growth")
-    _spread(draft, at, law)
-    if temperature_unused(law):
-        lacking = "its activations; add rest_activation, slip_activation or both"
-        if law.rest_growth is None:
-            lacking = "growth of the bonds; add rest_growth and slip_growth"
-        draft.remark(f"{at}.temperature has no effect without {lacking}")
+    check_spread(draft, at, law)
+    remark_temperature(draft, at, law)
     for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
         if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
             draft.lacks(f"{at}.{other}", f"{key} needs it; leave both out for a constant bond length")
-    if law.order is not None and (law.order <= -1 or (law.order < 0 and law.reading == "stretch")):
-        wanted = ">= 0 (reading 'stretch')" if law.reading == "stretch" else "> -1 (reading 'report')"
+    printed = law.reading != "stretch" or law.law == "convolution"
+    if law.order is not None and (law.order <= -1 or (law.order < 0 and not printed)):
+        wanted = ">= 0 (reading 'stretch')" if not printed else "> -1 (reading 'report')"
+        wanted = "> -1" if law.law == "convolution" else wanted
         draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
     contact = draft.tables.contact
     if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.gives_way:
@@ -193,23 +192,6 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     if law.static == 0 and contact and contact.gives_way:
         draft.say(f"{at}.static", f"0 beside {contact.gives_way}: no point carries friction; static > 0 is wanted, or "
                                   f"leave out {contact.gives_way}")  # fmt: skip
-
-
-def _spread(draft: Draft, at: str, law: Friction) -> None:
-    if law.spread is None:
-        return
-    if law.law not in ("nonlocal", "convolution", None):
-        draft.say(f"{at}.spread", f"law '{law.law}' has no bonds to spread; spread belongs to nonlocal and convolution")
-    elif at == "friction" and draft.tables.normal is not None and not draft.given("normal.width"):
-        draft.lacks("normal.width", "friction.spread needs it")
-
-
-def temperature_unused(law: Friction) -> bool:
-    """Whether a surface temperature stands where it changes no growth."""
-    if law.temperature is None or law.law != "nonlocal":
-        return False
-    still = not law.temperature.rest_activation and not law.temperature.slip_activation
-    return still or (law.rest_growth is None and law.slip_growth is None)
 
 
 def kinetic_unused(law: Friction) -> bool:
@@ -232,7 +214,8 @@ def _slide(draft: Draft) -> None:
 
 
 def _ageless(law: Friction) -> bool:
-    return law.law in ("coulomb", "elastic-plastic") or (law.law == "nonlocal" and law.rest_growth is None)
+    ageless = ("coulomb", "elastic-plastic", "convolution")
+    return law.law in ageless or (law.law == "nonlocal" and law.rest_growth is None)
 
 
 def _structure(draft: Draft) -> None:
@@ -360,7 +343,7 @@ def _method(draft: Draft, kind: str) -> None:
     if method != "exact" or kind != "rig" or law is None or law.law is None:
         return
     shear = contact.gives_way if contact is not None else ""
-    if law.law != "coulomb" or shear:
+    if law.law not in ("coulomb", "convolution") or shear:
         beside = f" beside {shear}" if shear else ""
         draft.say("accuracy.method", f"no exact solution exists for law '{law.law}'{beside}; use 'march' or leave "
                                      "method out")  # fmt: skip

@@ -207,12 +207,18 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     scene = what.scene
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
-    if patch is not None and not scene.contact.gives_way and not settings.per_point:
+    lumps = scene.friction is not None and scene.friction.law != "convolution"
+    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
-        raw = rig.run_exact(scene, settings, modes, drive, load, progress)
+        share = 1.0
+        if scene.friction is not None and scene.friction.law == "convolution":
+            from .simulate_convolution import limit_share
+
+            share = limit_share(scene, patch)
+        raw = rig.run_exact(scene, settings, modes, drive, load, progress, share)
         seconds["march"] = raw.seconds
         found = with_errors(raw.values, least=1e-9)
     else:
@@ -297,6 +303,10 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // settings.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
+        if f is not None and f.law == "convolution":
+            from .simulate_convolution import limit_tractions
+
+            tau = limit_tractions(scene, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return _fields(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
     shots = raw.snapshots

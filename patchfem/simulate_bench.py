@@ -33,8 +33,8 @@ class BenchRun:
     seconds: float
 
 
-def law_for(scene):
-    """The NumPy law object of a bench."""
+def law_for(scene, patch=None):
+    """The NumPy law object of a bench; only an averaged law looks at the patch."""
     from .friction.local import Coulomb, ElasticPlastic, Rate
     from .friction.quadrature import Quadrature
     from .friction.recursion import Recursion
@@ -46,6 +46,10 @@ def law_for(scene):
         return ElasticPlastic(f.static, f.bond_length)
     if f.law == "tanh":
         return Rate(f.static, f.reference_speed)
+    if f.law == "convolution":
+        from .simulate_convolution import law_on
+
+        return law_on(scene, patch)
     law = bonds_of(scene)
     if law.reading == "stretch" and law.order == 1:
         return Recursion(law)
@@ -109,7 +113,7 @@ def _new_pace(time) -> np.ndarray:
 
 def _rigid(scene, patch, time, slide, frames):
     """Every point follows the slide; the pressure rides on the upper piece or stays on the lower one."""
-    law = law_for(scene)
+    law = law_for(scene, patch)
     if patch is None:
         weight, at_rest, lower, x = np.ones(1), np.array([scene.normal.load]), False, np.zeros(1)
     else:
@@ -126,7 +130,7 @@ def _rigid(scene, patch, time, slide, frames):
     force, load, slip, work, stored = (np.zeros(time.size) for _ in range(5))
     pick = set(_frame_numbers(time.size, frames).tolist())
     tau, local, burnt = [], [], 0.0
-    length = scene.friction.bond_length or 0.0
+    length = (scene.friction.bond_length or 0.0) if scene.friction.law != "convolution" else 0.0
     static = scene.friction.static
     for k in range(time.size):
         if k:

@@ -114,7 +114,7 @@ def _sizes(scene) -> tuple:
         chain["asperities"] = skin.tangential_ratio * mean_stiffness(contact, load / area) * area
     if f is not None and load > 0:
         rigid = "none: it creeps" if f.law == "tanh" else "rigid until it slips"
-        chain["bonds"] = f.static * load / f.bond_length if f.bond_length else rigid
+        chain["bonds"] = f.static * load / f.bond_length if f.bond_length and f.law != "convolution" else rigid
     return unknowns, chain
 
 

@@ -93,7 +93,7 @@ def choose(scene, per_point: bool = False) -> Settings:
     """Engine and numerical settings from the scene; PatchfemError for a method that cannot do it."""
     accuracy, f, contact = scene.accuracy, scene.friction, scene.contact
     shear = contact.gives_way if contact is not None else ""
-    closed = f is None or (f.law == "coulomb" and not shear)
+    closed = f is None or (f.law in ("coulomb", "convolution") and not shear)
     side = "upper"
     if contact is not None:
         from .simulate_plan import shape_side
@@ -139,6 +139,10 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
     shear = contact.gives_way if contact is not None else ""
+    if f.law == "convolution":
+        from .simulate_convolution import limit_share
+
+        return hub.coulomb_model(*(limit * limit_share(scene, patch),) * 2)
     if f.law in ("coulomb", "elastic-plastic"):
         length = f.bond_length if f.law == "elastic-plastic" else 0.0
         if shear:
@@ -180,12 +184,14 @@ def whole(span: float, drive: BaseSine) -> bool:
     return span > drive.period * (1 - 1e-6)
 
 
-def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None) -> Raw:
-    """Closed-form run of a Coulomb scene, or of a structure without friction."""
+def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None,
+              share: float = 1.0) -> Raw:
+    """Closed-form run of a Coulomb scene, or of a structure without friction; share: of mu N that the law keeps."""
     from .dynamics.histories import simulate
 
     f = acting(scene).friction
-    static, kinetic = (f.static * load, f.kinetic * load) if f is not None else (0.0, 0.0)
+    static = f.static * load * share if f is not None else 0.0
+    kinetic = f.kinetic * load if f is not None and f.kinetic is not None else static
     travel = scene.structure.travel or np.inf
     begin = perf_counter()
     done = simulate(modes, drive, static, kinetic, settings.cycles, settings.window, travel, progress)

@@ -280,8 +280,6 @@ def test_refuses_another_shape_of_table(text, says):
 
 UNBUILT = [
     (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
-    (BENCH, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
-    (BENCH, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
     (RIG, ["friction.breakaway=0.1"], "friction.breakaway"),
     (RIG, ["structure.mode.second.pitch=2 rad/m"], "structure.mode.second.pitch"),
     (RIG, ["structure.stiffening.cubic=1e12 N/m^3"], "structure.stiffening"),

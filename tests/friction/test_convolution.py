@@ -1,0 +1,279 @@
+"""The averaged law: exact averages, the steady limit of 2.17 on a pressure that stays below, and scenes with it."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from friction_paths import triangle, upper_pressure, walk
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.special import gamma, gammainc
+from test_run import PATCH, POINT, SHEAR, SLIDE
+from test_temperature import RIG
+
+from patchfem import simulate_bench
+from patchfem.core import PatchfemError
+from patchfem.friction.convolution import Convolution, average, limits
+from patchfem.friction.law import Bonds
+from patchfem.friction.local import Coulomb
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import Recursion
+from patchfem.scene import SceneError, loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_patch import solve_all
+
+AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
+COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+FLAT = PATCH.split("[contact.tilt]")[0]
+CROWN = "[contact.crown]\nradius = \"20 m\"\n"
+
+
+def by_quadrature(y, nodes, sigma, way, length, order):
+    """The defining integral at one place, between the kinks of the pressure."""
+    ends = np.unique(np.clip(way * (y - nodes), 0, None))
+    if ends.size < 2:
+        return 0.0
+    if order < 0:  # s = t^(1/(p + 1)) takes the infinite start away
+        power = 1 / (order + 1)
+        return sum(quad(lambda t: power * length**-(order + 1) * np.exp(-t**power / length) / gamma(order + 1)
+                        * np.interp(y - way * t**power, nodes, sigma), a**(order + 1), b**(order + 1),
+                        epsabs=1e-15, epsrel=1e-13)[0] for a, b in pairwise(ends))
+    return sum(quad(lambda s: (s / length)**order * np.exp(-s / length) / gamma(order + 1) / length
+                    * np.interp(y - way * s, nodes, sigma), a, b, epsabs=1e-15, epsrel=1e-13)[0]
+               for a, b in pairwise(ends))
+
+
+@pytest.mark.parametrize("order", [-0.5, 0.0, 0.4, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("length", [0.05, 0.7, 40.0])
+def test_exact_average_is_the_integral(order, way, length):
+    rng = np.random.default_rng(3)
+    nodes = np.cumsum(rng.uniform(0.2, 1.5, 9))
+    sigma = rng.uniform(0.1, 2, 9)
+    places = np.append(rng.uniform(nodes[0], nodes[-1], 6), nodes[[0, 4, -1]])
+    truth = [by_quadrature(y, nodes, sigma, way, length, order) for y in places]
+    assert average(places, nodes, sigma, way, length, order) == pytest.approx(truth, rel=1e-9, abs=1e-12)
+
+
+@given(st.floats(-0.9, 4), st.floats(0.01, 100), st.sampled_from([1.0, -1.0]),
+       st.lists(st.floats(0, 1e6), min_size=2, max_size=30))
+def test_always_an_average_lies_between_nothing_and_the_largest_pressure(order, length, way, sigma):
+    nodes = np.arange(len(sigma)) * 1.0
+    found = average(nodes, nodes, sigma, way, length, order)
+    assert (found >= -1e-9 * max(sigma)).all() and (found <= max(sigma) * (1 + 1e-9)).all()
+    assert average(-nodes[::-1], -nodes[::-1], sigma[::-1], -way, length, order) == pytest.approx(found[::-1])
+
+
+# ---- C9, C10: edges and waves
+
+@pytest.mark.parametrize("width, want", [(5, (0.80134759, 0.60943313)), (10, (0.90000454, 0.80005448)),
+                                         (100, (0.99, 0.98))])
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_exact_c9_resultant_of_a_pad(width, want, order, way):
+    """Integral over the pad by Gauss points between enough cuts; uniform pressure on a few nodes."""
+    y, w = np.polynomial.legendre.leggauss(20)
+    cuts = np.linspace(0, width, 2 * width + 1)
+    places = (cuts[:-1, None] + (1 + y) / 2 * 0.5).ravel()
+    weight = np.tile(w / 4, 2 * width)
+    nodes = np.linspace(0, width, 7)
+    assert weight @ average(places, nodes, np.ones(7), way, 1.0, order) / width == pytest.approx(want[order], abs=1e-8)
+
+
+@pytest.mark.parametrize("order, length, size, degrees", [(0, 2.0, 0.9878867, -8.92705), (1, 2.0, 0.9759201, -17.85411),
+                                                         (1, 20.0, 0.2884004, -115.03673)])
+def test_exact_c10_transfer_of_a_wave(order, length, size, degrees):
+    """80 um wave of the pressure on a long straight-sided grid: (1 + i k eps)^-(p + 1), but for the nodes' own sinc."""
+    k, h = 2 * np.pi / 80, 0.05
+    nodes = np.arange(-40 * length, 80 + h / 2, h)
+    places = nodes[nodes >= 0][:-1:7]
+    wave = average(places, nodes, 2 + np.cos(k * nodes), 1.0, length, order) - 2
+    wave += 2 * (1 - gammainc(order + 1, (places - nodes[0]) / length))
+    found = np.linalg.lstsq(np.stack([np.cos(k * places), np.sin(k * places)], axis=1), wave, rcond=None)[0]
+    answer = complex(found[0], -found[1]) / np.sinc(k * h / 2 / np.pi)**2
+    assert abs(answer) == pytest.approx(size, abs=1e-6)
+    assert np.degrees(np.angle(answer)) == pytest.approx(degrees, abs=1e-4)
+
+
+# ---- the steady limit of 2.17
+
+def lower(nodes, sigma):
+    return lambda q: np.interp(nodes + q, nodes, sigma, left=0.0, right=0.0)
+
+
+@pytest.mark.parametrize("law, order", [(Recursion, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, order, way):
+    """2.17 by its own engines after 20 bond lengths, with the part that falls as the square of the step taken off; two
+    stretches of pressure with a bare gap of several nodes between, over which no bond survives."""
+    nodes = np.linspace(0, 60, 241)
+    sigma = np.maximum(np.sin(nodes / 7) + 0.3, 0.0)
+    bonds = Bonds(0.4, 1.0, float(order), "report" if order != 1 else "stretch", initial=0.0)
+    engine = law(bonds, 0.0) if law is Quadrature else law(bonds)
+    pressure = lower(nodes, sigma)
+    coarse, fine = (walk(engine, way * np.linspace(0, 20, steps + 1), pressure).traction[-1] for steps in (160, 320))
+    averaged = Convolution(0.4, 1.0, order, nodes, sigma)
+    end = averaged.step(averaged.start(sigma), way * 20.0, sigma, pressure(way * 20.0), 1.0).state
+    assert (np.diff((sigma > 0).astype(int)) != 0).sum() >= 2
+    assert (4 * fine - coarse) / 3 == pytest.approx(averaged.traction(end), abs=2e-6)
+    assert np.abs(averaged.traction(end)).max() > 0.4
+
+
+def test_exact_the_recursion_comes_to_the_average_with_the_square_of_the_step():
+    """Away from edges: a smooth pressure that is straight between the knots of the path."""
+    nodes = np.linspace(0, 60, 121)
+    sigma = 1.5 + np.sin(nodes / 3)
+    inner = (nodes > 5) & (nodes < 35)
+    miss = []
+    for steps in (200, 400, 800):
+        path = np.linspace(0, 20, steps + 1)
+        engine = Recursion(Bonds(0.4, 1.0))
+        state = engine.start(sigma)
+        pressure = lower(nodes, sigma)
+        for a, b in pairwise(path):
+            state = engine.step(state, b - a, pressure(a), pressure(b), 1.0).state
+        averaged = Convolution(0.4, 1.0, 1.0, nodes, sigma)
+        end = averaged.step(averaged.start(sigma), 20.0, sigma, pressure(20.0), 1.0).state
+        miss.append(np.abs(engine.traction(state) - averaged.traction(end))[inner].max())
+    assert miss[0] < 2e-4 and miss[1:] == pytest.approx([miss[0] / 4, miss[0] / 16], rel=0.1)
+
+
+def test_exact_short_bonds_and_even_pressure_are_coulomb():
+    path = triangle(2.0, 2, 8)
+    nodes, sigma = np.linspace(0, 100, 41), np.full(41, 2.0)
+    inner = (nodes > 45) & (nodes < 55)
+    plain = walk(Coulomb(0.3), path, upper_pressure(sigma))
+    for law in (Convolution(0.3, 0.5, 1.0, nodes), Convolution(0.3, 0.5, 1.0)):
+        found = walk(law, path, upper_pressure(sigma))
+        assert found.mean[:, inner] == pytest.approx(plain.mean[:, inner], rel=1e-13)
+        assert found.traction[:, inner] == pytest.approx(plain.traction[:, inner], rel=1e-13)
+    wavy = 2 + np.sin(nodes)
+    for eps in (1e-2, 1e-3, 1e-4):
+        found = walk(Convolution(0.3, eps, 1.0, nodes), path, upper_pressure(wavy))
+        near = walk(Coulomb(0.3), path, upper_pressure(wavy))
+        assert np.abs(found.traction - near.traction)[:, 1:-1].max() < 0.3 * 2 * eps * 1.01
+
+
+def test_exact_at_rest_the_last_traction_is_kept():
+    law, one = Convolution(0.3, 1.0), np.ones(1)
+    state = law.step(law.start(one), -0.1, one, one, 1.0).state
+    still = law.step(state, 0.0, one, one, 5.0)
+    assert still.mean[0] == -0.3 and law.traction(still.state)[0] == -0.3 and still.dissipated[0] == 0
+
+
+@given(st.lists(st.floats(-3, 3), min_size=1, max_size=12), st.booleans())
+def test_always_the_averaged_law_only_takes_energy(steps, below):
+    nodes = np.linspace(0, 9, 13)
+    sigma = np.maximum(np.sin(nodes), 0.0)
+    law = Convolution(0.5, 0.8, 1.0, nodes, sigma if below else None)
+    pressure = lower(nodes, sigma) if below else upper_pressure(sigma)
+    found = walk(law, np.cumsum([0.0, *steps]), pressure)
+    assert (found.dissipated >= -1e-14).all()
+    assert (np.abs(found.traction) <= 0.5 * sigma.max() + 1e-12).all()
+
+
+def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edges_lose():
+    """p = 0: the loss of a long pad is eps times the pressure at its trailing edge."""
+    nodes = np.linspace(0, 40, 2001)
+    weight = np.gradient(nodes)
+    weight[[0, -1]] /= 2
+    forward, back = limits(nodes, 1 + nodes / 40, weight, 1.0, 0.0)
+    assert 60 - forward == pytest.approx(2 - 1 / 40, rel=1e-4) and 60 - back == pytest.approx(1 + 1 / 40, rel=1e-4)
+
+
+# ---- scenes
+
+def bench_of(text, *sets, steps=64):
+    scene = loads(text, sets=sets)
+    patch = solve_all(scene, False)[0] if scene.contact is not None else None
+    return patch, simulate_bench.run(scene, patch, steps, 4)
+
+
+def test_exact_one_point_is_coulomb():
+    _, one = bench_of(POINT + AVERAGED + SLIDE)
+    _, two = bench_of(POINT + COULOMB + SLIDE)
+    assert one.values == two.values and (one.force == two.force).all()
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_exact_force_of_a_patch_bench_is_the_resultant_of_the_average(order):
+    """Forward and back by the definition, with the pressure on the mover: different, as the patch is tilted."""
+    patch, found = bench_of(PATCH + AVERAGED + SLIDE, "contact.tilt.angle=0.1 mrad", f"friction.order={order}")
+    x, sigma, weight = patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight
+    for way, force in ((1, found.force.max()), (-1, -found.force.min())):
+        truth = sum(w * by_quadrature(y, x, sigma, way, 1e-3, order) for y, s, w in zip(x, sigma, weight) if s > 0)
+        assert force == pytest.approx(0.3 * truth, rel=1e-9)
+    assert found.force.max() < 0.97 * 0.3 * patch.pressure.load
+    assert abs(found.force.max() + found.force.min()) > 1e-3 * found.force.max()
+    assert found.values["energy_balance"] < 1e-12 and found.slip == pytest.approx(found.slide)
+
+
+def test_exact_a_long_nonlocal_bench_over_a_pressure_below_ends_at_the_average():
+    """Two laws of the same scene: after ten bond lengths 2.17 and the average agree but for steps and edges."""
+    slide = '[slide]\nkind = "constant"\nspeed = "1 mm/s"\ndistance = "1 mm"\n'
+    sets = ["contact.tilt.on=lower", "contact.tilt.angle=0.1 mrad", "friction.bond_length=80 um"]
+    patch, one = bench_of(PATCH + AVERAGED + slide, *sets, steps=4000)
+    _, two = bench_of(PATCH + AVERAGED.replace("convolution", "nonlocal") + slide, *sets, steps=4000)
+    assert one.force[-1] == pytest.approx(two.force[-1], rel=2e-4)
+    limit = 0.3 * patch.pressure.load
+    assert np.abs(one.tau[-1] - two.tau[-1]).max() < 5e-3 * one.tau[-1].max() and one.force[-1] < 0.99 * limit
+
+
+def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_average():
+    text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + RIG
+    scene = loads(text)
+    found = run(plan(scene), estimate=False)
+    patch = found.patch
+    forward, back = limits(patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight, 3e-4, 1.0)
+    assert forward == pytest.approx(back, rel=1e-9) and 0.5 < forward / patch.pressure.load < 0.9
+    plain = run(plan(loads(FLAT + CROWN + COULOMB + RIG, sets=[
+        f"friction.static={0.3 * forward / patch.pressure.load!r}"])), estimate=False)
+    for name, m in plain.measures.items():
+        assert found.measures[name].value == pytest.approx(m.value, rel=1e-6, abs=1e-12), name
+    march = run(plan(loads(text, sets=["accuracy.method=march", "accuracy.steps_per_cycle=1600"])), estimate=False)
+    name = "relative_displacement_amplitude"
+    assert march.measures[name].value == pytest.approx(found.measures[name].value, rel=1e-3)
+    weight = patch.pieces.interface.weight
+    assert found.fields["shear_stress"][1:] @ weight == pytest.approx(
+        found.window.force[np.searchsorted(found.window.time, found.fields["time"][1:])], rel=1e-9)
+    assert not any("moves exactly as one point" in line for line in found.warnings)
+
+
+def test_exact_a_block_of_one_point_on_a_rig_is_coulomb():
+    one, two = (run(plan(loads(POINT + text + RIG)), estimate=False).measures for text in (AVERAGED, COULOMB))
+    assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
+    assert "bonds" in plan(loads(POINT + AVERAGED + RIG)).chain
+
+
+def test_exact_the_plan_names_the_law():
+    what = plan(loads(PATCH + AVERAGED + SLIDE))
+    assert "friction.law=convolution" in what.effects and "friction.law=convolution" not in what.not_in_scene
+    assert not any("reading" in name for name in what.effects)
+    assert "friction.law=convolution" in plan(loads(PATCH + COULOMB + SLIDE)).not_in_scene
+
+
+def test_refuses_an_uneven_pressure_on_a_rig():
+    scene = loads(PATCH + AVERAGED + RIG, sets=["contact.tilt.angle=0.1 mrad"])
+    with pytest.raises(PatchfemError, match=r"friction.law: 'convolution' on a pressure that is not symmetric: the "
+                                            r"limit is .* N forward and .* N back; .*not yet built"):
+        run(plan(scene), estimate=False)
+
+
+@pytest.mark.parametrize("text, sets, says", [
+    (SLIDE, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
+    (RIG, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
+    (RIG, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
+    (SLIDE, ["contact.strips.count=4"], "contact.strips: beside law 'convolution'"),
+    (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
+    (SLIDE, ["friction.kinetic=0.2"], "kinetic belongs to coulomb and nonlocal")])
+def test_refuses_what_the_averaged_law_cannot_do(text, sets, says):
+    more = [one.replace(SHEAR, "contact.shear={}") for one in sets]
+    with pytest.raises(SceneError, match=says):
+        loads(PATCH + AVERAGED + text, sets=more)
+
+
+def test_exact_any_order_above_minus_one_is_let_through():
+    assert loads(PATCH + AVERAGED + SLIDE, sets=["friction.order=-0.5"]).friction.order == -0.5
+    assert loads(PATCH + AVERAGED + SLIDE, sets=["friction.initial_bonds=0"]).remarks == [
+        "friction.initial_bonds has no meaning for law 'convolution' and is not used"]
