@@ -108,7 +108,7 @@ def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, or
     """2.17 by its own engines after 20 bond lengths, with the part that falls as the square of the step taken off; two
     stretches of pressure with a bare gap of several nodes between, over which no bond survives."""
     nodes = np.linspace(0, 60, 241)
-    sigma = np.maximum(np.sin(nodes / 7) + 0.3, 0.0)
+    sigma = np.maximum(np.sin(nodes / 2) + 0.8, 0.0)
     bonds = Bonds(0.4, 1.0, float(order), "report" if order != 1 else "stretch", initial=0.0)
     engine = law(bonds, 0.0) if law is Quadrature else law(bonds)
     pressure = lower(nodes, sigma)
