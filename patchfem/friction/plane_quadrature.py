@@ -1,0 +1,241 @@
+"""Eq. 2.17 in full along a path in two directions: the sum over the bonds that formed on every leg of a polygon.
+
+Readings and their numbers are those of `quadrature`; u is a vector, R the length of path since a bond formed. Legs are
+integrated in closed form for stretch with p = 1 and for the last leg, whose bonds all point along it; otherwise by
+eight Gauss points on pieces of at most a quarter bond length, shorter than their distance from where u or R vanishes.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import gammainc, gammaln
+
+from .law import Bonds, grow, growth_exponents
+from .local import Step
+from .plane import advance_plane, direction
+from .quadrature import PIECE, cutoff
+
+_Y, _W = np.polynomial.legendre.leggauss(8)
+_FIVE = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Legs:
+    """Bonds of a polygon. Leg k: q (k, 2) its end, path, damage, growth (J), mature (eps_p) there; span (k, 2), length
+    scale eps when it formed, gain: growth and mature length won on it (2, k); sigma (k, m) [Pa]. The first entry is the
+    initial cohort of weight m_0 eps_0; now: q, path, damage, growth, mature; alive (m,): first leg that still holds."""
+
+    q: np.ndarray
+    path: np.ndarray
+    damage: np.ndarray
+    growth: np.ndarray
+    mature: np.ndarray
+    span: np.ndarray
+    eps: np.ndarray
+    gain: np.ndarray
+    sigma: np.ndarray
+    now: tuple
+    alive: np.ndarray
+    dropped: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneQuadrature:
+    """Law object; `tail` bounds what the cut-off of old bonds may lose, 0 keeps every bond."""
+
+    law: Bonds
+    tail: float = 1e-9
+
+    def start(self, sigma) -> Legs:
+        """Only the initial cohort: unstressed, full-grown bonds of density m_0."""
+        none, length = np.zeros(1), np.full(1, self.law.length)
+        return Legs(np.zeros((1, 2)), none, none, none, length, np.zeros((1, 2)), length, np.zeros((2, 1)),
+                    np.array(sigma, float)[None], (np.zeros(2), 0.0, 0.0, 0.0, self.law.length),
+                    np.zeros(len(sigma), np.int64))
+
+    def step(self, state: Legs, dq, s0, s1, dt: float) -> Step:
+        """One leg dq (2,) [m]; the mean traction (2, m) is exact for p = 1 stretch, by five Gauss points else."""
+        dq = np.asarray(dq, float)
+        after = self._moved(state, dq, s0, s1, dt)
+        if not dq.any():
+            mean = self.traction(after)
+        elif self._closed:
+            bonds = np.zeros((4, len(s0)))
+            bonds[0] = _summed(state, self._surviving(state)[:, None])[0]
+            bonds[1:3] = _summed(state, self.weights(state)) * self.law.length
+            mean = self.law.static / self.law.length * advance_plane(bonds, dq, (s0 + s1) / 2, after.eps[-1])[1]
+        else:
+            mean = np.zeros((2, len(s0)))
+            for y, w in zip(*_FIVE):
+                part = (1 + y) / 2
+                here = self._moved(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, (s0 + s1) / 2)
+                mean += w / 2 * self.traction(here)
+        return Step(mean, dq @ mean - (self.stored(after) - self.stored(state)), after)
+
+    @property
+    def _closed(self) -> bool:
+        return self.law.order == 1 and self.law.reading == "stretch"
+
+    def _surviving(self, state: Legs) -> np.ndarray:
+        """(k,) surviving bond density of each leg [1], p = 1 stretch."""
+        left = np.exp(-(state.now[2] - state.damage))
+        out = left * -np.expm1(-np.hypot(*state.span.T) / state.eps)
+        if state.dropped == 0:
+            out[0] = self.law.initial * left[0]
+        return out
+
+    def _moved(self, state: Legs, dq, s0, s1, dt, forming=None) -> Legs:
+        q, path, damage, growth, mature = state.now
+        law, (h, _) = self.law, direction(dq)
+        speed = h / dt if dt > 0 else 0.0
+        middle = grow(law, mature, speed, speed, h / 2, dt / 2)
+        total = sum(growth_exponents(law, speed, speed, h, dt)) if law.grows else 0.0
+        after = (q + dq, path + h, damage + h / middle, growth + total, grow(law, mature, speed, speed, h, dt))
+        alive = np.where(s1 > 0, state.alive, len(state.path) + (h > 0))
+        if h == 0:
+            return replace(state, now=after, alive=alive)
+        sigma = (s0 + s1) / 2 if forming is None else forming
+        new = {name: np.append(getattr(state, name), value) for name, value in zip(
+            ("path", "damage", "growth", "mature", "eps"), (*after[1:], middle))}
+        gain = np.append(state.gain, [[after[3] - growth], [after[4] - mature]], axis=1)
+        return self._cut(Legs(np.vstack([state.q, after[0]]), span=np.vstack([state.span, dq]), gain=gain,
+                              sigma=np.vstack([state.sigma, sigma]), now=after, alive=alive, dropped=state.dropped,
+                              **new))
+
+    def _cut(self, state: Legs) -> Legs:
+        if self.tail <= 0:
+            return state
+        reach, stretch = cutoff(self.law.order, self.tail), self.law.reading == "stretch"
+        old, now = (state.damage, state.now[2]) if stretch else (state.path / self.law.length,
+                                                                 state.now[1] / self.law.length)
+        first = int(np.searchsorted(old, now - reach))
+        if first < max(64, len(state.path) // 2):
+            return state
+        kept = {name: getattr(state, name)[first:] for name in
+                ("q", "path", "damage", "growth", "mature", "span", "eps", "sigma")}
+        return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0),
+                       dropped=state.dropped + first)
+
+    def weights(self, state: Legs) -> np.ndarray:
+        """(k, 2) weight [1] of each leg: tau = mu_s sum_k weight_k sigma_k. The first is the initial cohort."""
+        law, first = self.law, 1 if state.dropped == 0 else 0
+        out, rest = np.zeros((len(state.path), 2)), slice(first, None)
+        if first:
+            out[0] = self._cohort(state)
+        if len(state.path) == first:
+            return out
+        if self._closed:
+            out[rest] = _stretch_leg(state, rest)[0] / law.length
+            return out
+        out[rest] = _gauss_leg(state, rest, law)
+        return out
+
+    def _cohort(self, state: Legs) -> np.ndarray:
+        """m_0 phi_p(R/eps_0) u/|u|: the bonds that were there at the start."""
+        law, (u, way) = self.law, direction(state.now[0])
+        path, damage = state.now[1:3]
+        if u == 0 or law.initial == 0:
+            return np.zeros(2)
+        x, harm = (u, damage) if law.reading == "stretch" else (path, path / law.length)
+        return law.initial * np.exp(law.order * np.log(x / law.length) - harm - gammaln(law.order + 1)) * way
+
+    def traction(self, state: Legs) -> np.ndarray:
+        """tau (2, m) [Pa], positive against positive slip."""
+        return self.law.static * _summed(state, self.weights(state))
+
+    def stored(self, state: Legs) -> np.ndarray:
+        """Elastic energy per area (m,) [J/m2] of the stretch reading with p = 1; zero where no energy is defined."""
+        if not self._closed:
+            return np.zeros(state.sigma.shape[1])
+        squares = _stretch_leg(state, slice(0, None))[1]
+        if state.dropped == 0:
+            squares[0] = self.law.initial * np.sum(state.now[0]**2) * np.exp(-state.now[2])
+        return self.law.static / (2 * self.law.length) * _summed(state, squares[:, None])[0]
+
+
+def _summed(state: Legs, weights) -> np.ndarray:
+    """(c, m) sums of weights (k, c) times the pressures of the legs that still hold."""
+    if not state.alive.any():
+        return weights.T @ state.sigma
+    young = np.arange(len(weights))[:, None] >= state.alive
+    return weights.T @ (state.sigma * young)
+
+
+def _stretch_leg(state: Legs, rest) -> tuple:
+    """Closed-form sums over a leg of k u dL/eps (k, 2) [m] and k |u|^2 dL/eps (k,) [m2] (p = 1)."""
+    span, eps = state.span[rest], state.eps[rest]
+    h = np.hypot(*span.T)
+    e = np.divide(span, h[:, None], out=np.zeros_like(span), where=h[:, None] > 0)
+    a = state.now[0] - state.q[rest]
+    x = h / eps
+    d = np.exp(-x)
+    zero, one, two = -np.expm1(-x), 1 - d * (1 + x), 2 - d * (x * x + 2 * x + 2)
+    left = np.exp(-(state.now[2] - state.damage[rest]))
+    along = np.sum(a * e, axis=1)
+    first = left[:, None] * (a * zero[:, None] + e * (eps * one)[:, None])
+    return first, left * (np.sum(a * a, axis=1) * zero + 2 * along * eps * one + eps**2 * two)
+
+
+def _gauss_leg(state: Legs, rest, law: Bonds) -> np.ndarray:
+    """(k, 2) sums over the legs by Gauss points; the last leg in closed form where its bonds share a length."""
+    span, eps = state.span[rest], state.eps[rest]
+    h = np.hypot(*span.T)
+    e, a, near = span / h[:, None], state.now[0] - state.q[rest], state.now[1] - state.path[rest]
+    before = np.sum(a * e, axis=1)  # u along e at the end of a leg; grows backwards along it
+    aside = np.hypot(*(a - e * before[:, None]).T)
+    out, shared = np.zeros_like(a), law.reading == "stretch" or not law.grows
+    last = shared & (near == 0)
+    out[last] = (e * (eps * gammainc(law.order + 1, h / eps) / law.length)[:, None])[last]
+    count = np.maximum(1, np.ceil(h / (PIECE * eps))).astype(int)
+    clear = np.minimum(np.hypot(aside, np.maximum(np.maximum(before, -before - h), 0.0)), near) >= h / count
+    even, odd = np.flatnonzero(clear & ~last), np.flatnonzero(~clear & ~last)
+    owner = np.repeat(even, count[even])
+    size = (h / count)[owner]
+    begin = size * (np.arange(owner.size) - np.repeat(np.cumsum(count[even]) - count[even], count[even]))
+    for k in odd:
+        cuts = _graded(h[k], PIECE * eps[k], (complex(-before[k], aside[k]), complex(-near[k], 0.0)))
+        owner, begin = np.append(owner, np.full(cuts.size - 1, k)), np.append(begin, cuts[:-1])
+        size = np.append(size, np.diff(cuts))
+    back = begin[:, None] + size[:, None] * (1 + _Y) / 2
+    u = a[owner][:, None] + back[..., None] * e[owner][:, None]
+    far = np.maximum(np.hypot(u[..., 0], u[..., 1]), 1e-300)
+    x, harm = _ages(state, rest, law, owner, back, far, h)
+    with np.errstate(under="ignore"):
+        f = np.exp(law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1)) / far
+    f = (u * f[..., None] * (_W / 2)[:, None]).sum(axis=1) * size[:, None] / law.length
+    for c in (0, 1):
+        out[:, c] += np.bincount(owner, f[:, c], h.size)
+    return out
+
+
+def _ages(state: Legs, rest, law: Bonds, owner, back, far, h) -> tuple:
+    """(argument of the power, exponent of the decay) of bonds `back` (k, 8) behind the ends of their legs."""
+    if law.reading == "stretch":
+        eps = state.eps[rest][owner][:, None]
+        return far / eps, state.now[2] - state.damage[rest][owner][:, None] + back / eps
+    travel = state.now[1] - state.path[rest][owner][:, None] + back
+    if not law.grows:
+        return travel / law.length, travel / law.length
+    part, (won, grown) = back / h[owner][:, None], state.gain[:, rest][:, owner][..., None]
+    age = state.now[3] - state.growth[rest][owner][:, None] + part * won
+    born = state.mature[rest][owner][:, None] - part * grown
+    own = np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
+    return travel / own, travel / own
+
+
+def _graded(h: float, most: float, poles) -> np.ndarray:
+    """Cuts (k,) of [0, h], none longer than `most` or than its distance from the complex places `poles`."""
+    inner = [p.real for p in poles if 0 < p.real < h]
+    least = 1e-15 * h
+    knots = sorted({0.0, h, *inner})
+    todo = list(pairwise(knots))[::-1]
+    cuts = [0.0]
+    while todo:
+        a, b = todo.pop()
+        away = min(abs(complex(max(a - p.real, p.real - b, 0.0), p.imag)) for p in poles)
+        if b - a > max(min(most, away), least):
+            todo += [((a + b) / 2, b), (a, (a + b) / 2)]
+        else:
+            cuts.append(b)
+    return np.array(cuts)

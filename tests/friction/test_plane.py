@@ -1,0 +1,241 @@
+"""The bond law along a path in two directions: circles, one direction, rotations, energy, and sums by hand.
+
+Lengths in eps_0 and tractions in mu_s sigma.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from friction_paths import walk
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.special import gamma
+
+from patchfem.friction.law import Bonds
+from patchfem.friction.plane import PlaneRecursion
+from patchfem.friction.plane_quadrature import PlaneQuadrature
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import Recursion
+
+ONE = np.ones(1)
+GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)
+
+
+def along(law, path, sigma=ONE, dt=1.0, pressures=None):
+    """(means (k, 2, m), tractions, dissipated (k, m), stored, state) of a polygon path (k + 1, 2)."""
+    state, rows = law.start(sigma if pressures is None else pressures[0]), []
+    for k, dq in enumerate(np.diff(path, axis=0)):
+        s0, s1 = (sigma, sigma) if pressures is None else pressures[k:k + 2]
+        step = law.step(state, dq, s0, s1, dt)
+        state = step.state
+        rows.append((step.mean, law.traction(state), step.dissipated, law.stored(state)))
+    return *(np.array(part) for part in zip(*rows)), state
+
+
+def circle(radius, arc, legs):
+    """Polygon on a circle through the origin that leaves it along +x; arc: length of the path."""
+    angle = np.linspace(0, arc / radius, legs + 1)
+    return radius * np.stack([np.sin(angle), 1 - np.cos(angle)], axis=1)
+
+
+def against_tangent(traction, path, radius):
+    """The traction as a complex number against the direction of motion at the end of a circle."""
+    angle = 2 * np.arctan2(path[-1, 1], path[-1, 0])
+    return complex(*traction) * np.exp(-1j * angle)
+
+
+# ---- C14
+
+@pytest.mark.parametrize("radius, size, lag", [(0.5, 0.447214, 63.4349), (2, 0.894427, 26.5651),
+                                               (10, 0.995037, 5.7106)])
+def test_exact_c14_circle(radius, size, lag):
+    path = circle(radius, 18, 6000)
+    found = against_tangent(along(PlaneRecursion(Bonds(1.0, 1.0)), path)[1][-1, :, 0], path, radius)
+    assert abs(found) == pytest.approx(size, abs=1e-5) == pytest.approx((1 + radius**-2)**-0.5, abs=1e-5)
+    assert -np.degrees(np.angle(found)) == pytest.approx(lag, abs=2e-3)
+    assert -np.angle(found) == pytest.approx(np.arctan(1 / radius), abs=1e-5)
+
+
+@pytest.mark.parametrize("reading, order", [("stretch", 0.0), ("stretch", 1.0), ("stretch", 2.5), ("report", -0.5),
+                                            ("report", 0.0), ("report", 1.0), ("report", 1.7)])
+@pytest.mark.parametrize("radius", [0.7, 3.0])
+def test_exact_circle_of_any_order(reading, order, radius):
+    """u = 2 r sin(s/2r) at half the turned angle: the sum over all bonds of a circle is one integral over s. A polygon
+    comes to it with the square of its legs (p = 0 and a second turn: times their logarithm; p < 0: h^(2 + p))."""
+    def bond(s):
+        u = 2 * radius * np.sin(s / (2 * radius))
+        x = abs(u) if reading == "stretch" else s
+        return x**order * np.exp(-s) / gamma(order + 1) * np.sign(u) * np.exp(-0.5j * s / radius)
+
+    turns = np.append(np.arange(0, 34, 2 * np.pi * radius), 34)
+    truth = sum(quad(lambda t, part=part: part(bond(t * t)) * 2 * t, a**0.5, b**0.5, limit=200)[0] * unit
+                for a, b in pairwise(turns) for part, unit in ((np.real, 1), (np.imag, 1j)))
+    law = PlaneQuadrature(Bonds(1.0, 1.0, order, reading, initial=0.0), 0.0)
+    miss = []
+    for legs in (400, 800):
+        path = circle(radius, 30, legs)
+        state = law.start(ONE)
+        for dq in np.diff(path, axis=0):
+            state = law._moved(state, dq, ONE, ONE, 1.0)
+        miss.append(against_tangent(law.traction(state)[:, 0], path, radius) - truth)
+    assert abs(miss[1]) < (5e-3 if order < 0 else 1e-3)
+    assert abs(miss[0] / miss[1]) > 0.87 * 2**min(2, 2 + order)
+
+
+# ---- one direction is the scalar law
+
+STEPS = st.lists(st.floats(-2, 2), min_size=1, max_size=12)
+
+
+@given(STEPS, st.sampled_from([0, 1]), st.floats(0.05, 3))
+def test_always_one_direction_is_the_scalar_state(steps, axis, dt):
+    knots, sigma = np.cumsum([0.0, *steps]), np.array([1.0, 0.3])
+    path = np.zeros((len(knots), 2))
+    path[:, axis] = knots
+    one = walk(Recursion(GROWING), knots, lambda q: sigma, dt)
+    found = along(PlaneRecursion(GROWING), path, sigma, dt)
+    assert found[0][:, axis] == pytest.approx(one.mean, rel=1e-14, abs=1e-14)
+    assert found[1][:, axis] == pytest.approx(one.traction, rel=1e-14, abs=1e-14)
+    assert found[2] == pytest.approx(one.dissipated, rel=1e-13, abs=1e-14)
+    assert found[3] == pytest.approx(one.stored, rel=1e-14, abs=1e-14)
+    assert not found[1][:, 1 - axis].any() and found[4].eps == one.state.eps
+
+
+@pytest.mark.parametrize("law, within", [
+    (Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8), 1e-13), (Bonds(0.7, 1.0, 0.0), 1e-10),
+    (Bonds(0.7, 1.0, 2.0), 1e-10), (Bonds(0.7, 1.0, 0.5), 1e-5), (Bonds(0.7, 1.0, 0.0, "report"), 1e-10),
+    (Bonds(0.7, 1.0, 1.0, "report"), 1e-10), (Bonds(0.7, 1.0, 2.4, "report", initial=0.0), 1e-8),
+    (Bonds(0.7, 1.0, 1.0, "report", 0.6, 2.0, 0.3, 1e-3, 0.0), 1e-5)])
+def test_exact_one_direction_is_the_scalar_sum(law, within):
+    rng = np.random.default_rng(5)
+    knots = np.cumsum(np.append(0.0, rng.uniform(-1, 1.4, 25)))
+    sigma = np.array([1.0, 0.3])
+    path = np.stack([0.6 * knots, -0.8 * knots], axis=1)
+    one = walk(Quadrature(law, 0.0), knots, lambda q: sigma, 0.5)
+    found = along(PlaneQuadrature(law, 0.0), path, sigma, 0.5)
+    way = np.array([0.6, -0.8])[:, None]
+    assert np.abs(found[1] - way * one.traction[:, None]).max() < within
+    assert np.abs(found[3] - one.stored).max() < within
+
+
+# ---- any direction
+
+def random_path(rng, legs):
+    return np.cumsum(np.vstack([[0.0, 0.0], rng.normal(0, 1, (legs, 2)) * rng.choice([0.02, 0.3, 2.0], (legs, 1))]),
+                     axis=0)
+
+
+@given(st.integers(0, 10**6), st.floats(-4, 4))
+def test_always_a_turned_path_turns_the_traction(seed, angle):
+    rng = np.random.default_rng(seed)
+    path, turn = random_path(rng, 8), np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    for law in (PlaneRecursion(GROWING), PlaneQuadrature(GROWING)):
+        one, other = along(law, path, dt=0.3), along(law, path @ turn.T, dt=0.3)
+        assert other[1] == pytest.approx(np.einsum("ij,kjm->kim", turn, one[1]), abs=1e-13)
+        assert other[2] == pytest.approx(one[2], abs=1e-12)
+
+
+def test_exact_the_sum_is_the_state_on_random_polygons():
+    """p = 1 stretch with growing bonds, changing pressure and bare places: two different computations, 1e-10."""
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        path = random_path(rng, 30)
+        pressures = rng.uniform(0, 2, (31, 3)) * (rng.uniform(size=(31, 3)) > 0.15)
+        one = along(PlaneRecursion(GROWING), path, dt=0.4, pressures=pressures)
+        other = along(PlaneQuadrature(GROWING, 0.0), path, dt=0.4, pressures=pressures)
+        for a, b in zip(one[:4], other[:4]):
+            assert a == pytest.approx(b, abs=1e-10)
+
+
+def test_exact_a_long_path_is_cut_within_its_tail():
+    path = circle(1.3, 80, 500)
+    whole, cut = (along(PlaneQuadrature(Bonds(1.0, 1.0), tail), path) for tail in (0.0, 1e-9))
+    assert cut[1] == pytest.approx(whole[1], abs=2e-9) and len(cut[4].path) < 400 < len(whole[4].path)
+
+
+def by_hand(law, path, dt):
+    """Traction at the end of a polygon by adaptive integration over the bonds of every leg (constant bond length)."""
+    legs = np.diff(path, axis=0)
+    length = np.hypot(*legs.T)
+    after = np.cumsum(length[::-1])[::-1] - length
+    total = np.zeros(2)
+    for k, leg in enumerate(legs):
+        e, a = leg / length[k], path[-1] - path[k + 1]
+        turn = float(np.clip(-(a @ e), 0, length[k]))
+        for c in (0, 1):
+            def bond(y, c=c, e=e, a=a, k=k):
+                u, travel = a + y * e, after[k] + y
+                size = max(np.hypot(*u), 1e-300)
+                x = size if law.reading == "stretch" else travel
+                return x**law.order * np.exp(-travel) / gamma(law.order + 1) * u[c] / size
+
+            for low, high in ((0, turn), (turn, length[k])):
+                if high > low:
+                    total[c] += quad(bond, low, high, epsabs=1e-12, epsrel=1e-11, limit=400)[0]
+    return law.static * total
+
+
+@pytest.mark.parametrize("reading, order", [("stretch", 0.0), ("stretch", 0.5), ("stretch", 2.0), ("report", -0.4),
+                                            ("report", 0.0), ("report", 1.0), ("report", 1.5)])
+def test_exact_polygon_by_adaptive_integration(reading, order):
+    """Legs that cross, turn back onto themselves and end where others began."""
+    law = Bonds(0.7, 1.0, order, reading, initial=0.0)
+    path = np.array([[0, 0], [1, 0], [1, 1.2], [0.4, 1.2], [0.4, -0.5], [0.4, 0.3], [0.9, 0.3], [0.2, 0.1], [1, 0],
+                     [1.5, 0.7], [1.1, 0.9]])
+    for end in range(2, len(path) + 1):
+        found = along(PlaneQuadrature(law, 0.0), path[:end])[1][-1, :, 0]
+        assert found == pytest.approx(by_hand(law, path[:end], 1.0), abs=1e-9)
+
+
+def test_exact_initial_bonds_point_back_to_the_start():
+    law = Bonds(1.0, 1.0, 2.0, "stretch", initial=1.0)
+    bare = Bonds(1.0, 1.0, 2.0, "stretch", initial=0.0)
+    path = np.array([[0, 0], [0.3, 0.1], [0.2, 0.8]])
+    more = along(PlaneQuadrature(law), path)[1][-1, :, 0] - along(PlaneQuadrature(bare), path)[1][-1, :, 0]
+    u, r = np.hypot(0.2, 0.8), np.hypot(0.3, 0.1) + np.hypot(0.1, 0.7)
+    assert more == pytest.approx(u**2 * np.exp(-r) / 2 * np.array([0.2, 0.8]) / u, rel=1e-13)
+
+
+# ---- energy
+
+def worst_gain(seed, paths, legs=24):
+    """Least of (work so far, dissipation, miss of the ledger) over random closed-in paths, all over the work done."""
+    rng, worst = np.random.default_rng(seed), [np.inf, np.inf, 0.0]
+    for _ in range(paths):
+        law = PlaneRecursion(Bonds(1.0, 1.0, 1.0, "stretch", rng.uniform(0, 1), 10**rng.uniform(-2, 2),
+                                   10**rng.uniform(-2, 1), 1e-2, rng.uniform()))
+        path = random_path(rng, legs)
+        path[-1] = path[0]
+        pressures = rng.uniform(0, 2, (legs + 1, 4)) * (rng.uniform(size=(legs + 1, 4)) > 0.1)
+        mean, _, burnt, stored, _ = along(law, path, dt=10**rng.uniform(-2, 1), pressures=pressures)
+        power = np.einsum("kcm,kc->km", mean, np.diff(path, axis=0))
+        scale = np.abs(power).sum(axis=0)
+        worst[0] = min(worst[0], (np.cumsum(power, axis=0) / scale).min())
+        worst[1] = min(worst[1], (burnt / scale).min())
+        worst[2] = max(worst[2], (np.abs(power.sum(axis=0) - stored[-1] - burnt.sum(axis=0)) / scale).max())
+    return worst
+
+
+def test_always_random_paths_take_energy():
+    """100 paths of 4 points with steps in the pressure, lost contact and changing bond length."""
+    work, burnt, ledger = worst_gain(1, 100)
+    assert work >= -1e-12 and burnt >= -1e-12 and ledger < 1e-12
+
+
+@pytest.mark.slow
+def test_always_twenty_thousand_random_paths_take_energy():
+    work, burnt, ledger = worst_gain(2, 20_000)
+    assert work >= -1e-12 and burnt >= -1e-12 and ledger < 1e-12
+
+
+def test_exact_at_rest_only_the_bond_length_changes():
+    law = PlaneRecursion(GROWING)
+    state = along(law, circle(0.5, 3, 40))[4]
+    still = law.step(state, np.zeros(2), ONE, ONE, 2.0)
+    assert (law.traction(still.state) == law.traction(state)).all() and not still.dissipated.any()
+    assert still.mean == pytest.approx(law.traction(state), rel=1e-15) and still.state.eps > state.eps
+    added = PlaneQuadrature(GROWING)
+    state = along(added, circle(0.5, 3, 40))[4]
+    assert added.step(state, np.zeros(2), ONE, ONE, 2.0).mean == pytest.approx(added.traction(state), rel=1e-13)
