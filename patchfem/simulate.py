@@ -105,6 +105,8 @@ def _strained(scene, patch) -> list:
 def _overhang(scene, fine) -> list:
     """Warnings of a bench whose slide leaves the patch or whose law has no finite peak."""
     out, travel = [], float(np.abs(fine.slide).max()) / scene.contact.length
+    if fine.lateral is not None and (aside := float(np.abs(fine.lateral).max()) / scene.contact.width) > 0.1:
+        out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
         out.append(f"the upper piece slides off the pressure: {100 * lost:.0f} % of the load is not carried at the end")
@@ -193,6 +195,8 @@ def _warming(scene, patch, response, work: float | None = None) -> list:
 
     if work is None:
         work = float(np.trapezoid(response.force, response.slide))
+        if response.lateral is not None:
+            work += float(np.trapezoid(response.lateral_force, response.lateral))
     return heating(scene, patch, work, float(response.time[-1]))
 
 

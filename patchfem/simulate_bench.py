@@ -10,7 +10,7 @@ from .core import Missing, PatchfemError
 from .friction.law import Bonds
 from .response.measures import harmonic, interface_loop, step_harmonic
 from .simulate_acting import acting
-from .simulate_slide import path_of, peak_speed
+from .simulate_slide import lateral_corners, path_of, peak_speed
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -18,7 +18,8 @@ MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a b
 @dataclass(frozen=True, eq=False, slots=True)
 class BenchRun:
     """One pass over the path. time, slide, force, load, slip: (k,); work: (k,) running friction work [J]; tau, local:
-    frames (f, m) of traction [Pa] and local slip [m] at samples `frames`; values by measure name."""
+    frames (f, m) of traction [Pa] and local slip [m] at samples `frames`; values by measure name. lateral,
+    lateral_force, yaw_moment: (k,) of a slide in two directions, else None."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -31,6 +32,9 @@ class BenchRun:
     local: np.ndarray
     values: dict
     seconds: float
+    lateral: np.ndarray | None = None
+    lateral_force: np.ndarray | None = None
+    yaw_moment: np.ndarray | None = None
 
 
 def law_for(scene, patch=None):
@@ -67,16 +71,24 @@ def bonds_of(scene) -> Bonds:
 
 def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
     """Slide the interface of a scene along its path with `steps` per cycle; patch None for [normal]."""
-    begin, scene = perf_counter(), acting(scene)
+    begin, sideways, more = perf_counter(), lateral_corners(scene) is not None, {}
+    if sideways:
+        from .simulate_plane import refuse, run_plane
+
+        refuse(scene)
+    scene = acting(scene)
     time, slide, first, omega = path_of(scene, steps)
-    if scene.contact is not None and scene.contact.gives_way:
+    if sideways:
+        out, more = run_plane(scene, patch, time, slide, frames)
+    elif scene.contact is not None and scene.contact.gives_way:
         out = _with_shear(scene, patch, time, slide, frames, say)
     else:
         out = _rigid(scene, patch, time, slide, frames)
     force, load, slip, work, stored, burnt, at, tau, local = out
     values = _values(scene, time, slide, force, load, slip, work, stored, burnt, first, omega)
     rate = np.gradient(slide, time) if time.size > 2 else np.zeros(time.size)
-    return BenchRun(time, slide, rate, force, load, slip, at, tau, local, values, perf_counter() - begin)
+    return BenchRun(time, slide, rate, force, load, slip, at, tau, local, values, perf_counter() - begin,
+                    **more)
 
 
 def _values(scene, time, slide, force, load, slip, work, stored, burnt, first, omega) -> dict:

@@ -111,8 +111,10 @@ def _histories(result: Result) -> tuple:
     if r is None:
         return {}, None
     if kind == "bench":
+        across = {"lateral_displacement": r.lateral, "lateral_force": r.lateral_force, "yaw_moment": r.yaw_moment}
         return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
-                "friction_force": r.force, "normal_load": r.load}, None
+                "friction_force": r.force, "normal_load": r.load,
+                **{name: values for name, values in across.items() if values is not None}}, None
     out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
     if kind == "rig":

@@ -55,8 +55,12 @@ def plan(scene, per_point: bool = False) -> Plan:
         engine, steps, more = _rig_cost(scene, per_point, unknowns)
         seconds += more
     elif scene.kind == "bench":
-        from .simulate_slide import path_of, steps_of
+        from .simulate_slide import lateral_corners, path_of, steps_of
 
+        if lateral_corners(scene) is not None:
+            from .simulate_plane import refuse
+
+            refuse(scene)
         engine = "bench"
         steps = path_of(scene, steps_of(scene))[0].size * 2
         seconds += 6e-5 * steps

@@ -26,7 +26,7 @@ def path_of(scene, steps: int) -> tuple:
     if slide.kind == "dwell":
         return *_cut(*_dwell_corners(slide), steps), 0, 0.0
     if slide.kind == "file":
-        return *_cut(*file_corners(scene), steps), 0, 0.0
+        return *_cut(*file_corners(scene), steps, _across(scene)), 0, 0.0
     count = max(1, round(slide.cycles * steps))
     number = np.arange(count + 1)
     if slide.kind == "sine":
@@ -56,21 +56,43 @@ def _dwell_corners(slide) -> tuple:
 
 def file_corners(scene) -> tuple:
     """(time [s], slide [m]) as the path file of the scene has them."""
+    return _table(scene)[:2]
+
+
+def lateral_corners(scene) -> tuple | None:
+    """(time [s], lateral slide [m]) where the scene slides by a path file with that column, else None."""
+    found = _table(scene) if scene.slide is not None and scene.slide.kind == "file" else ()
+    return (found[0], found[2]) if len(found) == 3 else None
+
+
+def _across(scene):
+    """(k,) lateral slide [m] at the corners of a path file, None for a slide along x alone."""
+    corners = lateral_corners(scene)
+    return None if corners is None else corners[1]
+
+
+def _lengths(slide, across=None) -> np.ndarray:
+    """Lengths [m] of straight legs between corners."""
+    return np.abs(np.diff(slide)) if across is None else np.hypot(np.diff(slide), np.diff(across))
+
+
+def _table(scene) -> tuple:
     path = scene.beside(scene.slide.file)
     return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
 
 
 @lru_cache(maxsize=4)
 def _read(path, stamp):
-    return read_path(path, {"time": KINDS["time"], "displacement": KINDS["length"]})
+    return read_path(path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]})
 
 
-def _cut(time, slide, steps: int) -> tuple:
-    """The corners with straight samples between them: half the steps by path, half evenly over the legs that move.
+def _cut(time, slide, steps: int, across=None) -> tuple:
+    """The corners with straight samples between them: half the steps by path, half evenly over the legs that move;
+    across: lateral slide at the corners.
 
     A rest is REST steps however long it is: growth at rest (2.10) is exact in a step of any duration.
     """
-    path = np.abs(np.diff(slide))
+    path = _lengths(slide, across)
     share = path / path.sum() / 2 + 1 / (2 * np.count_nonzero(path))
     pieces = np.where(path > 0, np.maximum(1, np.ceil(steps * share * (1 - 1e-12))), REST).astype(int)
     corner = np.concatenate([[0], np.cumsum(pieces)])
@@ -85,14 +107,19 @@ def peak_speed(scene) -> float:
         return 2 * np.pi * slide.frequency * slide.amplitude
     if slide.kind == "file":
         time, place = file_corners(scene)
-        return float(np.abs(np.diff(place) / np.diff(time)).max())
+        return float((_lengths(place, _across(scene)) / np.diff(time)).max())
     return slide.speed
 
 
 def amplitude(scene) -> float:
     """Half the range of a slide that returns, the distance of one that does not [m]; for a file half the range."""
     slide = scene.slide
-    return float(np.ptp(file_corners(scene)[1])) / 2 if slide.kind == "file" else slide.amplitude or slide.distance
+    return _range(scene) / 2 if slide.kind == "file" else slide.amplitude or slide.distance
+
+
+def _range(scene) -> float:
+    """Range of the path of a file [m], of the wider one of its two directions."""
+    return float(max(np.ptp(column) for column in _table(scene)[1:]))
 
 
 def steps_of(scene) -> int:
@@ -105,8 +132,8 @@ def steps_of(scene) -> int:
         return 4 * ceil(max(pinned, LEAST * legs) / 4)
     base, cycles = 400 * sqrt(1e-3 / scene.accuracy.tolerance), 1.0
     if time is not None:
-        path = float(np.abs(np.diff(place)).sum())
-        cycles = max(1.0, path / (2 * float(np.ptp(place))))
+        path = float(_lengths(place, _across(scene)).sum())
+        cycles = max(1.0, path / (2 * (_range(scene) if slide.kind == "file" else float(np.ptp(place)))))
         if scene.friction.bond_length:
             base = max(base, 20 * min(path / cycles / scene.friction.bond_length, 1000))
     return 4 * ceil(max(cycles * min(max(base, 100), MOST), LEAST * legs) / 4)

@@ -1,4 +1,4 @@
-"""A prescribed slide from a two-column table: time and displacement, straight between the rows."""
+"""A prescribed slide from a table: time, displacement and, for two directions, lateral; straight between the rows."""
 
 import re
 from collections.abc import Mapping
@@ -8,17 +8,20 @@ import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
 
-UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-         "displacement": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}}
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
+UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "displacement": _LENGTHS, "lateral": _LENGTHS}
+COLUMNS = ("time", "displacement", "lateral")
 LARGEST = 64 * 2**20  # bytes of text
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 
 
 def read_path(path, units: Mapping = UNITS) -> tuple:
-    """(time (k,) [s], displacement (k,) [m]) of a CSV whose header is like `time [s],displacement [um]`.
+    """(time (k,) [s], displacement (k,) [m]) of a CSV whose header is like `time [s],displacement [um]`; and lateral
+    (k,) [m], the displacement across, where that column stands too.
 
-    units: column -> unit -> factor to SI. At least two rows, time strictly rising; the first row is 0, 0, where the
-    pieces were pressed, and the path leaves it. PatchfemError names file and line, Missing where there is no file.
+    units: column -> unit -> factor to SI. At least two rows, time strictly rising; the first row is 0 in every
+    column, where the pieces were pressed, and the path leaves it. PatchfemError names file and line, Missing where
+    there is no file.
     """
     path = Path(path)
     lines = _text(path).split("\n")
@@ -29,7 +32,7 @@ def read_path(path, units: Mapping = UNITS) -> tuple:
         raise PatchfemError(f"{path}:{last + 1}: a path is at least two rows below its header, not {len(rows)}")
     rows = rows * factors
     _check(path, *rows.T)
-    return frozen_array(rows[:, 0]), frozen_array(rows[:, 1])
+    return tuple(frozen_array(column) for column in rows.T)
 
 
 def _text(path: Path) -> str:
@@ -46,33 +49,35 @@ def _text(path: Path) -> str:
 
 
 def _header(path, line: str, units: Mapping) -> tuple:
-    """(column names as they stand, factors (2,) of time and displacement)."""
+    """(column names as they stand, factors of time, displacement and lateral)."""
     wanted = f"a header like `time [s],displacement [um]` is wanted, not '{line.strip()[:80]}'"
     found = [re.fullmatch(r"\s*(\w+)\s*\[\s*([^\[\]]*?)\s*\]\s*", cell) for cell in line.split(",")]
     names = [one[1] if one else "" for one in found]
-    if sorted(names) != ["displacement", "time"]:
+    known = COLUMNS[:max(len(names), 2)]
+    if sorted(names) != sorted(known):
         raise PatchfemError(f"{path}:1: {wanted}")
     for _, name, unit in ((one, one[1], one[2]) for one in found):
         if unit not in units[name]:
             raise PatchfemError(f"{path}:1: {name} [{unit}]: the unit is not known; one of {', '.join(units[name])}")
     unit = {one[1]: one[2] for one in found}
-    return names, np.array([units[name][unit[name]] for name in ("time", "displacement")])
+    return names, np.array([units[name][unit[name]] for name in known])
 
 
 def _row(path, number: int, line: str, order) -> tuple:
     cells = [cell.strip() for cell in line.split(",")]
-    if len(cells) != 2:
-        raise PatchfemError(f"{path}:{number}: two cells are wanted, time and displacement, not '{line.strip()[:80]}'")
+    if len(cells) != len(order):
+        wanted = "two cells are wanted, time and displacement" if len(order) == 2 else "three cells are wanted"
+        raise PatchfemError(f"{path}:{number}: {wanted}, not '{line.strip()[:80]}'")
     values = dict(zip(order, cells))
     for name, cell in values.items():
         if not _NUMBER.fullmatch(cell) or not np.isfinite(float(cell)):
             raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
-    return float(values["time"]), float(values["displacement"])
+    return tuple(float(values[name]) for name in COLUMNS[:len(order)])
 
 
-def _check(path, time, displacement) -> None:
-    for name, first in (("time", time[0]), ("displacement", displacement[0])):
-        if first != 0:
+def _check(path, time, *places) -> None:
+    for name, column in zip(COLUMNS, (time, *places)):
+        if (first := column[0]) != 0:
             raise PatchfemError(f"{path}:2: {name} starts at {first:g}: the slide starts at 0, 0, where the pieces are "
                                 f"pressed; subtract the first {name} from the column")
     back = np.flatnonzero(np.diff(time) <= 0)
@@ -80,5 +85,5 @@ def _check(path, time, displacement) -> None:
         k = back[0]
         raise PatchfemError(f"{path}:{k + 3}: time {time[k + 1]:g} s does not follow {time[k]:g} s; strictly rising "
                             "time is wanted")
-    if not displacement.any():
+    if not any(column.any() for column in places):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")

@@ -1,0 +1,203 @@
+"""A bench along a path file in two directions, and a patch in strips along one: scenes against closed forms and
+against the law stepped point by point."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_run import PATCH, POINT, cli
+
+from patchfem import simulate_bench
+from patchfem.core import PatchfemError
+from patchfem.friction.law import Bonds
+from patchfem.friction.plane import PlaneRecursion
+from patchfem.response.paths import read_path
+from patchfem.scene import load, loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_patch import solve_all
+from patchfem.simulate_slide import path_of, peak_speed
+
+NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n'
+FILE = '[slide]\nkind = "file"\nfile = "path.csv"\n'
+TRIANGLE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\ncycles = 2\n'
+STRIPS = '[contact.strips]\ncount = 4\nroll = "0.02 mrad"\n'
+L_SHAPE = "time [ms],displacement [um],lateral [um]\n0,0,0\n2,10,0\n6,10,20\n8,4,24\n"
+NEWTON = 115.65376199677297
+
+
+@pytest.fixture
+def table(tmp_path):
+    def write(text, scene=POINT + NONLOCAL, *sets):
+        (tmp_path / "path.csv").write_text(text, "utf-8")
+        (tmp_path / "scene.toml").write_text(scene + FILE, "utf-8")
+        return load(tmp_path / "scene.toml", sets)
+    return write
+
+
+def ring(radius, turns, rows):
+    """A circle through the origin that leaves it along +x, in um, one turn a second."""
+    angle = np.linspace(0, 2 * np.pi * turns, round(rows * turns) + 1)
+    lines = zip((angle / (2 * np.pi)).tolist(), (radius * np.sin(angle)).tolist(),
+                (radius * (1 - np.cos(angle))).tolist())
+    return "time [s],displacement [um],lateral [um]\n" + "\n".join(f"{t!r},{x!r},{y!r}" for t, x, y in lines) + "\n"
+
+
+@pytest.mark.parametrize("radius, size, lag", [(1, 0.447214, 63.4349), (4, 0.894427, 26.5651), (20, 0.995037, 5.7106)])
+def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
+    """r = 0.5, 2, 10 bond lengths of 2 um: |F| and lag of the two resultants against the motion."""
+    turns = {1: 6.25, 4: 2.25, 20: 0.75}[radius]
+    scene = table(ring(radius, turns, {1: 400, 4: 600, 20: 1500}[radius]), POINT + NONLOCAL)
+    found = simulate_bench.run(scene, None, 4)
+    force = (found.force[-1] + 1j * found.lateral_force[-1]) / (0.3 * found.load[0])
+    motion = np.exp(2j * np.pi * turns)
+    assert abs(force) == pytest.approx(size, abs=1e-5)
+    assert -np.degrees(np.angle(force / motion)) == pytest.approx(lag, abs=2e-3)
+    assert found.values["energy_balance"] < 1e-12 and found.yaw_moment is None
+    assert peak_speed(scene) == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
+
+
+@pytest.mark.parametrize("keys", ["", "order = 0\n", 'reading = "report"\norder = 2\n',
+                                  'kinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "1 um"\n'])
+def test_exact_a_column_of_zeros_is_the_slide_in_one_direction(table, keys):
+    rows = [(0, 0), (2, 10), (6, -10), (8, 0)]
+    plain = "time [ms],displacement [um]\n" + "".join(f"{t},{x}\n" for t, x in rows)
+    zeros = "lateral [mm],time [ms],displacement [um]\n" + "".join(f"0,{t},{x}\n" for t, x in rows)
+    one, two = (simulate_bench.run(table(text, POINT + NONLOCAL + keys), None, 200) for text in (plain, zeros))
+    assert one.lateral_force is None and not two.lateral_force.any()
+    assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
+    assert two.slip == pytest.approx(one.slip, rel=1e-9, abs=1e-15)
+    for name, value in one.values.items():
+        assert two.values[name] == pytest.approx(value, rel=1e-9, abs=1e-12), name
+
+
+@pytest.mark.parametrize("keys", ["", "order = 2\n", 'reading = "report"\n'])
+def test_exact_directions_changed_about(table, keys):
+    """The same path with its columns exchanged: forces exchange too, also where the x column never moves."""
+    rows = [(0, 0), (3, 6), (5, 2), (9, 8)]
+    x_only = "time [ms],displacement [um],lateral [um]\n" + "".join(f"{t},{x},0\n" for t, x in rows)
+    y_only = "time [ms],displacement [um],lateral [um]\n" + "".join(f"{t},0,{x}\n" for t, x in rows)
+    one, two = (simulate_bench.run(table(text, POINT + NONLOCAL + keys), None, 80) for text in (x_only, y_only))
+    assert two.lateral_force == pytest.approx(one.force, rel=1e-12, abs=1e-12) and not two.force.any()
+    assert (one.time == two.time).all()
+
+
+def test_exact_the_resting_turn_of_a_right_angle(table):
+    """After a long leg along x (z = eps) a leg along y: F_x = e^-y/eps, F_y = 1 - e^-y/eps of mu N, by hand."""
+    text = "time [ms],displacement [um],lateral [um]\n0,0,0\n20,80,0\n21,80,8\n"
+    found = simulate_bench.run(table(text), None, 4000)
+    limit, y = 0.3 * found.load[0], found.lateral
+    turned = y > 0
+    assert found.force[turned] == pytest.approx(limit * np.exp(-y[turned] / 2e-6), rel=1e-9, abs=1e-12 * limit)
+    assert found.lateral_force[turned] == pytest.approx(limit * -np.expm1(-y[turned] / 2e-6), rel=1e-9)
+
+
+@pytest.mark.parametrize("strips", ["", STRIPS])
+def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
+    """Resultants and yaw moment from the law at every node of every strip, with that strip's own pressure."""
+    scene = table(L_SHAPE, PATCH + strips + NONLOCAL)
+    patch = solve_all(scene, False)[0]
+    found = simulate_bench.run(scene, patch, 60, 6)
+    count = 4 if strips else 1
+    sigma = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
+    y = patch.strips.offsets if strips else np.zeros(1)
+    weight = np.tile(patch.pieces.interface.weight / count, count)
+    law, flat = PlaneRecursion(Bonds(0.3, 2e-6)), sigma.ravel()
+    time, slide, *_ = path_of(scene, 60)
+    q = np.stack([slide, np.interp(time, *np.array([[0, 2e-3, 6e-3, 8e-3], [0, 0, 20e-6, 24e-6]]))], axis=1)
+    state, rows = law.start(flat), [np.zeros((2, flat.size))]
+    for dq, dt in zip(np.diff(q, axis=0), np.diff(time)):
+        state = law.step(state, dq, flat, flat, dt).state
+        rows.append(law.traction(state))
+    tau = np.array(rows) * weight
+    force = tau.sum(axis=2)
+    places, across = np.tile(patch.x, count), np.repeat(y, patch.x.size)
+    assert found.force == pytest.approx(force[:, 0], rel=1e-9, abs=1e-9)
+    assert found.lateral_force == pytest.approx(force[:, 1], rel=1e-9, abs=1e-9)
+    yaw = tau[:, 0] @ across - tau[:, 1] @ places
+    assert found.yaw_moment == pytest.approx(yaw, rel=1e-8, abs=1e-12) and np.abs(yaw).max() > 1e-3
+    mean = np.array(rows)[found.frames, 0].reshape(len(found.frames), count, -1).mean(axis=1)
+    assert found.tau == pytest.approx(mean, rel=1e-9, abs=1e-6)
+    if strips:
+        long = found.slide.argmax()
+        assert yaw[long] == pytest.approx(patch.strips.yaw_moment(0.3), rel=0.01)
+
+
+def test_exact_histories_of_both_directions_are_written(table, tmp_path):
+    scene = table(L_SHAPE, PATCH + STRIPS + NONLOCAL)
+    answer = cli("run", scene.path, "-o", tmp_path / "out")
+    assert answer.code == 0, answer.err
+    result = run(plan(scene), estimate=False)
+    with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
+        for name, unit in (("lateral_displacement", "m"), ("lateral_force", "N"), ("yaw_moment", "N m")):
+            assert data[name].attrs["units"] == unit and data[name].dims == ("time",)
+        assert data["lateral_force"].values == pytest.approx(result.response.lateral_force)
+        assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
+    wide = L_SHAPE.replace("24", "2400")
+    assert any("0.189 of the width" in w or "0.19 of the width" in w for w in
+               run(plan(table(wide, PATCH + NONLOCAL)), estimate=False).warnings)
+
+
+def test_exact_the_table_is_read_in_any_order_of_columns(tmp_path):
+    (tmp_path / "a.csv").write_text("lateral [mm],time [ms],displacement [um]\n0,0,0\n1e-3,2,5\n", "utf-8")
+    time, x, y = read_path(tmp_path / "a.csv")
+    assert (time[1], x[1], y[1]) == pytest.approx((2e-3, 5e-6, 1e-6))
+
+
+@pytest.mark.parametrize("text, says", [
+    (L_SHAPE + "9,4\n", ":6: three cells"), (L_SHAPE + "9,4,x\n", ":6: lateral: 'x' is not a finite"),
+    (L_SHAPE.replace("0,0,0", "0,0,3"), ":2: lateral starts at 3e-06"),
+    (L_SHAPE.replace("lateral [um]", "lateral [s]"), ":1: lateral [s]: the unit is not known"),
+    (L_SHAPE.replace("lateral [um]", "sideways [um]"), ":1: a header like"),
+    (L_SHAPE.replace("lateral [um]", "time [s]"), ":1: a header like"),
+    ("time [s],displacement [um],lateral [um]\n0,0,0\n1,0,0\n", "nothing slides")])
+def test_refuses_a_broken_lateral_column(table, text, says):
+    with pytest.raises(PatchfemError) as error:
+        plan(table(text))
+    assert "path.csv" in str(error.value) and says in str(error.value)
+
+
+@pytest.mark.parametrize("scene, sets, says", [
+    (POINT, ["friction.law=coulomb"], "law 'coulomb'"),
+    (POINT, ["friction.law=elastic-plastic"], "law 'elastic-plastic'"),
+    (POINT, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "law 'tanh'"),
+    (POINT, ["friction.law=convolution"], "law 'convolution'"),
+    (POINT, ["normal.width=1 mm", "friction.spread=1 um"], "friction.spread"),
+    (PATCH, ["contact.shear={}"], "[contact.shear]"), (PATCH, ["contact.tilt.on=lower"], "pressure on the lower piece"),
+])
+def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):
+    found = table(L_SHAPE, scene + NONLOCAL, *sets)
+    for act in (lambda: plan(found), lambda: simulate_bench.run(found, None, 40)):
+        with pytest.raises(PatchfemError) as error:
+            act()
+        assert "scene.toml:" in str(error.value) and "slide.file: a lateral column beside" in str(error.value)
+        assert says in str(error.value) and str(error.value).endswith("not yet built")
+
+
+# ---- strips along one direction
+
+@pytest.mark.parametrize("law", [NONLOCAL, '[friction]\nlaw = "coulomb"\nstatic = 0.3\n',
+                                 '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"\n'])
+def test_exact_strips_carry_the_resultant_of_one_point(law):
+    """Pressure on the upper piece, rolled strips: the force is that of the load on one point."""
+    one, two = bench_of(POINT + law), bench_of(PATCH + STRIPS + law)
+    assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
+    assert two.slip == pytest.approx(one.slip, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("side", ["upper", "lower"])
+def test_exact_level_strips_are_the_patch(side):
+    """Four level strips of a crown press as one: the bench is that of the patch without them, on either piece, and its
+    resultant that of one point, but for the edges of a contact that moves over the lower piece."""
+    level = STRIPS.replace('roll = "0.02 mrad"\n', "")
+    crown = PATCH.split("[contact.tilt]")[0] + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
+    one, two = (bench_of(crown + more + NONLOCAL) for more in ("", level))
+    assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
+    assert two.tau == pytest.approx(one.tau, rel=1e-6, abs=1e-6 * one.tau.max())
+    point = bench_of(POINT + NONLOCAL)
+    assert two.force == pytest.approx(point.force, abs=(1e-9 if side == "upper" else 1e-3) * point.force.max())
+    assert side == "upper" or two.force != pytest.approx(point.force, rel=1e-9)
+
+
+def bench_of(text, *sets):
+    scene = loads(text + TRIANGLE, sets=sets)
+    patch = solve_all(scene, False)[0] if scene.contact is not None else None
+    return simulate_bench.run(scene, patch, 120, 4)
