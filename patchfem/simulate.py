@@ -206,7 +206,7 @@ def _without_errors(found: dict, estimate: bool) -> dict:
 
 def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from . import simulate_rig as rig
-    from .response.errors import with_errors
+    from .response.errors import change, with_errors
 
     scene = what.scene
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
@@ -217,14 +217,14 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
-        share = 1.0
-        if scene.friction is not None and scene.friction.law == "convolution":
-            from .simulate_convolution import limit_share
-
-            share = limit_share(scene, patch)
+        share, rough = _shares(scene, patch, coarse[0] if estimate else None)
         raw = rig.run_exact(scene, settings, modes, drive, load, progress, share)
         seconds["march"] = raw.seconds
-        found = with_errors(raw.values, least=1e-9)
+        errors = []
+        if rough is not None:
+            other = rig.run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, rough)
+            errors, seconds["error"] = [change(raw.values, other.values)], other.seconds
+        found = with_errors(raw.values, *errors, least=1e-9)
     else:
         rig.refuse_costly(scene, settings, drive)
         raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
@@ -245,6 +245,15 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
                     f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
     warnings = [*warnings, raw.message] if raw.message else warnings
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
+
+
+def _shares(scene, patch, coarse) -> tuple:
+    """Shares of mu N that limit a rigid block, on the mesh of the patch and on the coarser one, None where it is 1."""
+    if scene.friction is None or scene.friction.law != "convolution":
+        return 1.0, None
+    from .simulate_convolution import limit_share
+
+    return limit_share(scene, patch), None if coarse is None else limit_share(scene, coarse)
 
 
 def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress, estimate) -> tuple:

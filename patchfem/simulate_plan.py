@@ -5,7 +5,7 @@ from math import pi, sqrt
 
 from .core import Missing, PatchfemError
 from .effects import EFFECTS, absent
-from .simulate_acting import acting
+from .simulate_acting import acting, pad_width
 
 AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
 SHEAR_MODES = 8  # modes a shear reduction starts from
@@ -67,6 +67,10 @@ def plan(scene, per_point: bool = False) -> Plan:
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
     groups = _groups(acted, chain)
+    if scene.friction is not None and scene.friction.spread is not None:
+        from .friction.spread import pad_factor
+
+        groups["share_of_the_spread"] = pad_factor(pad_width(scene), scene.friction.spread)
     return Plan(scene, scene.kind, named, tuple(absent(named)), engine, unknowns, steps, round(seconds, 2), size, chain,
                 groups, tuple(_verdict(scene, groups, size)))
 

@@ -164,7 +164,8 @@ def test_exact_studies_load(path):
 
 
 OPTIONS = [
-    ["", COULOMB, PLASTIC], ["", "friction.reading=report"], ["", "friction.order=0.5", "friction.order=-0.5"],
+    ["", COULOMB, PLASTIC, "friction.law=convolution"], ["", "friction.reading=report"],
+    ["", "friction.order=0.5", "friction.order=-0.5"],
     ["", SHEAR], ["", LOWER], ["", "contact.crown.radius=1 m"], ["", "friction.kinetic=0.2"],
     ["", "accuracy.method=exact", "accuracy.method=march"],
 ]  # fmt: skip

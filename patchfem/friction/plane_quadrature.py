@@ -2,7 +2,8 @@
 
 Readings and their numbers are those of `quadrature`; u is a vector, R the length of path since a bond formed. Legs are
 integrated in closed form for stretch with p = 1 and for the last leg, whose bonds all point along it; otherwise by
-eight Gauss points on pieces of at most a quarter bond length, shorter than their distance from where u or R vanishes.
+eight Gauss points on pieces of at most a quarter bond length, shorter than their distance from where u or R vanishes,
+and by three on legs ten times shorter than that distance and than a bond length.
 """
 
 from dataclasses import dataclass, replace
@@ -16,8 +17,8 @@ from .local import Step
 from .plane import advance_plane, direction
 from .quadrature import PIECE, cutoff
 
-_Y, _W = np.polynomial.legendre.leggauss(8)
-_FIVE = np.polynomial.legendre.leggauss(5)
+_THREE, _FIVE, _EIGHT = (np.polynomial.legendre.leggauss(count) for count in (3, 5, 8))
+SLIGHT = 0.1  # legs so short against their distance and the bond length take three points
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -188,8 +189,10 @@ def _gauss_leg(state: Legs, rest, law: Bonds) -> np.ndarray:
     last = shared & (near == 0)
     out[last] = (e * (eps * gammainc(law.order + 1, h / eps) / law.length)[:, None])[last]
     count = np.maximum(1, np.ceil(h / (PIECE * eps))).astype(int)
-    clear = np.minimum(np.hypot(aside, np.maximum(np.maximum(before, -before - h), 0.0)), near) >= h / count
-    even, odd = np.flatnonzero(clear & ~last), np.flatnonzero(~clear & ~last)
+    away = np.minimum(np.hypot(aside, np.maximum(np.maximum(before, -before - h), 0.0)), near)
+    slight = (h <= SLIGHT * np.minimum(away, eps)) & ~last
+    clear = (away >= h / count) & ~last & ~slight
+    even, odd = np.flatnonzero(clear), np.flatnonzero(~clear & ~last & ~slight)
     owner = np.repeat(even, count[even])
     size = (h / count)[owner]
     begin = size * (np.arange(owner.size) - np.repeat(np.cumsum(count[even]) - count[even], count[even]))
@@ -197,20 +200,30 @@ def _gauss_leg(state: Legs, rest, law: Bonds) -> np.ndarray:
         cuts = _graded(h[k], PIECE * eps[k], (complex(-before[k], aside[k]), complex(-near[k], 0.0)))
         owner, begin = np.append(owner, np.full(cuts.size - 1, k)), np.append(begin, cuts[:-1])
         size = np.append(size, np.diff(cuts))
-    back = begin[:, None] + size[:, None] * (1 + _Y) / 2
-    u = a[owner][:, None] + back[..., None] * e[owner][:, None]
-    far = np.maximum(np.hypot(u[..., 0], u[..., 1]), 1e-300)
-    x, harm = _ages(state, rest, law, owner, back, far, h)
-    with np.errstate(under="ignore"):
-        f = np.exp(law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1)) / far
-    f = (u * f[..., None] * (_W / 2)[:, None]).sum(axis=1) * size[:, None] / law.length
-    for c in (0, 1):
-        out[:, c] += np.bincount(owner, f[:, c], h.size)
+    few = np.flatnonzero(slight)
+    for part, rule in (((owner, begin, size), _EIGHT), ((few, np.zeros(few.size), h[few]), _THREE)):
+        found = _pieces(state, rest, law, a, e, h, part, rule)
+        for c in (0, 1):
+            out[:, c] += np.bincount(part[0], found[:, c], h.size)
     return out
 
 
+def _pieces(state: Legs, rest, law: Bonds, a, e, h, part: tuple, rule: tuple) -> np.ndarray:
+    """(n, 2) sums over pieces (leg, start behind its end, length), each (n,), by the points and weights of a rule."""
+    (owner, begin, size), (points, weights) = part, rule
+    back = begin[:, None] + size[:, None] * (1 + points) / 2
+    ux, uy = (a[owner, c][:, None] + back * e[owner, c][:, None] for c in (0, 1))
+    far = np.maximum(np.sqrt(ux * ux + uy * uy), 1e-300)
+    x, harm = _ages(state, rest, law, owner, back, far, h)
+    with np.errstate(under="ignore"):
+        f = np.exp(-harm) if law.order == 0 else np.exp(
+            law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1))
+    f *= weights * size[:, None] / (2 * law.length * far)
+    return np.stack([(ux * f).sum(axis=1), (uy * f).sum(axis=1)], axis=1)
+
+
 def _ages(state: Legs, rest, law: Bonds, owner, back, far, h) -> tuple:
-    """(argument of the power, exponent of the decay) of bonds `back` (k, 8) behind the ends of their legs."""
+    """(argument of the power, exponent of the decay) of bonds `back` (n, points) behind the ends of their legs."""
     if law.reading == "stretch":
         eps = state.eps[rest][owner][:, None]
         return far / eps, state.now[2] - state.damage[rest][owner][:, None] + back / eps

@@ -240,6 +240,16 @@ def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_avera
     assert not any("moves exactly as one point" in line for line in found.warnings)
 
 
+def test_exact_the_mesh_of_the_limit_stands_in_the_errors_of_the_motion():
+    """A mesh four times as fine moves the block otherwise, by no more than the error that is given."""
+    text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + RIG
+    found = run(plan(loads(text))).measures
+    fine = run(plan(loads(text, sets=["contact.element_size=0.125 mm"])), estimate=False).measures
+    for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
+        miss = abs(found[name].value - fine[name].value)
+        assert 1e-6 * abs(fine[name].value) < miss < found[name].error, name
+
+
 def test_exact_a_block_of_one_point_on_a_rig_is_coulomb():
     one, two = (run(plan(loads(POINT + text + RIG)), estimate=False).measures for text in (AVERAGED, COULOMB))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}

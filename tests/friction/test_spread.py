@@ -80,6 +80,8 @@ def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
     one, two = (run(plan(loads(text, sets=[*sets, "accuracy.steps_per_cycle=400"])), estimate=False).measures
                 for sets in (SPREAD, [f"friction.static={0.3 * share!r}"]))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
+    assert plan(loads(text, sets=SPREAD)).groups["share_of_the_spread"] == share
+    assert "share_of_the_spread" not in plan(loads(text)).groups
     assert plan(loads(text, sets=SPREAD)).groups["D"] == pytest.approx(share * plan(loads(text)).groups["D"])
 
 

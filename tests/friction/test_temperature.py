@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import erfc
+from test_imports import BENCH, FROM_PYTHON, absent, loaded
 from test_run import PATCH, POINT
 
 from patchfem import closed_forms, simulate_bench
@@ -210,3 +211,11 @@ def test_exact_the_rise_is_reported_beside_the_table_only():
     assert any("no contact area" in w for w in none)
     own = text.replace(SUBSTRATE, 'substrate = {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}')
     assert any("conductivity" in w for w in run(plan(loads(own)), estimate=False).warnings)
+
+
+def test_exact_a_scene_without_these_effects_imports_none_of_them(tmp_path):
+    (tmp_path / "scene.toml").write_text(BENCH.replace("coulomb", "nonlocal").replace(
+        "static", 'bond_length = "2 um"\nstatic'), "utf-8")
+    absent(loaded(FROM_PYTHON, tmp_path / "scene.toml"), "friction.temperature", "friction.spread",
+           "friction.convolution", "friction.plane", "friction.plane_quadrature", "simulate_plane", "simulate_heat",
+           "simulate_convolution")
