@@ -74,7 +74,8 @@ def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
 
 
 class Averaged(NamedTuple):
-    """traction (m,) [Pa] of the last motion, slide [m] since the start, way: sign of the last motion."""
+    """traction (m,) [Pa] of the last motion, slide [m] since the start, way: sign of the last motion, 0 where the
+    traction is no longer its limit."""
 
     traction: np.ndarray
     slide: float
@@ -101,7 +102,8 @@ class Convolution:
     def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]; the mean is that of its two ends."""
         if dq == 0:
-            return Step(state.traction, np.zeros_like(s0), state)
+            rested = self._rested(state, s0, s1)
+            return Step(rested.traction, np.zeros_like(s0), rested)
         way, slide = float(np.sign(dq)), state.slide + dq
         start = state.traction
         if way != state.way:
@@ -109,6 +111,14 @@ class Convolution:
         end = self.static * way * self._averaged(slide, s1, way)
         mean = (start + end) / 2
         return Step(mean, mean * dq, Averaged(end, slide, way))
+
+    def _rested(self, state: Averaged, s0, s1) -> Averaged:
+        """At rest the traction is kept, within the limit where the pressure falls."""
+        way = float(np.sign(state.traction.sum()))
+        if way == 0 or np.array_equal(s0, s1):
+            return state
+        limit = self.static * self._averaged(state.slide, s1, way)
+        return Averaged(way * np.minimum(way * state.traction, limit), state.slide, 0.0)
 
     def _averaged(self, slide: float, sigma, way: float):
         if self.nodes is None:

@@ -160,6 +160,11 @@ def test_exact_at_rest_the_last_traction_is_kept():
     state = law.step(law.start(one), -0.1, one, one, 1.0).state
     still = law.step(state, 0.0, one, one, 5.0)
     assert still.mean[0] == -0.3 and law.traction(still.state)[0] == -0.3 and still.dissipated[0] == 0
+    for pressure, kept in ((2.0, -0.3), (0.5, -0.15), (0.0, 0.0)):
+        rested = law.step(state, 0.0, one, pressure * one, 5.0)
+        assert rested.state.traction[0] == kept and rested.dissipated[0] == 0
+        on = law.step(rested.state, -0.1, pressure * one, 1.0 * one, 1.0)
+        assert on.mean[0] == pytest.approx(-0.3 * (pressure + 1) / 2) and on.state.traction[0] == -0.3
 
 
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=12), st.booleans())

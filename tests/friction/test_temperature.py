@@ -207,6 +207,9 @@ def test_exact_the_rise_is_reported_beside_the_table_only():
     assert not any("warm" in w for w in found.warnings)
     power = np.trapezoid(found.response.force, found.response.slide) / found.response.time[-1]
     assert f"friction of {power:.1g}"[:14] in lines[0]
+    rig = run(plan(loads(PATCH + GROWING + WARM + RIG, sets=["accuracy.steps_per_cycle=100"])), estimate=False)
+    power = rig.extra["book"]["friction"] / rig.response.time[-1]
+    assert any(f"friction of {power:.2g} W" in w and "in a cycle" in w for w in rig.warnings) and power > 0
     none = run(plan(loads(POINT + GROWING + WARM + TRIANGLE)), estimate=False).warnings
     assert any("no contact area" in w for w in none)
     own = text.replace(SUBSTRATE, 'substrate = {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}')
