@@ -21,6 +21,7 @@ work less the gain of that store; the print makes it negative at times, which is
 
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.special import gammainc, gammainccinv, gammaln, roots_jacobi
@@ -30,6 +31,7 @@ from .local import Step
 from .recursion import advance, pressed, stretch
 
 _GAUSS_Y, _GAUSS_W = np.polynomial.legendre.leggauss(4)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 PIECE = 0.25  # longest Gauss piece in bond lengths
 
 
@@ -75,7 +77,7 @@ class Quadrature:
                       np.zeros(len(sigma), np.int64))
 
     def step(self, state: Strips, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment; the mean traction is exact for p = 1 stretch, by five Gauss points else."""
+        """One straight increment; the mean traction is exact for p = 1 stretch, else by five Gauss points."""
         after = self._moved(state, dq, s0, s1, dt)
         if dq == 0:
             mean = self.traction(after)
@@ -86,22 +88,31 @@ class Quadrature:
             part = advance(loose, damaging, (s0 + s1) / 2, after.eps[-1] if damaging else self.law.length)[1]
             part = (free * (bonds[1] + loose[1]) / 2 + damaging * part) / dq
             mean = self.law.static / self.law.length * part
+        elif self.law.reading == "stretch":
+            spent = self._spent(state, dq, s0, s1, dt)
+            return Step((spent + self.stored(after) - self.stored(state)) / dq, spent, after)
         else:
-            mean = self._mean(state, dq, s0, s1, dt)
-        work = mean * dq
-        return Step(mean, work - (self.stored(after) - self.stored(state)), after)
+            mean = np.zeros(len(s0))
+            for part, w in zip((1 + _NODES) / 2, _WEIGHTS / 2):
+                mean += w * self.traction(self._part(state, part, dq, s0, s1, dt))
+        return Step(mean, mean * dq - (self.stored(after) - self.stored(state)), after)
 
-    def _mean(self, state: Strips, dq: float, s0, s1, dt: float) -> np.ndarray:
-        """Path-mean traction by five Gauss points on the elastic and on the damaging part of the step."""
-        nodes, weights = np.polynomial.legendre.leggauss(5)
-        free = elastic_part(self.law, state.play, dq, self._middle(state, dq, dt))[0] / dq
-        mean = np.zeros(len(s0))
-        for start, length in ((0.0, free), (free, 1 - free)):
-            for y, w in zip(nodes, weights) if length > 0 else ():
-                part = start + length * (1 + y) / 2
-                here = self._moved(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2)
-                mean += length * w / 2 * self.traction(here)
-        return mean
+    def _spent(self, state: Strips, dq: float, s0, s1, dt: float) -> np.ndarray:
+        """Energy dissipated along a step of the stretch reading: damage takes the share dR/eps of what is stored. It is
+        never negative, and the mean traction that follows from it has the work of the law at any length of step."""
+        middle = self._middle(state, dq, dt)
+        free, damaging, _ = elastic_part(self.law, state.play, dq, middle)
+        spent, length = np.zeros(len(s0)), abs(damaging) / middle
+        edges = np.unique(np.append(np.minimum([0, 1, 2, 4, 8, 16, 32], length), length))
+        for a, b in pairwise(edges):
+            for place, w in zip((a + b + (b - a) * _NODES) / 2, (b - a) / 2 * _WEIGHTS):
+                here = self._part(state, (free + place / length * damaging) / dq, dq, s0, s1, dt)
+                spent += w * self.stored(here)
+        return spent
+
+    def _part(self, state: Strips, part: float, dq: float, s0, s1, dt: float) -> Strips:
+        """The state within a step, whose bonds form under its mean pressure."""
+        return self._moved(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2)
 
     def press(self, state: Strips, s0, s1) -> Step:
         """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it.
