@@ -179,6 +179,8 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     if law.order is not None and (law.order <= -1 or (law.order < 0 and law.reading == "stretch")):
         wanted = ">= 0 (reading 'stretch')" if law.reading == "stretch" else "> -1 (reading 'report')"
         draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
+    if law.breakaway and law.reading == "report":
+        draft.say(f"{at}.breakaway", "the law as printed (reading 'report') has none; use 'stretch' or leave it out")
     contact = draft.tables.contact
     if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.gives_way:
         draft.say(f"{at}.reading", f"'report' is refused beside {contact.gives_way}; use 'stretch' or leave it out")

@@ -112,7 +112,8 @@ def _histories(result: Result) -> tuple:
         return {}, None
     if kind == "bench":
         return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
-                "friction_force": r.force, "normal_load": r.load}, None
+                "friction_force": r.force, "normal_load": r.load,
+                **dict(zip(("friction_work", "energy_stored", "energy_dissipated", "energy_created"), r.ledger))}, None
     out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
     if kind == "rig":

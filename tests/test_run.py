@@ -426,7 +426,7 @@ def test_refuses_verbs_not_yet_built(verb):
 
 
 @pytest.mark.parametrize("sets", [
-    ("friction.temperature.surface=393 K", "friction.temperature.reference=293 K"), ("friction.breakaway=0.5",),
+    ("friction.temperature.surface=393 K", "friction.temperature.reference=293 K"),
     ("contact.holder.tangential_stiffness=1e4 N/m",), ("friction.law=convolution",),
     ("friction.spread=5 um",), ("structure.bonded.stiffness=4.6e6 N/m",), ("structure.stiffening.cubic=1e12 N/m^3",),
     ("wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"), ("accuracy.method=harmonic",),

@@ -73,7 +73,8 @@ def bond_step(m, z, s2, dq, sigma, eps):
 def free_part(play, dq, half):
     """Elastic part of an increment (twin: `law.elastic_part`); play is dragged into its range first."""
     start = min(max(play, -half), half)
-    return min(max(start + dq, -half), half) - start
+    end = min(max(start + dq, -half), half)
+    return dq if end == start + dq else end - start
 
 
 @njit(error_model="numpy", fastmath=FAST)
@@ -81,8 +82,10 @@ def loose_mean(m, z, play, half, dq, sigma, eps):
     """`bond_mean` with an elastic range of half width `half` (twin: `recursion.Recursion.step`)."""
     free = free_part(play, dq, half)
     rest = dq - free
-    if rest == 0.0:
+    if rest == 0.0 or abs(dq) < 1e-280:  # no 1/dq of a step that small
         return z + 0.5 * m * dq, 0.5 * m
+    if free == 0.0:
+        return bond_mean(m, z, dq, sigma, eps)
     mean, slope = bond_mean(m, z + m * free, rest, sigma, eps)
     total = (free * (z + 0.5 * m * free) + rest * mean) / dq
     return total, (mean + slope * rest - total) / dq

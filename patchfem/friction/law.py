@@ -44,7 +44,8 @@ def elastic_part(law: Bonds, play, dq, eps):
     half = law.breakaway * eps
     start = np.clip(play, -half, half)  # a shrinking range is dragged as well
     end = np.clip(start + dq, -half, half)
-    return end - start, dq - (end - start), end
+    free = np.where(end == start + dq, dq, end - start)[()]
+    return free, dq - free, end
 
 
 def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> tuple:

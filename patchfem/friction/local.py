@@ -7,7 +7,7 @@ changes the state it was given. No traction outlives the contact, and at rest no
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class Coulomb:
     """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept."""
 
     kinetic: float
+    at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
 
     def start(self, sigma):
         """State: the last traction (m,) [Pa], 0 before any motion."""
@@ -58,6 +59,7 @@ class Rate:
 
     static: float
     speed: float
+    at_once: ClassVar[bool] = True
 
     def start(self, sigma):
         """State: the last traction (m,) [Pa], 0 before any motion."""

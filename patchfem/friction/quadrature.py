@@ -73,8 +73,8 @@ class Quadrature:
         """Only the initial cohort: unstressed, full-grown bonds of density m_0."""
         one = np.zeros(1)
         return Strips(one, one, one, one, np.full(1, self.law.length), one, np.full(1, self.law.length),
-                      np.zeros((2, 1)), self.law.initial * np.array(sigma, float)[None], (0.0, 0.0, 0.0, 0.0, self.law.length),
-                      np.zeros(len(sigma), np.int64))
+                      np.zeros((2, 1)), self.law.initial * np.array(sigma, float)[None],
+                      (0.0, 0.0, 0.0, 0.0, self.law.length), np.zeros(len(sigma), np.int64))
 
     def step(self, state: Strips, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment; the mean traction is exact for p = 1 stretch, else by five Gauss points."""
@@ -86,7 +86,7 @@ class Quadrature:
             free, damaging, _ = elastic_part(self.law, state.play, dq, self._middle(state, dq, dt))
             loose = stretch(bonds, free)
             part = advance(loose, damaging, (s0 + s1) / 2, after.eps[-1] if damaging else self.law.length)[1]
-            part = (free * (bonds[1] + loose[1]) / 2 + damaging * part) / dq
+            part = free / dq * (bonds[1] + loose[1]) / 2 + damaging / dq * part
             mean = self.law.static / self.law.length * part
         elif self.law.reading == "stretch":
             spent = self._spent(state, dq, s0, s1, dt)
@@ -134,7 +134,8 @@ class Quadrature:
     def _thinned(self, state: Strips, s0, s1) -> tuple:
         """Factor (m,) on all bonds and density (m,) [Pa] of a cohort (below 0: bonds without stretch that are gone)
         that have the moments of `pressed`."""
-        m, z, s2 = before = self._sums(state)
+        before = self._sums(state)
+        m, _, s2 = before
         dense, _, kept = pressed(self.law, before, s0, s1)
         keep = np.divide(kept, s2, out=np.ones_like(s2), where=s2 > 0)
         return keep, dense - keep * m
@@ -145,8 +146,8 @@ class Quadrature:
         mass = self._young(state) * state.sigma * self._surviving(state)[:, None]
         falls, total = s1 < s0, mass.sum(axis=0)
         excess = np.where(falls & (s0 > 0), total * (1 - s1 / np.where(s0 > 0, s0, 1.0)), 0.0)
-        older = np.cumsum(mass[::-1], axis=0)[::-1] - mass
-        gone = np.clip(excess - (total - older - mass), 0.0, mass)
+        younger = np.cumsum(mass[::-1], axis=0)[::-1] - mass
+        gone = np.clip(excess - younger, 0.0, mass)
         keep = 1 - np.divide(gone, mass, out=np.zeros_like(mass), where=mass > 0)
         held = np.abs(self.weights(state) @ (self._young(state) * state.sigma * keep))
         bound = np.where(falls & (held > s1), s1 / np.where(held > 0, held, 1.0), 1.0)

@@ -118,7 +118,7 @@ class Recursion:
         stretched = stretch(state.bonds, free)
         out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
         if free != 0:
-            mean = (free * (state.bonds[1] + stretched[1]) / 2 + damaging * mean) / dq
+            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
         scale = self.law.static / self.law.length
         spent = scale * burnt / 2
         lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
