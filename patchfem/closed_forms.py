@@ -107,15 +107,34 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
     return limit * (np.exp(-2 * x) - gammainc(order + 1, x) - old)
 
 
-def stretch_loop(amplitude, length, limit=1.0):
-    """(area, force at the end of a stroke) of the steady loop, stretch reading, p = 1, constant bond length.
+def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
+    """(area, force at the end of a stroke) of a steady loop of the stretch reading, p = 1, constant bond length.
 
-    4 limit (A - eps tanh(A/eps)) and limit tanh(A/eps); amplitude A [m] half peak-to-peak.
-    ValueError unless amplitude and length are positive.
+    amplitude, length [m]; limit = mu_s N [N]; breakaway: share b of the length that stretches without damage. With
+    x = amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E): force limit z, area
+    4 limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2); b = 0: 4 limit (amplitude - length tanh x), Dahl's
+    loop. Up to x = b the loop is a line: no area, force limit x of a slide from rest. Returns ([J], [N]).
+    ValueError unless amplitude and length are positive and 0 <= breakaway < 1.
     """
     positive(amplitude=amplitude, length=length)
-    end = np.tanh(np.asarray(amplitude) / length)
-    return 4 * limit * (amplitude - length * end), limit * end
+    if not 0 <= breakaway < 1:
+        raise ValueError(f"breakaway must be in [0, 1), got {breakaway}")
+    x, b = np.asarray(amplitude, float) / length, breakaway
+    e = np.exp(-2 * np.maximum(x - b, 0.0))
+    z = (1 - (1 - 2 * b) * e) / (1 + e)
+    area = 4 * limit * length * (x - b + b * b - b * z - (1 + z - 2 * b) * (1 - e) / 2)
+    return np.where(x > b, area, 0.0)[()], limit * np.where(x > b, z, x)[()]
+
+
+def dither_drift(low, high, breakaway=0.0):
+    """Slide per cycle in bond lengths that a force between low and high (shares of mu_s N, -1 < low < high < 1) leaves
+    behind in the stretch reading, p = 1, constant bond length and load; 0 where high - low <= 2 breakaway.
+
+    Up: the elastic range, then ln((1 - low - 2 b)/(1 - high)); down: the range, then ln((1 + high - 2 b)/(1 + low)).
+    """
+    if high - low <= 2 * breakaway * (1 + 1e-12):
+        return 0.0
+    return float(np.log((1 - low - 2 * breakaway) / (1 - high)) - np.log((1 + high - 2 * breakaway) / (1 + low)))
 
 
 def report_loop(amplitude, length, limit=1.0):

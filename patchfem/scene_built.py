@@ -16,10 +16,6 @@ if TYPE_CHECKING:
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
     "contact.holder.tangential_stiffness": "",
-    "normal.amplitude": "",
-    "normal.frequency": "",
-    "normal.phase": "",
-    "friction.breakaway": "",
     "structure.mode.normal": "",
     "structure.mode.pitch": "",
     "structure.mode.lateral": "",
@@ -82,6 +78,11 @@ def combinations(draft: Draft, kind: str) -> None:
         draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
     if kind not in ("bench", "rig") or law is None:
         return
+    normal = draft.tables.normal
+    if kind == "rig" and normal is not None and normal.amplitude:
+        draft.say("normal.amplitude", "in a rig: use a bench, [slide], meanwhile; not yet built")
+    if kind == "rig" and law.law == "nonlocal" and law.breakaway and law.order != 1:
+        draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
     if shear:
         _behind_shear(draft, law, shear)
     elif kind == "rig" and law.law == "nonlocal" and law.reading == "report" and _inside(law.order, -1, 0):

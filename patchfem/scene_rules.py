@@ -186,6 +186,8 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
         wanted = ">= 0 (reading 'stretch')" if not printed else "> -1 (reading 'report')"
         wanted = "> -1" if law.law == "convolution" else wanted
         draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
+    if law.breakaway and law.reading == "report":
+        draft.say(f"{at}.breakaway", "the law as printed (reading 'report') has none; use 'stretch' or leave it out")
     contact = draft.tables.contact
     if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.gives_way:
         draft.say(f"{at}.reading", f"'report' is refused beside {contact.gives_way}; use 'stretch' or leave it out")

@@ -170,13 +170,18 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     if estimate:
         half, quarter = (bench.run(scene, patch, max(4, steps // (4 * k) * 4), 0, say) for k in (2, 4))
         seconds["error"] = half.seconds + quarter.seconds
-        others.append(step_error(fine.values, half.values, quarter.values, steps))
+        first_order = bench.varies(scene)  # twice the change, as of few steps
+        others.append(step_error(fine.values, half.values, quarter.values, min(steps, 399) if first_order else steps))
         if coarse[0] is not None:
             rough = bench.run(scene, coarse[0], max(4, steps // 16 * 4), 0, say)
             others.append(change(quarter.values, rough.values))
             seconds["error"] += rough.seconds
     found = with_errors(fine.values, *others, least=1e-10)
-    warnings, fields = [*warnings, *_warming(scene, patch, fine)], {}
+    fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
+    if created > 1e-6 * power:
+        warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
+                    "that went to and fro: reading = \"stretch\" creates none"]
+    warnings = [*warnings, *_warming(scene, patch, fine)]
     if patch is not None:
         from .simulate_measures import measures
 

@@ -10,6 +10,7 @@ from .core import Missing, PatchfemError
 from .friction.law import Bonds
 from .response.measures import harmonic, interface_loop, step_harmonic
 from .simulate_acting import acting
+from .simulate_load import load_at, refined, varies
 from .simulate_slide import lateral_corners, path_of, peak_speed
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
@@ -17,9 +18,10 @@ MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a b
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BenchRun:
-    """One pass over the path. time, slide, force, load, slip: (k,); work: (k,) running friction work [J]; tau, local:
-    frames (f, m) of traction [Pa] and local slip [m] at samples `frames`; values by measure name. lateral,
-    lateral_force, yaw_moment: (k,) of a slide in two directions, else None."""
+    """One pass over the path. time, slide, rate, force, load, slip: (k,); ledger: work, stored, dissipated and created
+    energy (4, k) [J], all but the stored one running sums; tau, local: frames (f, m) of traction [Pa] and local slip
+    [m] at samples `frames`; values by measure name. lateral, lateral_force, yaw_moment: (k,) of a slide in two
+    directions, else None."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -27,6 +29,7 @@ class BenchRun:
     force: np.ndarray
     load: np.ndarray
     slip: np.ndarray
+    ledger: np.ndarray
     frames: np.ndarray
     tau: np.ndarray
     local: np.ndarray
@@ -66,7 +69,7 @@ def bonds_of(scene) -> Bonds:
     f = acting(scene).friction
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
-                 f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds)
+                 f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds, f.breakaway)
 
 
 def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
@@ -78,27 +81,49 @@ def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
         refuse(scene)
     scene = acting(scene)
     time, slide, first, omega = path_of(scene, steps)
+    if varies(scene):
+        start = time[first]
+        time, slide = refined(scene, time, slide, steps)
+        first = int(np.searchsorted(time, start))
     if sideways:
         out, more = run_plane(scene, patch, time, slide, frames)
     elif scene.contact is not None and scene.contact.gives_way:
         out = _with_shear(scene, patch, time, slide, frames, say)
     else:
         out = _rigid(scene, patch, time, slide, frames)
-    force, load, slip, work, stored, burnt, at, tau, local = out
-    values = _values(scene, time, slide, force, load, slip, work, stored, burnt, first, omega)
+    force, load, slip, ledger, at, tau, local = out
+    values = _values(scene, time, slide, force, load, slip, ledger, first, omega)
     rate = np.gradient(slide, time) if time.size > 2 else np.zeros(time.size)
-    return BenchRun(time, slide, rate, force, load, slip, at, tau, local, values, perf_counter() - begin,
+    return BenchRun(time, slide, rate, force, load, slip, ledger, at, tau, local, values, perf_counter() - begin,
                     **more)
 
 
-def _values(scene, time, slide, force, load, slip, work, stored, burnt, first, omega) -> dict:
-    ratio = force / load[0] if load[0] > 0 else np.zeros_like(force)  # over the load that is applied
+def ledger_of(work, stored, losses) -> np.ndarray:
+    """(4, k): work, stored, dissipated and created energy [J] of samples, from the (gain, loss) (k, 2) [J] of every
+    step over the points that create energy and those that lose it."""
+    created, dissipated = np.cumsum(losses, axis=0).T
+    return np.stack([work, stored, dissipated, created])
+
+
+def _split(losses) -> tuple:
+    """(created, dissipated) of the energy that places lose, some of it below zero."""
+    return -np.minimum(losses, 0.0).sum(), np.maximum(losses, 0.0).sum()
+
+
+def _values(scene, time, slide, force, load, slip, ledger, first, omega) -> dict:
+    # over the load that is applied: what slides off the pressure is friction lost
+    applied = load if varies(scene) else np.full_like(load, load[0])
+    ratio = np.divide(force, applied, out=np.zeros_like(force), where=applied > 1e-9 * applied.max(initial=0.0))
+    work, stored, dissipated, created = ledger
     power = np.abs(np.diff(work)).sum()
-    miss = abs(work[-1] - (stored[-1] - stored[0]) - burnt)
-    out = {"normal_load": float(load[0]), "friction_force_peak": float(np.abs(force).max()),
+    miss = abs(work[-1] - (stored[-1] - stored[0]) - dissipated[-1] + created[-1])
+    out = {"normal_load": float(scene.normal.load if varies(scene) else load[0]),
+           "friction_force_peak": float(np.abs(force).max()),
            "friction_ratio_end": float(ratio[-1]), "friction_ratio_peak": float(np.abs(ratio).max()),
            "slip_amplitude": float(slip[first:].max() - slip[first:].min()) / 2,
-           "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0}
+           "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0,
+           "friction_work": float(work[-1]), "energy_stored": float(stored[-1]),
+           "energy_dissipated": float(dissipated[-1]), "energy_created": float(created[-1])}
     if omega:
         t, q, f = time[first:], slide[first:], force[first:]
         weight = np.zeros(t.size)
@@ -138,19 +163,27 @@ def _rigid(scene, patch, time, slide, frames):
     def pressure(q):
         return np.interp(x + q, x, at_rest, left=0.0, right=0.0) if lower else at_rest
 
-    state, s0 = law.start(pressure(slide[0])), pressure(slide[0])
+    changes = varies(scene)
+    loads = load_at(scene, time) if changes else None
+    s0 = loads[:1] if changes else pressure(slide[0])
+    state = law.start(s0)
     force, load, slip, work, stored = (np.zeros(time.size) for _ in range(5))
+    losses = np.zeros((time.size, 2))
     pick = set(_frame_numbers(time.size, frames).tolist())
-    tau, local, burnt = [], [], 0.0
+    tau, local = [], []
     length = (scene.friction.bond_length or 0.0) if scene.friction.law != "convolution" else 0.0
     static = scene.friction.static
     for k in range(time.size):
         if k:
-            s1 = pressure(slide[k])
-            step = law.step(state, slide[k] - slide[k - 1], s0, s1, time[k] - time[k - 1])
-            state, s0 = step.state, s1
-            work[k] = work[k - 1] + weight @ step.mean * (slide[k] - slide[k - 1])
-            burnt += weight @ step.dissipated
+            dq, dt = slide[k] - slide[k - 1], time[k] - time[k - 1]
+            if changes:
+                s1 = loads[k:k + 1]
+                mean, lost, state = _under_load(law, state, dq, s0, s1, dt)
+            else:
+                s1 = pressure(slide[k])
+                mean, lost, state = law.step(state, dq, s0, s1, dt)
+            s0, losses[k] = s1, _split(weight * lost)
+            work[k] = work[k - 1] + weight @ mean * dq
         here = law.traction(state)
         force[k], load[k], stored[k] = weight @ here, weight @ s0, weight @ law.stored(state)
         elastic = length * force[k] / (static * load[k]) if static * load[k] > 0 else 0.0
@@ -159,7 +192,20 @@ def _rigid(scene, patch, time, slide, frames):
             tau.append(here)
             limit = static * s0
             local.append(slide[k] - length * np.divide(here, limit, out=np.zeros_like(here), where=limit > 0))
-    return force, load, slip, work, stored, burnt, np.array(sorted(pick)), np.array(tau), np.array(local)
+    return (force, load, slip, ledger_of(work, stored, losses), np.array(sorted(pick)), np.array(tau),
+            np.array(local))
+
+
+def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
+    """One step while the load goes from s0 to s1: half of its change before the motion, half after (order 1 where
+    bonds are let go, else 2). A law without stretch takes the change along with the motion."""
+    if dq != 0 and getattr(law, "at_once", False):
+        return law.step(state, dq, s0, s1, dt)
+    half = (s0 + s1) / 2
+    before = law.press(state, s0, half)
+    step = law.step(before.state, dq, half, half, dt)
+    after = law.press(step.state, half, s1)
+    return step.mean, before.dissipated + step.dissipated + after.dissipated, after.state
 
 
 def _refuse_costly(scene, law, samples: int, points: int, slide) -> None:
@@ -198,15 +244,16 @@ def _elements(scene, patch, time, slide, frames):
     k, limit = found.stiffness, found.yield_slide
     stretch = np.zeros(k.size)
     force, slip, work, stored = (np.zeros(time.size) for _ in range(4))
+    losses = np.zeros((time.size, 2))
     pick = set(_frame_numbers(time.size, frames).tolist())
-    states, burnt = [], 0.0
+    states = []
     for i in range(time.size):
         if i:
             dq = slide[i] - slide[i - 1]
             end = np.clip(stretch + dq, -limit, limit)
             part = np.divide(end - stretch, dq, out=np.ones(k.size), where=dq != 0)
             work[i] = work[i - 1] + k @ (part * (stretch + end) / 2 + (1 - part) * end) * dq
-            burnt += float(k @ (np.abs(end) * np.abs(stretch + dq - end)))
+            losses[i, 1] = k @ (np.abs(end) * np.abs(stretch + dq - end))
             stretch = end
         force[i], stored[i] = k @ stretch, k @ stretch**2 / 2
         slip[i] = slide[i] - (k * limit) @ stretch / (k @ limit)
@@ -214,7 +261,7 @@ def _elements(scene, patch, time, slide, frames):
             states.append((slide[i], stretch))
     tau, local = element_fields(patch, found, states, f.bond_length if f.law == "elastic-plastic" else 0.0)
     load = np.full(time.size, patch.pressure.load)
-    return force, load, slip, work, stored, burnt, np.array(sorted(pick)), tau, local
+    return force, load, slip, ledger_of(work, stored, losses), np.array(sorted(pick)), tau, local
 
 
 def element_fields(patch, found, states, length: float) -> tuple:
@@ -275,4 +322,6 @@ def _points(scene, patch, time, slide, frames, say):
     work = np.concatenate([[0.0], np.cumsum(forces[:-1, 1] * np.diff(slide))])
     tau, local = point_fields(patch, law, shear, states)
     load = np.full(time.size, patch.pressure.load)
-    return (forces[:, 0], load, forces[:, 2], work, burnt[:, 1], float(burnt[:-1, 0].sum()), at, tau, local)
+    losses = np.zeros((time.size, 2))
+    losses[1:, 1] = burnt[:-1, 0]
+    return forces[:, 0], load, forces[:, 2], ledger_of(work, burnt[:, 1], losses), at, tau, local

@@ -114,6 +114,7 @@ def _histories(result: Result) -> tuple:
         across = {"lateral_displacement": r.lateral, "lateral_force": r.lateral_force, "yaw_moment": r.yaw_moment}
         return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
                 "friction_force": r.force, "normal_load": r.load,
+                **dict(zip(("friction_work", "energy_stored", "energy_dissipated", "energy_created"), r.ledger)),
                 **{name: values for name, values in across.items() if values is not None}}, None
     out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}

@@ -34,7 +34,7 @@ class ContactModel:
         """(Contact, Work) with arrays of their own."""
         empty = {name: np.zeros((0, 0)) if name in ("psi", "bonds", "bondlist") else np.zeros(0)
                  for name in hub.Contact._fields}
-        empty["growth"] = np.full(5, -1.0)
+        empty["growth"] = np.append(np.full(5, -1.0), 0.0)
         arrays = {k: np.array(v, dtype=np.float64, order="C") for k, v in (empty | self.fields).items()}
         contact = hub.Contact(**arrays)
         r = contact.kappa.size
@@ -66,10 +66,11 @@ def jenkins_model(stiffness, yield_slide) -> ContactModel:
 
 
 def growth_numbers(law) -> np.ndarray:
-    """(a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10, a_s = -1 for a constant bond length."""
+    """(a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10, a_s = -1 for a constant bond length, and the breakaway share."""
     if not law.grows:
-        return np.array([-1.0, 1.0, 1.0, law.length, law.length])
-    return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length])
+        return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
+    return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length,
+                     law.breakaway])
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
@@ -84,7 +85,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     places = np.zeros(0) if pattern is None else pattern[0]
     if shear is not None:
         area, sigma = area[shear.points], sigma[shear.points]
-    bonds = np.zeros((4, area.size))
+    bonds = np.zeros((5 if law.breakaway else 4, area.size))
     bonds[0] = law.initial * sigma
     limit = law.static * float(area @ sigma)
     fields = {"force": [limit, limit, limit], "weight": law.static * area / law.length, "bonds": bonds,

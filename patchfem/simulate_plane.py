@@ -3,7 +3,7 @@
 import numpy as np
 
 from .core import PatchfemError
-from .simulate_bench import _frame_numbers, _refuse_costly, bonds_of
+from .simulate_bench import _frame_numbers, _refuse_costly, _split, bonds_of, ledger_of
 from .simulate_plan import shape_side
 from .simulate_slide import lateral_corners
 
@@ -30,8 +30,8 @@ def refuse(scene) -> None:
 
 
 def run_plane(scene, patch, time, slide, frames: int) -> tuple:
-    """((force, load, slip, work, stored, dissipated, frames, tau, local) as the bench has them along x, histories of
-    the other direction by name).
+    """((force, load, slip, ledger, frames, tau, local) as the bench has them along x, histories of the other direction
+    by name).
 
     Pressure that rides on a rigid mover is constant at every point and the law is linear in it, so every point has the
     traction of one point under unit pressure times its own. yaw_moment [N m]: sum of y f_x - x f_y, about +z of the
@@ -42,13 +42,13 @@ def run_plane(scene, patch, time, slide, frames: int) -> tuple:
     across = np.interp(time, *lateral_corners(scene))
     q, one = np.stack([slide, across], axis=1), np.ones(1)
     state, unit = law.start(one), np.zeros((time.size, 2))
-    work, stored, burnt = np.zeros(time.size), np.zeros(time.size), 0.0
+    work, stored, losses = np.zeros(time.size), np.zeros(time.size), np.zeros((time.size, 2))
     for k in range(1, time.size):
         step = law.step(state, q[k] - q[k - 1], one, one, time[k] - time[k - 1])
         state = step.state
         unit[k], stored[k] = law.traction(state)[:, 0], law.stored(state)[0]
         work[k] = work[k - 1] + (q[k] - q[k - 1]) @ step.mean[:, 0]
-        burnt += float(step.dissipated[0])
+        losses[k] = _split(step.dissipated)
     load, moment, roll = _pressed(scene, patch)
     at = _frame_numbers(time.size, frames)
     sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
@@ -58,7 +58,7 @@ def run_plane(scene, patch, time, slide, frames: int) -> tuple:
     more = {"lateral": across, "lateral_force": load * unit[:, 1]}
     if patch is not None:
         more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
-    return (load * unit[:, 0], np.full(time.size, load), slip, load * work, load * stored, load * burnt, at,
+    return (load * unit[:, 0], np.full(time.size, load), slip, load * ledger_of(work, stored, losses), at,
             np.outer(unit[at, 0], sigma), local), more
 
 

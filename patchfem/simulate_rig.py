@@ -86,7 +86,7 @@ def law_of(scene, speed: float) -> Bonds:
     f = acting(scene).friction
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
-                 f.rest_speed or max(1e-3 * speed, 1e-12), f.initial_bonds)
+                 f.rest_speed or max(1e-3 * speed, 1e-12), f.initial_bonds, f.breakaway)
 
 
 def choose(scene, per_point: bool = False) -> Settings:

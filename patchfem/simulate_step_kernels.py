@@ -22,6 +22,8 @@ from .friction.kernels import (
     jenkins_step,
     list_mean,
     list_step,
+    loose_mean,
+    loose_step,
 )
 
 COULOMB, JENKINS, POINTS, LIST, RATE = 0, 1, 2, 3, 4
@@ -31,8 +33,9 @@ class Contact(NamedTuple):
     """Memory and numbers of a contact; a kind leaves the arrays it does not use empty.
 
     force: (static or scale, kinetic, bound) [N]; of a rate law (limit [N], v_0 [m/s], limit). Jenkins: stretch,
-    stiffness, limit (t,). Points: weight (m,) = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, source (m,),
-    shear modes psi (m, r), kappa (r,), b (r,).
+    stiffness, limit (t,). Points: weight (m,) = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, and play (5, m)
+    where bonds stretch freely over the share growth[5] of their length; source (m,), shear modes psi (m, r),
+    kappa (r,), b (r,).
     List: bondlist (7, capacity), now (5,), tally = (bonds, cut-off, merge width), law. growth of eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
     """
@@ -103,6 +106,14 @@ def pressure_at(place, x, sigma):
     return (1 - part) * sigma[j] + part * sigma[j + 1]
 
 
+@njit(error_model="numpy", fastmath=FAST)
+def point_mean(c, j, dq, eps):
+    """Path-mean stretch [Pa m] of point j and its slope [Pa]."""
+    if c.bonds.shape[0] > 4:
+        return loose_mean(c.bonds[0, j], c.bonds[1, j], c.bonds[4, j], c.growth[5] * eps, dq, c.source[j], eps)
+    return bond_mean(c.bonds[0, j], c.bonds[1, j], dq, c.source[j], eps)
+
+
 @njit(error_model="numpy")
 def scalar_force(dq, kind, c, eps, v0, dt):
     """Path-mean friction force [N] and slope [N/m] for a rigid slide increment; `c` is the contact tuple."""
@@ -114,7 +125,7 @@ def scalar_force(dq, kind, c, eps, v0, dt):
     if kind == POINTS:
         force, slope = 0.0, 0.0
         for j in range(c.weight.size):
-            mean, s = bond_mean(c.bonds[0, j], c.bonds[1, j], dq, c.source[j], eps)
+            mean, s = point_mean(c, j, dq, eps)
             force += c.weight[j] * mean
             slope += c.weight[j] * s
         return force, slope
@@ -170,7 +181,7 @@ def residual(y, free, beta, c, eps, out, slope):
 
     beta = 0: the slide is given, dq = free. Returns the friction force [N].
     """
-    weight, bonds, source, psi, kappa, b = c.weight, c.bonds, c.source, c.psi, c.kappa, c.b
+    weight, psi, kappa, b = c.weight, c.psi, c.kappa, c.b
     r = kappa.size
     for k in range(r):
         out[k + 1] = kappa[k] * (b[k] + 0.5 * y[k + 1])
@@ -179,7 +190,7 @@ def residual(y, free, beta, c, eps, out, slope):
         xi = y[0]
         for k in range(r):
             xi -= psi[j, k] * y[k + 1]
-        mean, gain = bond_mean(bonds[0, j], bonds[1, j], xi, source[j], eps)
+        mean, gain = point_mean(c, j, xi, eps)
         f = weight[j] * mean
         slope[j] = weight[j] * gain
         force += f
@@ -326,7 +337,12 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
         xi = dq
         for k in range(b.size):
             xi -= psi[j, k] * y[k + 1]
-        m, z, s2, part = bond_step(bonds[0, j], bonds[1, j], bonds[2, j], xi, source[j], middle)
+        if bonds.shape[0] > 4:
+            m, z, s2, play, part = loose_step(bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j], c.growth[5] * middle,
+                                              xi, source[j], middle)
+            bonds[4, j] = play
+        else:
+            m, z, s2, part = bond_step(bonds[0, j], bonds[1, j], bonds[2, j], xi, source[j], middle)
         burnt += weight[j] * part / 2
         if follow and pressure_at(c.place[j] + q0 + dq, c.x, c.sigma) <= 0:
             burnt += weight[j] * s2 / 2

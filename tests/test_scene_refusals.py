@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
+from scene_texts import BENCH, LINEAR, PATCH, RIG, STRUCTURE, line_of, mistakes, only
 
 from patchfem.scene import SceneError, load, loads
 from patchfem.scene_built import NOT_YET_BUILT, _find
@@ -280,7 +280,8 @@ def test_refuses_another_shape_of_table(text, says):
 
 UNBUILT = [
     (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
-    (RIG, ["friction.breakaway=0.1"], "friction.breakaway"),
+    (RIG, ["friction.breakaway=0.1", "friction.order=2"], "friction.breakaway"),
+    (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz"], "normal.amplitude"),
     (RIG, ["structure.mode.second.pitch=2 rad/m"], "structure.mode.second.pitch"),
     (RIG, ["structure.stiffening.cubic=1e12 N/m^3"], "structure.stiffening"),
     (RIG, ["structure.bonded.stiffness=1e6 N/m"], "structure.bonded"),

@@ -12,7 +12,7 @@ a point.
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.special import gammainc, gammainccinv
@@ -94,6 +94,7 @@ class Convolution:
     nodes: np.ndarray | None = None
     pattern: np.ndarray | None = None
     kept: dict = field(default_factory=dict)
+    at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
 
     def start(self, sigma) -> Averaged:
         """No traction before any motion."""
@@ -102,8 +103,7 @@ class Convolution:
     def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]; the mean is that of its two ends."""
         if dq == 0:
-            rested = self._rested(state, s0, s1)
-            return Step(rested.traction, np.zeros_like(s0), rested)
+            return Step(state.traction, np.zeros_like(s0), state)
         way, slide = float(np.sign(dq)), state.slide + dq
         start = state.traction
         if way != state.way:
@@ -112,13 +112,13 @@ class Convolution:
         mean = (start + end) / 2
         return Step(mean, mean * dq, Averaged(end, slide, way))
 
-    def _rested(self, state: Averaged, s0, s1) -> Averaged:
-        """At rest the traction is kept, within the limit where the pressure falls."""
+    def press(self, state: Averaged, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]: the traction is kept within its limit. mean: after it."""
         way = float(np.sign(state.traction.sum()))
-        if way == 0 or np.array_equal(s0, s1):
-            return state
-        limit = self.static * self._averaged(state.slide, s1, way)
-        return Averaged(way * np.minimum(way * state.traction, limit), state.slide, 0.0)
+        held = state.traction
+        if way != 0:
+            held = way * np.minimum(way * held, self.static * self._averaged(state.slide, s1, way))
+        return Step(held, np.zeros_like(held), Averaged(held, state.slide, 0.0))
 
     def _averaged(self, slide: float, sigma, way: float):
         if self.nodes is None:

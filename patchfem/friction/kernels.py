@@ -69,6 +69,38 @@ def bond_step(m, z, s2, dq, sigma, eps):
     return m1, z1, s21, burnt
 
 
+@njit(error_model="numpy", fastmath=FAST)
+def free_part(play, dq, half):
+    """Elastic part of an increment (twin: `law.elastic_part`); play is dragged into its range first."""
+    start = min(max(play, -half), half)
+    end = min(max(start + dq, -half), half)
+    return dq if end == start + dq else end - start
+
+
+@njit(error_model="numpy", fastmath=FAST)
+def loose_mean(m, z, play, half, dq, sigma, eps):
+    """`bond_mean` with an elastic range of half width `half` (twin: `recursion.Recursion.step`)."""
+    free = free_part(play, dq, half)
+    rest = dq - free
+    if rest == 0.0 or abs(dq) < 1e-280:  # no 1/dq of a step that small
+        return z + 0.5 * m * dq, 0.5 * m
+    if free == 0.0:
+        return bond_mean(m, z, dq, sigma, eps)
+    mean, slope = bond_mean(m, z + m * free, rest, sigma, eps)
+    total = (free * (z + 0.5 * m * free) + rest * mean) / dq
+    return total, (mean + slope * rest - total) / dq
+
+
+@njit(error_model="numpy", fastmath=FAST)
+def loose_step(m, z, s2, play, half, dq, sigma, eps):
+    """`bond_step` with an elastic range; returns the new play as well."""
+    free = free_part(play, dq, half)
+    s2 += free * (2 * z + m * free)
+    z += m * free
+    m, z, s2, burnt = bond_step(m, z, s2, dq - free, sigma, eps)
+    return m, z, s2, min(max(play, -half), half) + free, burnt
+
+
 @njit(error_model="numpy")
 def grow(eps, v0, v1, path, dt, growth):
     """(bond length after the step, I_A + I_B) of eq. 2.10 (twin: `law.grow`).

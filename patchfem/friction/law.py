@@ -12,7 +12,8 @@ class Bonds:
 
     static: mu_s; ratio = eps_k/eps_0 = mu_k/mu_s (2.21); length = eps_0 [m]; order = p; reading "stretch" or "report";
     rest_growth = a_s [m s-2] (2.10 needs this unit) and slip_growth = l_k [m], None for a constant bond length;
-    rest_speed = v_h [m/s], the floor under |v| without which 2.10 has no limit at a reversal; initial = m_0.
+    rest_speed = v_h [m/s], the floor under |v| without which 2.10 has no limit at a reversal; initial = m_0;
+    breakaway: share of the bond length that stretches without damage.
     """
 
     static: float
@@ -24,11 +25,27 @@ class Bonds:
     slip_growth: float | None = None
     rest_speed: float = 1e-6
     initial: float = 1.0
+    breakaway: float = 0.0
 
     @property
     def grows(self) -> bool:
         """Whether the bond length evolves."""
         return self.rest_growth is not None
+
+
+def elastic_part(law: Bonds, play, dq, eps):
+    """(elastic, damaging) parts of the increment dq and the play after it; play, dq scalars or (m,) [m].
+
+    Play is how far the slide stands from the middle of its elastic range, |play| <= breakaway * eps. Inside that range
+    bonds stretch and none breaks or forms; at its ends the range is dragged along. A damaged path counted so keeps
+    every statement about energy, and a motion to and fro within the range leaves no trace (a play operator, Visintin,
+    Differential Models of Hysteresis, 1994).
+    """
+    half = law.breakaway * eps
+    start = np.clip(play, -half, half)  # a shrinking range is dragged as well
+    end = np.clip(start + dq, -half, half)
+    free = np.where(end == start + dq, dq, end - start)[()]
+    return free, dq - free, end
 
 
 def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> tuple:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import PatchfemError
 from .law import Bonds, grow
 from .local import Step
 from .recursion import advance, shape_functions
@@ -25,6 +26,12 @@ class PlaneState(NamedTuple):
 
     bonds: np.ndarray
     eps: float
+
+
+def refuse_breakaway(law: Bonds) -> None:
+    """PatchfemError for a law whose elastic range has no form in two directions."""
+    if law.breakaway:
+        raise PatchfemError("breakaway in two directions: set breakaway = 0; not yet built")
 
 
 def direction(dq) -> tuple:
@@ -52,6 +59,9 @@ class PlaneRecursion:
     """Law object of the stretch reading, p = 1, along a path in two directions."""
 
     law: Bonds
+
+    def __post_init__(self):
+        refuse_breakaway(self.law)
 
     def start(self, sigma) -> PlaneState:
         """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa]."""

@@ -14,7 +14,7 @@ from scipy.special import gammainc, gammaln
 
 from .law import Bonds, grow, growth_exponents
 from .local import Step
-from .plane import advance_plane, direction
+from .plane import advance_plane, direction, refuse_breakaway
 from .quadrature import PIECE, cutoff
 
 _THREE, _FIVE, _EIGHT = (np.polynomial.legendre.leggauss(count) for count in (3, 5, 8))
@@ -48,6 +48,9 @@ class PlaneQuadrature:
     law: Bonds
     tail: float = 1e-9
 
+    def __post_init__(self):
+        refuse_breakaway(self.law)
+
     def start(self, sigma) -> Legs:
         """Only the initial cohort: unstressed, full-grown bonds of density m_0."""
         none, length = np.zeros(1), np.full(1, self.law.length)
@@ -56,23 +59,40 @@ class PlaneQuadrature:
                     np.zeros(len(sigma), np.int64))
 
     def step(self, state: Legs, dq, s0, s1, dt: float) -> Step:
-        """One leg dq (2,) [m]; the mean traction (2, m) is exact for p = 1 stretch, by five Gauss points else."""
+        """One leg dq (2,) [m]; the mean traction (2, m) is exact for p = 1 stretch, by five Gauss points else, its part
+        along the leg in the stretch reading by the energy."""
         dq = np.asarray(dq, float)
         after = self._moved(state, dq, s0, s1, dt)
+        gain = self.stored(after) - self.stored(state)
         if not dq.any():
-            mean = self.traction(after)
-        elif self._closed:
+            return Step(self.traction(after), -gain, after)
+        if self._closed:
             bonds = np.zeros((4, len(s0)))
             bonds[0] = _summed(state, self._surviving(state)[:, None])[0]
-            bonds[1:3] = _summed(state, self.weights(state)) * self.law.length
+            bonds[1:3] = _summed(state, self.weights(state))[:2] * self.law.length
             mean = self.law.static / self.law.length * advance_plane(bonds, dq, (s0 + s1) / 2, after.eps[-1])[1]
-        else:
-            mean = np.zeros((2, len(s0)))
-            for y, w in zip(*_FIVE):
-                part = (1 + y) / 2
+            return Step(mean, dq @ mean - gain, after)
+        mean, spent = self._along(state, dq, s0, s1, dt)
+        if self.law.reading == "report":
+            return Step(mean, dq @ mean - gain, after)
+        path, e = direction(dq)
+        return Step(mean + e[:, None] * ((spent + gain) / path - e @ mean), spent, after)
+
+    def _along(self, state: Legs, dq, s0, s1, dt) -> tuple:
+        """(mean traction (2, m), dissipated energy (m,)) of a leg; the latter in the stretch reading, where damage
+        takes the share dR/eps of what is stored."""
+        middle = self._moved(state, dq, s0, s1, dt).eps[-1]
+        length, mean, spent = direction(dq)[0] / middle, np.zeros((2, len(s0))), np.zeros(len(s0))
+        edges = np.append(np.minimum([0, 1, 2, 4, 8, 16, 32], length), length)
+        if self.law.reading == "report":
+            edges = np.array([0.0, length])
+        for a, b in pairwise(np.unique(edges)):
+            for place, w in zip((a + b + (b - a) * _FIVE[0]) / 2, (b - a) / 2 * _FIVE[1]):
+                part = place / length
                 here = self._moved(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, (s0 + s1) / 2)
-                mean += w / 2 * self.traction(here)
-        return Step(mean, dq @ mean - (self.stored(after) - self.stored(state)), after)
+                sums = self.law.static * _summed(here, self.weights(here))
+                mean, spent = mean + w / length * sums[:2], spent + w * sums[2]
+        return mean, spent
 
     @property
     def _closed(self) -> bool:
@@ -119,40 +139,39 @@ class PlaneQuadrature:
                        dropped=state.dropped + first)
 
     def weights(self, state: Legs) -> np.ndarray:
-        """(k, 2) weight [1] of each leg: tau = mu_s sum_k weight_k sigma_k. The first is the initial cohort."""
+        """(k, 3) of each leg: weight [1] along x and across, tau = mu_s sum_k weight_k sigma_k, and stored energy [m],
+        V = mu_s sum_k energy_k sigma_k. The first is the initial cohort."""
         law, first = self.law, 1 if state.dropped == 0 else 0
-        out, rest = np.zeros((len(state.path), 2)), slice(first, None)
+        out, rest = np.zeros((len(state.path), 3)), slice(first, None)
         if first:
             out[0] = self._cohort(state)
         if len(state.path) == first:
             return out
         if self._closed:
-            out[rest] = _stretch_leg(state, rest)[0] / law.length
+            u, square = _stretch_leg(state, rest)
+            out[rest] = np.column_stack([u, square / 2]) / law.length
             return out
         out[rest] = _gauss_leg(state, rest, law)
         return out
 
     def _cohort(self, state: Legs) -> np.ndarray:
-        """m_0 phi_p(R/eps_0) u/|u|: the bonds that were there at the start."""
+        """m_0 phi_p(R/eps_0) u/|u| and its stored energy: the bonds that were there at the start."""
         law, (u, way) = self.law, direction(state.now[0])
         path, damage = state.now[1:3]
         if u == 0 or law.initial == 0:
-            return np.zeros(2)
-        x, harm = (u, damage) if law.reading == "stretch" else (path, path / law.length)
-        return law.initial * np.exp(law.order * np.log(x / law.length) - harm - gammaln(law.order + 1)) * way
+            return np.zeros(3)
+        stretched = law.reading == "stretch"
+        x, harm = (u, damage) if stretched else (path, path / law.length)
+        force = law.initial * np.exp(law.order * np.log(x / law.length) - harm - gammaln(law.order + 1))
+        return force * np.append(way, u / (law.order + 1 if stretched else 1.0))
 
     def traction(self, state: Legs) -> np.ndarray:
         """tau (2, m) [Pa], positive against positive slip."""
-        return self.law.static * _summed(state, self.weights(state))
+        return self.law.static * _summed(state, self.weights(state))[:2]
 
     def stored(self, state: Legs) -> np.ndarray:
-        """Elastic energy per area (m,) [J/m2] of the stretch reading with p = 1; zero where no energy is defined."""
-        if not self._closed:
-            return np.zeros(state.sigma.shape[1])
-        squares = _stretch_leg(state, slice(0, None))[1]
-        if state.dropped == 0:
-            squares[0] = self.law.initial * np.sum(state.now[0]**2) * np.exp(-state.now[2])
-        return self.law.static / (2 * self.law.length) * _summed(state, squares[:, None])[0]
+        """Elastic energy per area (m,) [J/m2] of the bonds at the damage of the moment."""
+        return self.law.static * _summed(state, self.weights(state))[2]
 
 
 def _summed(state: Legs, weights) -> np.ndarray:
@@ -179,15 +198,16 @@ def _stretch_leg(state: Legs, rest) -> tuple:
 
 
 def _gauss_leg(state: Legs, rest, law: Bonds) -> np.ndarray:
-    """(k, 2) sums over the legs by Gauss points; the last leg in closed form where its bonds share a length."""
+    """(k, 3) sums over the legs by Gauss points; the last leg in closed form where its bonds share a length."""
     span, eps = state.span[rest], state.eps[rest]
     h = np.hypot(*span.T)
     e, a, near = span / h[:, None], state.now[0] - state.q[rest], state.now[1] - state.path[rest]
     before = np.sum(a * e, axis=1)  # u along e at the end of a leg; grows backwards along it
     aside = np.hypot(*(a - e * before[:, None]).T)
-    out, shared = np.zeros_like(a), law.reading == "stretch" or not law.grows
-    last = shared & (near == 0)
-    out[last] = (e * (eps * gammainc(law.order + 1, h / eps) / law.length)[:, None])[last]
+    out, stretched = np.zeros((h.size, 3)), law.reading == "stretch"
+    last = (stretched or not law.grows) & (near == 0)
+    whole, arm = (eps * gammainc(law.order + n, h / eps) / law.length for n in (1, 2))
+    out[last] = np.column_stack([e * whole[:, None], eps * arm * (1 if stretched else law.order + 1)])[last]
     count = np.maximum(1, np.ceil(h / (PIECE * eps))).astype(int)
     away = np.minimum(np.hypot(aside, np.maximum(np.maximum(before, -before - h), 0.0)), near)
     slight = (h <= SLIGHT * np.minimum(away, eps)) & ~last
@@ -203,13 +223,13 @@ def _gauss_leg(state: Legs, rest, law: Bonds) -> np.ndarray:
     few = np.flatnonzero(slight)
     for part, rule in (((owner, begin, size), _EIGHT), ((few, np.zeros(few.size), h[few]), _THREE)):
         found = _pieces(state, rest, law, a, e, h, part, rule)
-        for c in (0, 1):
+        for c in (0, 1, 2):
             out[:, c] += np.bincount(part[0], found[:, c], h.size)
     return out
 
 
 def _pieces(state: Legs, rest, law: Bonds, a, e, h, part: tuple, rule: tuple) -> np.ndarray:
-    """(n, 2) sums over pieces (leg, start behind its end, length), each (n,), by the points and weights of a rule."""
+    """(n, 3) sums over pieces (leg, start behind its end, length), each (n,), by the points and weights of a rule."""
     (owner, begin, size), (points, weights) = part, rule
     back = begin[:, None] + size[:, None] * (1 + points) / 2
     ux, uy = (a[owner, c][:, None] + back * e[owner, c][:, None] for c in (0, 1))
@@ -219,7 +239,8 @@ def _pieces(state: Legs, rest, law: Bonds, a, e, h, part: tuple, rule: tuple) ->
         f = np.exp(-harm) if law.order == 0 else np.exp(
             law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1))
     f *= weights * size[:, None] / (2 * law.length * far)
-    return np.stack([(ux * f).sum(axis=1), (uy * f).sum(axis=1)], axis=1)
+    share = law.order + 1 if law.reading == "stretch" else 1.0
+    return np.stack([(ux * f).sum(axis=1), (uy * f).sum(axis=1), (far * far * f).sum(axis=1) / share], axis=1)
 
 
 def _ages(state: Legs, rest, law: Bonds, owner, back, far, h) -> tuple:

@@ -6,7 +6,15 @@ With k = exp(-int dR/eps) the surviving share of a bond and 1/eps frozen when it
 
 obey m' = |v|(sigma - m)/eps, z' = v m - |v| z/eps, s2' = 2 v z - |v| s2/eps; tau = mu_s z/eps_0. Exact step for a bond
 length held over the step. Stored energy mu_s s2/(2 eps_0) and dissipation mu_s s2/(2 eps_0 eps) per path are never
-negative: passive for every path, pressure and bond length.
+negative: passive for every path, pressure and bond length, and for every part of the path that is counted as damaging.
+
+Breakaway. The path counts only where the slide drags its elastic range along (`law.elastic_part`); inside it
+z' = v m and s2' = 2 v z. With a share b of the bond length, a dither of the force by less than 2 b mu_s sigma from end
+to end drifts in its first cycle only, b = 0 is Dahl's law and b -> 1 the elastic-plastic one.
+
+Load. Where the load falls at rest, the bonds that carry nothing, the last formed, are let go first: the force stays as
+long as a population with the moments (m, z, s2) exists, m >= z^2/s2. Beyond that all stretches shrink, and no point
+keeps more than mu_s sigma. Where it rises, unstressed bonds come in the density m_0. Neither gives energy.
 """
 
 from dataclasses import dataclass
@@ -15,15 +23,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .law import Bonds, grow
+from .law import Bonds, elastic_part, grow
 from .local import Step
 
 
 class BondState(NamedTuple):
-    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]."""
+    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]; play [m] of `elastic_part`."""
 
     bonds: np.ndarray
     eps: float
+    play: float = 0.0
 
 
 def shape_functions(x):
@@ -70,6 +79,25 @@ def advance(bonds, dq, sigma, eps):
     return out, mean, slope, burnt
 
 
+def stretch(bonds, dq):
+    """Bonds (3, m) that all stretch by dq and neither break nor form."""
+    m, z, s2 = bonds
+    return np.stack([m, z + m * dq, s2 + dq * (2 * z + m * dq)])
+
+
+def pressed(law: Bonds, bonds, s0, s1):
+    """Bonds (3, m) after a change of the pressure from s0 to s1 (m,) [Pa] at rest; stored energy never rises."""
+    m, z, s2 = bonds
+    falls = s1 < s0
+    left = np.divide(m * s1, s0, out=np.zeros_like(m), where=s0 > 0)
+    density = np.where(falls, left, m + law.initial * (s1 - s0))
+    least = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
+    keep = np.where(falls & (least > left), left / np.maximum(least, 1e-300), 1.0)
+    bound = law.length * s1
+    keep *= np.where(falls & (keep * np.abs(z) > bound), bound / np.maximum(keep * np.abs(z), 1e-300), 1.0)
+    return np.stack([density, z * keep, s2 * keep])
+
+
 @dataclass(frozen=True, slots=True)
 class Recursion:
     """Law object of the stretch reading, p = 1; the pressure may change along the increment and in time."""
@@ -86,14 +114,24 @@ class Recursion:
         """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
         speed = dq / dt if dt > 0 else 0.0
         middle = grow(self.law, state.eps, speed, speed, dq / 2, dt / 2)
-        out, mean, _, burnt = advance(state.bonds, dq, (s0 + s1) / 2, middle)
+        free, damaging, play = elastic_part(self.law, state.play, dq, middle)
+        stretched = stretch(state.bonds, free)
+        out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
+        if free != 0:
+            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
         scale = self.law.static / self.law.length
         spent = scale * burnt / 2
         lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
         if lost.any():
             spent = spent + np.where(lost, scale * out[2] / 2, 0.0)
             out = np.where(lost, 0.0, out)
-        return Step(scale * mean, spent, BondState(out, grow(self.law, state.eps, speed, speed, dq, dt)))
+        return Step(scale * mean, spent, BondState(out, grow(self.law, state.eps, speed, speed, dq, dt), play))
+
+    def press(self, state: BondState, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        bonds = pressed(self.law, state.bonds, s0, s1)
+        scale = self.law.static / self.law.length
+        return Step(scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
         """tau = mu_s z/eps_0 (m,) [Pa]."""

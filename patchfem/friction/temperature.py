@@ -14,9 +14,9 @@ from math import pi, sqrt
 import numpy as np
 
 from ..core import PatchfemError
-from .law import Bonds, growth_exponents
+from .law import Bonds, elastic_part, growth_exponents
 from .local import Step
-from .recursion import BondState, Recursion, advance
+from .recursion import BondState, Recursion, advance, stretch
 
 
 def growth_at(rest: float, slip: float, surface, reference: float, rest_activation: float | None,
@@ -85,15 +85,19 @@ class WarmRecursion(Recursion):
     def start(self, sigma) -> BondState:
         """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa], all of length eps_0."""
         state = Recursion(self.law).start(sigma)
-        return BondState(state.bonds, np.full(sigma.size, self.law.length))
+        return BondState(state.bonds, np.full(sigma.size, self.law.length), np.zeros(sigma.size))
 
     def step(self, state: BondState, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
         law = self.law
         speed = dq / dt if dt > 0 else 0.0
         middle = grow_each(law, state.eps, speed, dq / 2, dt / 2)
-        out, mean, _, burnt = advance(state.bonds, dq, (s0 + s1) / 2, middle)
-        scale = law.static / law.length
-        lost = s1 <= 0
+        free, damaging, play = elastic_part(law, state.play, dq, middle)
+        stretched = stretch(state.bonds, free)
+        out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
+        if dq != 0:
+            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
+        scale, lost = law.static / law.length, s1 <= 0
         spent = scale * (burnt + np.where(lost, out[2], 0.0)) / 2
-        return Step(scale * mean, spent, BondState(np.where(lost, 0.0, out), grow_each(law, state.eps, speed, dq, dt)))
+        return Step(scale * mean, spent,
+                    BondState(np.where(lost, 0.0, out), grow_each(law, state.eps, speed, dq, dt), play))

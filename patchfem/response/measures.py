@@ -12,12 +12,14 @@ UNITS = {
     "stick_fraction": "1", "slip_start_phase": "rad", "friction_force_peak": "N", "loop_area": "J",
     "equivalent_stiffness": "N m-1", "equivalent_damping": "1", "energy_balance": "1", "drift_per_cycle": "m",
     "normal_load": "N", "friction_ratio_end": "1", "friction_ratio_peak": "1",
+    "friction_work": "J", "energy_stored": "J", "energy_dissipated": "J", "energy_created": "J",
 }
 FLOORS = {
     "relative_displacement_amplitude": 1e-10, "absolute_acceleration_peak": 1e-4, "slip_amplitude": 1e-10,
     "stick_fraction": 1e-3, "slip_start_phase": 1e-3, "friction_force_peak": 1e-6, "loop_area": 1e-10,
     "equivalent_stiffness": 1.0, "equivalent_damping": 1e-8, "energy_balance": 1e-8, "drift_per_cycle": 1e-11,
     "friction_ratio_end": 1e-9, "friction_ratio_peak": 1e-9,
+    "friction_work": 1e-10, "energy_stored": 1e-10, "energy_dissipated": 1e-10, "energy_created": 1e-10,
 }
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
 

@@ -161,7 +161,7 @@ def test_exact_at_rest_the_last_traction_is_kept():
     still = law.step(state, 0.0, one, one, 5.0)
     assert still.mean[0] == -0.3 and law.traction(still.state)[0] == -0.3 and still.dissipated[0] == 0
     for pressure, kept in ((2.0, -0.3), (0.5, -0.15), (0.0, 0.0)):
-        rested = law.step(state, 0.0, one, pressure * one, 5.0)
+        rested = law.press(state, one, pressure * one)
         assert rested.state.traction[0] == kept and rested.dissipated[0] == 0
         on = law.step(rested.state, -0.1, pressure * one, 1.0 * one, 1.0)
         assert on.mean[0] == pytest.approx(-0.3 * (pressure + 1) / 2) and on.state.traction[0] == -0.3
@@ -199,6 +199,15 @@ def test_exact_one_point_is_coulomb():
     _, one = bench_of(POINT + AVERAGED + SLIDE)
     _, two = bench_of(POINT + COULOMB + SLIDE)
     assert one.values == two.values and (one.force == two.force).all()
+
+
+def test_exact_one_point_under_a_changing_load_is_coulomb():
+    sets = ["normal.amplitude=60 N", "normal.frequency=300 Hz"]
+    dwell = '[slide]\nkind = "dwell"\nspeed = "5 mm/s"\ndistance = "20 um"\nhold = "5 ms"\ndistance_after = "20 um"\n'
+    _, one = bench_of(POINT + AVERAGED + dwell, *sets)
+    _, two = bench_of(POINT + COULOMB + dwell, *sets)
+    assert one.force == pytest.approx(two.force, rel=1e-13) and one.values == pytest.approx(two.values)
+    assert np.ptp(one.load) > 100
 
 
 @pytest.mark.parametrize("order", [0, 1])

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.closed_forms import coulomb_loop_area, jenkins_loop
-from patchfem.friction.local import Coulomb, ElasticPlastic
+from patchfem.friction.local import Coulomb, ElasticPlastic, Rate
 
 ONE = upper_pressure([1.0, 0.5])
 PRESSURE = st.just(0.0) | st.floats(1e-6, 4)
@@ -63,11 +63,35 @@ def test_always_elastic_plastic_creates_no_energy(rows, length):
 
 
 def test_exact_falling_pressure_takes_energy_at_rest():
-    law = ElasticPlastic(1.0, 1.0)
-    state = law.step(law.start(np.ones(1)), 0.8, np.ones(1), np.ones(1), 1.0).state
-    step = law.step(state, 0.0, np.full(1, 0.5), np.full(1, 0.5), 1.0)
-    assert law.traction(step.state)[0] == pytest.approx(0.4)
-    assert step.dissipated[0] == pytest.approx(0.32 - 0.16) and law.stored(step.state)[0] == pytest.approx(0.16)
+    """Springs of 1 stretched by 0.8: under half the pressure the limit 0.5 is left, with 0.5^2/2 of the 0.8^2/2."""
+    law, one = ElasticPlastic(1.0, 1.0), np.ones(1)
+    state = law.step(law.start(one), 0.8, one, one, 1.0).state
+    for step in (law.step(state, 0.0, one / 2, one / 2, 1.0), law.press(state, one, one / 2)):
+        assert law.traction(step.state)[0] == pytest.approx(0.5)
+        assert step.dissipated[0] == pytest.approx(0.32 - 0.125) and law.stored(step.state)[0] == pytest.approx(0.125)
+    light = law.press(state, one, 0.9 * one)
+    assert law.traction(light.state)[0] == 0.8 and light.dissipated[0] == 0.0
+
+
+def test_exact_rising_pressure_brings_unstressed_springs_and_slip_breaks_those_in_excess():
+    law, one = ElasticPlastic(1.0, 1.0), np.ones(1)
+    state = law.step(law.start(one), 0.8, one, one, 1.0).state
+    state = law.press(state, one, 2 * one).state
+    assert law.traction(state)[0] == 0.8 and law.stored(state)[0] == pytest.approx(0.8**2 / 4)
+    assert law.step(state, 0.1, 2 * one, 2 * one, 1.0).mean[0] == pytest.approx(0.8 + 0.1)  # stiffness 2
+    state = law.press(state, 2 * one, one).state
+    slid = law.step(state, 0.1 + 3.0, one, one, 1.0)  # 0.1 up to the limit, then three lengths of slip
+    assert law.stored(slid.state)[0] == pytest.approx(1 / (2 * (1 + np.exp(-3.0))))
+    assert slid.dissipated[0] == pytest.approx(3.0 + 0.09 + 0.8**2 / 4 - law.stored(slid.state)[0])
+
+
+@pytest.mark.parametrize("law, share", [(Coulomb(0.3), 0.3), (Rate(0.3, 1.0), 0.3)])
+def test_exact_a_held_traction_follows_a_falling_pressure_only(law, share):
+    one = np.ones(1)
+    state = law.step(law.start(one), 50.0, one, one, 1.0).state
+    assert law.press(state, one, 2 * one).mean[0] == pytest.approx(share)
+    assert law.press(state, one, one / 3).mean[0] == pytest.approx(share / 3)
+    assert law.traction(law.press(state, one, 0 * one).state)[0] == 0
 
 
 @settings(deadline=None)

@@ -511,7 +511,11 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
             slow = engine.step(state, speed, one, one, 1.0)
             assert np.isfinite([slow.mean[0], slow.dissipated[0], engine.traction(slow.state)[0]]).all()
             assert engine.traction(slow.state)[0] == pytest.approx(engine.traction(still.state)[0], abs=1e-14)
-            assert abs(slow.dissipated[0]) <= 1e-15
+            if reading == "stretch":
+                assert abs(slow.dissipated[0]) <= 1e-15
+            else:  # what heals under load gains energy
+                assert slow.dissipated[0] == pytest.approx(still.dissipated[0], abs=1e-14)
+                assert slow.dissipated[0] < -1e-3 if growth else abs(slow.dissipated[0]) <= 1e-15
             if reading == "stretch":
                 assert engine.traction(slow.state) == pytest.approx(engine.traction(state), abs=1e-14)
     if growth:

@@ -161,6 +161,8 @@ def test_refuses_a_broken_lateral_column(table, text, says):
     (POINT, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "law 'tanh'"),
     (POINT, ["friction.law=convolution"], "law 'convolution'"),
     (POINT, ["normal.width=1 mm", "friction.spread=1 um"], "friction.spread"),
+    (POINT, ["friction.breakaway=0.2"], "friction.breakaway"),
+    (POINT, ["normal.amplitude=1 N", "normal.frequency=50 Hz"], "normal.amplitude"),
     (PATCH, ["contact.shear={}"], "[contact.shear]"), (PATCH, ["contact.tilt.on=lower"], "pressure on the lower piece"),
 ])
 def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):

@@ -89,13 +89,14 @@ def test_exact_rates_near_the_ends_of_floating_point():
 
 # ---- a temperature per point
 
-def test_exact_points_of_their_own_temperature_are_separate_runs():
+@pytest.mark.parametrize("breakaway", [0.0, 0.3])
+def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
     """Three points at 250, 293.15 and 450 K in one call = three recursions with rates by hand."""
-    law = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5)
+    law = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, breakaway=breakaway)
     hot, sigma = np.array([250.0, 293.15, 450.0]), np.array([1.0, 2.0, 0.5])
     engine = WarmRecursion.warm(law, hot, 293.15, 2500.0, 1500.0)
     alone = [Recursion(Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10 * np.exp(2500 * (1 / 293.15 - 1 / t)),
-                             2e-7 * np.exp(1500 * (1 / t - 1 / 293.15)), 1e-5)) for t in hot]
+                             2e-7 * np.exp(1500 * (1 / t - 1 / 293.15)), 1e-5, breakaway=breakaway)) for t in hot]
     state, states = engine.start(sigma), [one.start(sigma[i:i + 1]) for i, one in enumerate(alone)]
     rng = np.random.default_rng(1)
     for dq in np.append(rng.normal(0, 1e-6, 60), [0.0, 2e-6]):

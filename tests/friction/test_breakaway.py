@@ -1,0 +1,166 @@
+"""Breakaway: bonds that stretch over a share of their length without damage."""
+
+import numpy as np
+import pytest
+from friction_paths import random_walk, triangle, upper_pressure, walk
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem import closed_forms, simulate_kernels, simulate_step_kernels
+from patchfem.friction.kernels import loose_mean, loose_step
+from patchfem.friction.law import Bonds, elastic_part
+from patchfem.friction.local import ElasticPlastic
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import Recursion
+from patchfem.simulate_march import points_model
+
+ONE = upper_pressure([1.0])
+GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 0.01}
+
+
+def bonds(share, order=1.0, **more):
+    return Bonds(1.0, 1.0, order, breakaway=share, **more)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.7, 0.999])
+@pytest.mark.parametrize("amplitude", [0.1, 0.9, 1.5, 8.0])
+def test_exact_loop_with_breakaway(share, amplitude):
+    path = triangle(amplitude, 80, 7)
+    run = walk(Recursion(bonds(share)), path, ONE)
+    work = run.mean[-14:, 0] @ np.diff(path)[-14:]
+    area, end = closed_forms.stretch_loop(amplitude, 1.0, 1.0, share)
+    if amplitude > share:  # below it the loop is a line about the first stroke's mean
+        assert (work, -run.traction[-1, 0]) == pytest.approx((area, end), abs=1e-11)
+    else:
+        assert work == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("engine", [Recursion, lambda law: Quadrature(law, 0.0)])
+def test_exact_breakaway_of_the_whole_length_is_elastic_plastic(engine):
+    path = random_walk(3, 60, 0.6)
+    soft = walk(engine(bonds(1 - 1e-13)), path, ONE)
+    hard = walk(ElasticPlastic(1.0, 1.0), path, ONE)
+    assert soft.traction == pytest.approx(hard.traction, abs=1e-11)
+    assert soft.mean == pytest.approx(hard.mean, abs=1e-11)
+
+
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+@pytest.mark.parametrize("share", [0.1, 0.6])
+def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):
+    law = bonds(share, initial=0.7, **growth)
+    path = random_walk(5, 150, 0.5)
+    a, b = (walk(engine, path, upper_pressure([1.0, 0.3])) for engine in (Recursion(law), Quadrature(law, 0.0)))
+    for name in ("mean", "traction", "stored", "dissipated"):
+        assert getattr(a, name) == pytest.approx(getattr(b, name), abs=1e-11), name
+
+
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
+    law = bonds(0.35, initial=0.6, **growth)
+    path = random_walk(7, 80, 0.4)
+    model = points_model(law, [1.0], [1.0])
+    contact, work = model.build(simulate_kernels)
+    burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    assert simulate_kernels.follow_path(path, 1.0, model.kind, contact, work, 1e-12, burnt, forces) == 0
+    run = walk(Recursion(law), path, ONE)
+    assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
+    assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
+    assert burnt[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)
+    assert burnt[1:, 1] == pytest.approx(run.stored[:, 0], abs=1e-12)
+
+
+@given(st.floats(0, 2), st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1), st.floats(-3, 3), st.floats(0.2, 2))
+def test_always_the_slope_with_breakaway_is_the_derivative_of_the_mean(m, z, play, half, dq, eps):
+    play = np.clip(play, -half, half)
+    mean, slope = loose_mean(m, z, play, half, dq, 1.0, eps)
+    ahead, behind = (loose_mean(m, z, play, half, dq + h, 1.0, eps)[0] for h in (1e-6, -1e-6))
+    kinks = abs(abs(dq + play) - half) < 1e-4 or abs(dq) < 1e-3
+    assert kinks or slope == pytest.approx((ahead - behind) / 2e-6, abs=1e-6)
+    twin = Recursion(Bonds(1.0, eps, breakaway=half / eps if half < eps else 0.0))
+    if 0 < half < eps:
+        state = twin.start(np.array([1.0]))._replace(bonds=np.array([[m], [z], [z * z]]), play=play)
+        step = twin.step(state, dq, np.ones(1), np.ones(1), 0.0)
+        assert mean / eps == pytest.approx(step.mean[0], abs=1e-12)
+        after = loose_step(m, z, z * z, play, half, dq, 1.0, eps)
+        assert after[:3] == pytest.approx(step.state.bonds[:, 0], abs=1e-12)
+        assert after[3] == pytest.approx(step.state.play, abs=1e-15)
+
+
+@given(st.lists(st.tuples(st.floats(-2, 2), st.floats(0.1, 2)), min_size=1, max_size=20), st.floats(0, 0.99))
+def test_always_the_play_splits_the_slide(steps, share):
+    law, play, free, all_ = bonds(share), 0.0, 0.0, 0.0
+    for dq, eps in steps:
+        loose, damaging, after = elastic_part(law, play, dq, eps)
+        assert loose + damaging == pytest.approx(dq, abs=1e-15) and abs(after) <= share * eps
+        assert loose * dq >= 0 and damaging * np.sign(dq) >= -1e-15
+        assert abs(damaging) <= 1e-15 or abs(abs(after) - share * eps) <= 1e-15
+        play, free, all_ = after, free + loose, all_ + abs(dq)
+    assert abs(free) <= all_
+
+
+def dither(law, low, high, cycles):
+    """Slides (cycles,) at the low end of every cycle of a force dither, from rest."""
+    engine, one = Recursion(law), np.ones(1)
+    state, slide, ends = engine.start(one), 0.0, []
+    for _ in range(cycles):
+        for target in (high, low):
+            step, way = 0.0, 1.0 if target > float(engine.traction(state)[0]) else -1.0
+            for _ in range(200):  # Newton along a concave branch comes from one side
+                here = engine.step(state, step, one, one, 1.0)
+                miss = target - float(engine.traction(here.state)[0])
+                if abs(miss) < 1e-14:
+                    break
+                ahead = engine.step(state, step + way * 1e-9, one, one, 1.0)
+                step += miss / ((float(engine.traction(ahead.state)[0]) - target + miss) / (way * 1e-9))
+            state, slide = engine.step(state, step, one, one, 1.0).state, slide + step
+        ends.append(slide)
+    return np.array(ends)
+
+
+@pytest.mark.parametrize("share, low, high", [(0.0, 0.4, 0.6), (0.0, 0.2, 0.8), (0.1, 0.4, 0.6), (0.3, 0.2, 0.8),
+                                              (0.2, 0.2, 0.8), (0.3, 0.0, 0.6), (0.5, -0.2, 0.7), (0.3, -0.5, 0.5)])
+def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
+    """0 from the second cycle on where the dither stays within the elastic range, the closed form elsewhere."""
+    ends = dither(bonds(share), low, high, 8)
+    wanted = closed_forms.dither_drift(low, high, share)
+    assert np.diff(ends) == pytest.approx(wanted, abs=1e-9)
+    assert (wanted == 0) == (high - low <= 2 * share + 1e-15 or low == -high)
+
+
+def worst_loss(seed, points, count):
+    """Least dissipation over stored energy and work of `points` random paths under one slide."""
+    rng = np.random.default_rng(seed)
+    growth = {"ratio": rng.uniform(0.1, 1), "rest_growth": 10**rng.uniform(-2, 1),
+              "slip_growth": 10**rng.uniform(-2, 1), "rest_speed": 0.01} if rng.random() < 0.7 else {}
+    law = Recursion(Bonds(0.4, 1.0, initial=rng.uniform(0, 1), breakaway=rng.choice([0, rng.uniform(0, 1)]), **growth))
+    sigma = rng.uniform(0, 2, points)
+    state, worst = law.start(sigma), 0.0
+    for _ in range(count):
+        after = rng.uniform(0, 2, points) * (rng.random(points) < 0.9)
+        press = law.press(state, sigma, after)
+        falls = after < sigma
+        assert (np.abs(press.mean) <= 0.4 * after * (1 + 1e-12))[falls].all()
+        assert (press.mean == law.traction(state))[~falls & (sigma > 0)].all()
+        dq = float(rng.normal() * 10**rng.uniform(-4, 2))
+        ahead = rng.uniform(0, 2, points) if rng.random() < 0.5 else after
+        step = law.step(press.state, dq, after, ahead, 10**rng.uniform(-3, 2))
+        size = np.abs(step.mean * dq) + law.stored(state) + 1e-12
+        worst = min(worst, (press.dissipated / size).min(), (step.dissipated / size).min())
+        gain = step.mean * dq - (law.stored(step.state) - law.stored(press.state)) - step.dissipated
+        assert np.abs(gain / size).max() <= 1e-11
+        state, sigma = step.state, ahead
+    return worst
+
+
+def test_always_breakaway_and_a_changing_load_are_passive_on_400_paths():
+    assert min(worst_loss(seed, 20, 40) for seed in range(20)) >= -1e-12
+
+
+@pytest.mark.slow
+def test_always_breakaway_and_a_changing_load_are_passive_on_20000_paths():
+    assert min(worst_loss(1000 + seed, 20, 60) for seed in range(1000)) >= -1e-12
+
+
+def test_exact_the_kind_of_points_stays_small_without_breakaway():
+    assert points_model(bonds(0.0), [1.0], [1.0]).fields["bonds"].shape[0] == 4
+    assert simulate_step_kernels.Contact._fields.index("growth") > 0
