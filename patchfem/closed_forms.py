@@ -51,8 +51,8 @@ def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
     the last four are positive.
     """
     positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
-    w = np.asarray(speed)**2 / (rest_growth * slip_growth)
-    return length * (1 + ratio * w) / (1 + w)
+    slow = 1 / np.hypot(1.0, np.asarray(speed, float) / np.sqrt(rest_growth * slip_growth))
+    return length * (ratio + (1 - ratio) * slow * slow)
 
 
 def steady_shear(direction, pressure, static, ratio=1.0):

@@ -116,6 +116,28 @@ def _overhang(scene, fine) -> list:
     return out
 
 
+def _unripe(law, speed: float) -> list:
+    """The warning of a printed law whose bonds break before they are grown."""
+    from .friction.law import ripening
+
+    a = ripening(law, speed) if law.reading == "report" else 0.0
+    if a <= 0.3:
+        return []
+    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit 0.3): as printed, "
+            "friction then falls below 2.18-2.21; lower friction.slip_growth, or use reading = \"stretch\""]
+
+
+def _creeping(law, outcome, found) -> list:
+    """The warning of a bounded motion whose middle moves on: Dahl's creep, not a property of the joint."""
+    drift = found.get("drift_per_cycle")
+    if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
+        return []
+    if law.breakaway or law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
+        return []
+    return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds that are damaged at any "
+            "stretch do so under a biased load; friction.breakaway of half the swing of the force over mu N stops it"]
+
+
 def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
     from .simulate_measures import measures, plane_band, strip_error
 
@@ -156,12 +178,14 @@ def _fields(patch, time, tau, local, slide) -> dict:
 def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from . import simulate_bench as bench
     from .response.errors import change, step_error, with_errors
-    from .simulate_slide import steps_of
+    from .simulate_slide import peak_speed, steps_of
 
     scene = what.scene
     if scene.friction.law == "nonlocal" and scene.friction.order < 0 and scene.friction.initial_bonds > 0:
         warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
                     "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
+    if scene.friction.law == "nonlocal":
+        warnings = [*warnings, *_unripe(bench.bonds_of(scene), peak_speed(scene))]
     steps = steps_of(scene)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(scene, patch, steps, frames, say)
@@ -248,6 +272,10 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     if scene.friction is not None and scene.friction.law == "tanh":
         warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
                     f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
+    if scene.friction is not None and scene.friction.law == "nonlocal":
+        law = rig.law_of(scene, drive.acceleration / drive.omega)
+        warnings = [*warnings, *_unripe(law, float(np.abs(raw.window.slide_rate).max())),
+                    *_creeping(law, outcome, found)]
     warnings = [*warnings, raw.message] if raw.message else warnings
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 

@@ -48,7 +48,7 @@ def law_for(scene, patch=None):
 
     f = scene.friction
     if f.law == "coulomb":
-        return Coulomb(f.kinetic)
+        return Coulomb(f.kinetic, f.static)
     if f.law == "elastic-plastic":
         return ElasticPlastic(f.static, f.bond_length)
     if f.law == "tanh":
@@ -173,6 +173,7 @@ def _rigid(scene, patch, time, slide, frames):
     tau, local = [], []
     length = (scene.friction.bond_length or 0.0) if scene.friction.law != "convolution" else 0.0
     static = scene.friction.static
+    peaks = _ends_of_rest(slide) if scene.friction.law == "coulomb" and scene.friction.kinetic < static else {}
     for k in range(time.size):
         if k:
             dq, dt = slide[k] - slide[k - 1], time[k] - time[k - 1]
@@ -185,6 +186,8 @@ def _rigid(scene, patch, time, slide, frames):
             s0, losses[k] = s1, _split(weight * lost)
             work[k] = work[k - 1] + weight @ mean * dq
         here = law.traction(state)
+        if k in peaks:
+            here = law.breaking(s0, peaks[k])
         force[k], load[k], stored[k] = weight @ here, weight @ s0, weight @ law.stored(state)
         elastic = length * force[k] / (static * load[k]) if static * load[k] > 0 else 0.0
         slip[k] = slide[k] - elastic
@@ -194,6 +197,13 @@ def _rigid(scene, patch, time, slide, frames):
             local.append(slide[k] - length * np.divide(here, limit, out=np.zeros_like(here), where=limit > 0))
     return (force, load, slip, ledger_of(work, stored, losses), np.array(sorted(pick)), np.array(tau),
             np.array(local))
+
+
+def _ends_of_rest(slide) -> dict:
+    """Sample -> sign of the motion that starts there: the first sample of a slide and the last of every rest."""
+    moves = np.sign(np.diff(slide))
+    ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))
+    return {int(k): float(moves[k]) for k in ends}
 
 
 def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:

@@ -9,6 +9,7 @@ from numba import njit
 
 from .dynamics.kernels import accelerations, free_slide, move, step_energy, stored
 from .friction.kernels import grow
+from .friction.slide_kernels import rigid_path
 from .simulate_step_kernels import (
     COULOMB,
     JENKINS,
@@ -121,6 +122,9 @@ def follow_path(path, dt, kind, c, work, goal, burnt, forces):
     dissipated in the step that follows, energy stored at the sample. Returns the steps that did not converge.
     """
     bad = 0
+    if kind == POINTS and c.b.size == 0:
+        rigid_path(path, dt, c.weight, c.bonds, c.source, c.growth, work.eps, burnt, forces)
+        return bad
     for i in range(path.size):
         force, energy, slip = contact_state(kind, c, path[i], 0.0)
         forces[i, 0], forces[i, 2], burnt[i, 1] = force, slip, energy

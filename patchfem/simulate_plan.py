@@ -55,14 +55,16 @@ def plan(scene, per_point: bool = False) -> Plan:
         engine, steps, more = _rig_cost(scene, per_point, unknowns)
         seconds += more
     elif scene.kind == "bench":
+        from .simulate_load import refined, varies
         from .simulate_slide import lateral_corners, path_of, steps_of
 
         if lateral_corners(scene) is not None:
             from .simulate_plane import refuse
 
             refuse(scene)
-        engine = "bench"
-        steps = path_of(scene, steps_of(scene))[0].size * 2
+        engine, per_cycle = "bench", steps_of(scene)
+        time, slide = path_of(scene, per_cycle)[:2]
+        steps = 2 * (refined(scene, time, slide, per_cycle)[0] if varies(scene) else time).size
         seconds += 6e-5 * steps
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))

@@ -273,3 +273,23 @@ def test_exact_results_of_both_kinds_are_written(tmp_path, kind):
     assert abs(peak.value - 0.3 * best) <= peak.error < 1e-3 * peak.value
     assert abs(end.value - 0.3 * last) <= max(end.error, 1e-9)
     assert "drift_per_cycle" not in result.measures
+
+
+def test_exact_coulomb_breaks_away_at_its_static_friction():
+    """At the first instant and after a rest the force is mu_s N, while sliding mu_k N; the work knows only mu_k."""
+    run_ = sliding(POINT + COULOMB + "kinetic = 0.2\n" + DWELL)
+    load, force = run_.load[0], run_.force
+    moves = np.diff(run_.slide) > 0
+    ends = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
+    assert ends.size == 2 and force[ends] == pytest.approx(0.3 * load, rel=1e-14)
+    assert np.delete(force, ends) == pytest.approx(0.2 * load, rel=1e-14)
+    assert run_.values["friction_ratio_peak"] == pytest.approx(0.3) and run_.values["friction_ratio_end"] == 0.2
+    assert run_.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
+
+
+def test_exact_the_printed_law_warns_where_bonds_break_before_they_ripen():
+    """a = ell/eps at 1 mm/s: 1/ell = a_s/v^2 + 1/l_k, with l_k = 1 um and eps_k = 1 um about 1; l_k = 0.1 um: 0.1."""
+    fast = POINT + NONLOCAL + 'reading = "report"\n' + DWELL
+    found = [run(plan(loads(fast, sets=sets))).warnings for sets in ([], ["friction.slip_growth=0.1 um"],
+                                                                     ["friction.reading=stretch"])]
+    assert [any("ripen" in line for line in lines) for lines in found] == [True, False, False]

@@ -33,6 +33,18 @@ class Bonds:
         return self.rest_growth is not None
 
 
+def ripening(law: Bonds, speed: float) -> float:
+    """Path in which a bond that starts from nothing ripens (2.10), over its steady length (2.11), at a speed [m/s].
+
+    In the report reading friction is mu (eps/eps_0) G(a; p) with this a, so 2.18-2.21 hold where a is small: within
+    1.5 % up to 0.1 for p = 0 and 1; for a beyond 1 the friction itself fades away.
+    """
+    if not law.grows or speed == 0:
+        return 0.0
+    slow, fast = law.rest_growth / speed**2, 1 / law.slip_growth
+    return 1 / ((slow + fast) * law.length * (slow + law.ratio * fast) / (slow + fast))
+
+
 def elastic_part(law: Bonds, play, dq, eps):
     """(elastic, damaging) parts of the increment dq and the play after it; play, dq scalars or (m,) [m].
 

@@ -22,9 +22,13 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Coulomb:
-    """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept."""
+    """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept.
+
+    `static` is what the contact carries at the instant a rest ends (`breaking`); it does no work.
+    """
 
     kinetic: float
+    static: float | None = None
     at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
 
     def start(self, sigma):
@@ -42,6 +46,10 @@ class Coulomb:
         """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
         held = np.clip(state, -self.kinetic * s1, self.kinetic * s1)
         return Step(held, np.zeros_like(held), held)
+
+    def breaking(self, sigma, direction: float):
+        """Traction (m,) [Pa] under sigma at the instant a rest ends in a motion of this sign."""
+        return (self.kinetic if self.static is None else self.static) * sigma * direction
 
     def traction(self, state):
         """Traction (m,) [Pa] at the end of the last step."""
