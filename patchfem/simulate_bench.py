@@ -60,10 +60,11 @@ def bonds_of(scene) -> Bonds:
                  f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds)
 
 
-def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
-    """Slide the interface of a scene along its path with `steps` per cycle; patch None for [normal]."""
+def run(scene, patch, steps: int, frames: int = 0, say=None, path=None) -> BenchRun:
+    """Slide the interface of a scene along its path with `steps` per cycle, or along `path` in the form of `path_of`;
+    patch None for [normal]."""
     begin = perf_counter()
-    time, slide, first, omega = path_of(scene, steps)
+    time, slide, first, omega = path_of(scene, steps) if path is None else path
     if scene.contact is not None and scene.contact.gives_way:
         out = _with_shear(scene, patch, time, slide, frames, say)
     else:
