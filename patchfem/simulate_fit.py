@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .core import Outcome, PatchfemError
+from .core import NotConverged, Outcome, PatchfemError
 from .identify.least_squares import Fit, fit
 from .identify.words import remarks
 from .quantities import KINDS
@@ -73,7 +73,12 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
     def residual(values):
         return (bench(values) - loop.reading)[~held] / scale
 
-    found, step_error = _refined(bench, residual, wanted, scene, say)
+    try:
+        found, step_error = _refined(bench, residual, wanted, scene, say)
+    except NotConverged:
+        if bench.made == 0:
+            raise bench.refused from None
+        raise
     model = bench(found.values)
     miss = model - loop.reading
     rms = [float(np.sqrt(np.mean(miss[rows]**2))) if rows.any() else None for rows in (~held, held)]

@@ -27,6 +27,7 @@ class Model:
         steps, legs = scene.accuracy.steps_per_cycle, loop.reading.size - 1
         self.pinned = steps is not None
         self.pieces = max(1, -(-steps // legs)) if self.pinned and not self.exact else 1
+        self.refused, self.made = None, 0
         self.patch, self.moving = None, any(key.startswith("contact.") for key in named)
 
     def __call__(self, values) -> np.ndarray:
@@ -34,6 +35,7 @@ class Model:
         from . import simulate_bench
 
         scene = self.scene_at(values)
+        self.made += 1
         patch = self._patch(scene)
         corner = np.arange(self.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
@@ -53,6 +55,7 @@ class Model:
         try:
             return loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
         except SceneError as error:
+            self.refused = self.refused or error
             raise PatchfemError(error.mistakes[0]) from None
 
     def _patch(self, scene):
