@@ -70,7 +70,7 @@ def weight_across(relative_distance):
 def growth_factor(share, order=1.0) -> float:
     """Steady friction of bonds that grow from zero (2.10 as printed) over that of full-grown ones (2.18).
 
-    G(a; p) = int_0^inf phi_p(s/(1 - e^(-s/a))) ds, a = share = ell/eps with 1/ell = a_s/v^2 + 1/l_k: the path over which
+    G(a; p) = int_0^inf phi_p(s/(1 - e^(-s/a))) ds, a = share = ell/eps with 1/ell = a_s/v^2 + 1/l_k: the path on which
     a bond ripens, in bond lengths. G(0; p) = 1 and G(p; p) = 1; it falls like e^-a for bonds that break unripe.
     ValueError for a < 0 or p <= -1. To 1e-12, by adaptive quadrature between the scales of the integrand.
     """
