@@ -92,11 +92,12 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
 def _refined(bench, residual, wanted, scene, say) -> tuple:
     """(fit, change of the model when its steps are halved); steps are halved until they change the fit too little."""
     low, high = [one.low for one in wanted], [one.high for one in wanted]
-    start, starts, before = _own_values(scene, wanted), 3, (0, 0, "")
+    start, starts, before, agreed = _own_values(scene, wanted), 3, (0, 0, ""), 0
     while True:
-        found = fit(residual, low, high, start=start, starts=starts)
-        found = replace(found, evaluations=found.evaluations + before[0], failures=found.failures + before[1],
-                        reason=before[2] or found.reason)
+        found = fit(residual, low, high, start=start, starts=starts, bars=bench.exact)
+        agreed = found.agreed if starts > 1 else agreed
+        found = _counted(found, before)
+        before = (found.evaluations, found.failures, found.reason)
         if bench.exact:
             return found, 0.0
         coarse = bench(found.values)
@@ -105,10 +106,17 @@ def _refined(bench, residual, wanted, scene, say) -> tuple:
         change, peak = float(np.abs(fine - coarse).max()), float(np.abs(fine).max())
         if bench.pinned or change <= 0.1 * scene.accuracy.tolerance * peak or bench.pieces >= MOST_PIECES:
             bench.pieces //= 2
-            return found, change
+            last = _counted(fit(residual, low, high, start=found.values, starts=1), before)
+            return replace(last, agreed=agreed), change
         if say:
             say(f"{bench.pieces} steps between two rows")
-        start, starts, before = found.values, 1, (found.evaluations, found.failures, found.reason)
+        start, starts = found.values, 1
+
+
+def _counted(found: Fit, before: tuple) -> Fit:
+    """The fit with the evaluations, failures and first reason of the fits before it."""
+    return replace(found, evaluations=found.evaluations + before[0], failures=found.failures + before[1],
+                   reason=before[2] or found.reason)
 
 
 def _own_values(scene: Scene, wanted: list) -> list:

@@ -26,6 +26,13 @@ class Answer:
     unknown: np.ndarray
 
 
+def nothing(n: int) -> Answer:
+    """An Answer that was not asked for."""
+    nan = np.full((n, n), np.nan)
+    return Answer(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
+                  np.zeros((0, n)))
+
+
 def intervals(model: Counted, u, cost: float, descend: Callable) -> Answer:
     """The Answer at the least squares u (n,) of sum of squares `cost`; descend settles the other values of a profile.
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
-from .intervals import Answer, intervals
+from .intervals import Answer, intervals, nothing
 from .space import Counted, space, spread_points
 
 MOST = 100  # evaluations of one descent, Jacobians not counted
@@ -47,12 +47,13 @@ class Fit:
     outcome: Outcome
 
 
-def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3) -> Fit:
+def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: bool = True) -> Fit:
     """Values within [low, high] (n,) that minimise the sum of squares of residual(values (n,)) -> (r,).
 
-    log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most. A residual
-    that raises a PatchfemError or is not finite is a failed evaluation, counted and passed over. ValueError for bad
-    bounds or fewer rows than values, NotConverged where every start fails.
+    log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
+    `start` alone where it works; bars=False leaves the intervals NaN and looks for no bound or unknown. A residual that
+    raises a PatchfemError or is not finite is a failed evaluation, counted and passed over. ValueError for bad bounds
+    or fewer rows than values, NotConverged where every start fails.
     """
     box = space(low, high, log)
     model, n = Counted(residual, box), box.low.size
@@ -67,8 +68,11 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3) ->
             break
     u, cost, done = min(found, key=lambda one: one[1])
     agreed = sum(abs(other[1] - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
-    u, cost = _onto_bounds(model, u, cost)
-    answer = intervals(model, u, cost, descend)
+    if bars:
+        u, cost = _onto_bounds(model, u, cost)
+        answer = intervals(model, u, cost, descend)
+    else:
+        answer = nothing(n)
     rms = float(np.sqrt(cost / model.rows))
     return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done else Outcome.NOT_CONVERGED)
 
@@ -84,6 +88,8 @@ def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome:
 def _starts(model: Counted, own, count: int) -> list:
     """The own start, where it works, then the best of a set that fills the cube."""
     n = model.space.low.size
+    if count == 1 and own is not None and model(own) is not None:
+        return [own]
     scored = []
     for u in spread_points(8 * n, n):
         r = model(u)
