@@ -12,9 +12,10 @@ Read the package in the order of the physics; each stage imports `core` and itse
 8. `structure`   the modes of the rig
 9. `dynamics`    exact events and the march in time
 10. `response`    measures of a run and their errors
-11. `export`     summary, netCDF, VTK, report
-12. `closed_forms` exact answers that tests, studies and users share
-13. `simulate`   the page where the stages meet
+11. `identify`   values of a scene from measurements, with intervals
+12. `export`     summary, netCDF, VTK, report
+13. `closed_forms` exact answers that tests, studies and users share
+14. `simulate`   the page where the stages meet
 """
 
 __version__ = "0.2.0"

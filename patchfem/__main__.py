@@ -19,7 +19,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
 Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
-NOT_BUILT = ("sweep", "fit", "profile", "compare", "report", "import", "demo", "new",
+NOT_BUILT = ("sweep", "profile", "compare", "report", "import", "demo", "new",
              "schema", "doctor", "cite")
 
 
@@ -203,6 +203,34 @@ def cost(scene: Path, /, *, over: str = "", out: Annotated[Path | None, Paramete
         print(json.dumps(answer))
 
 
+@app.command
+def fit(scene: Path, /, *, to: Path, free: Annotated[tuple[str, ...], Parameter(negative=())],
+        hold: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+        out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None, set_: Sets = (),
+        json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
+        quiet: Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())] = False):
+    """Fit keys of SCENE (--free table.key=low..high,...) to the measured loop --to FILE; rows that --hold names
+    (column=value,...) are only predicted."""
+    found = _scene(scene, set_)
+    from .simulate_fit import fit_loop
+    from .simulate_fit_files import fit_into
+
+    fitted = fit_loop(found, to, free, hold, None if quiet else say)
+    target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
+    answer = fit_into(fitted, target)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        from .export.fit import lines_of
+
+        print("\n".join(lines_of(answer)))
+        for text in answer["warnings"]:
+            say(f"warning: {text}")
+        print(f"results: {target}")
+    if answer["outcome"] == "not_converged":
+        raise NotReached
+
+
 MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak",
         "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
 
@@ -257,7 +285,7 @@ def _guarded(words: list) -> int:
         return 130
     try:
         if words and words[0] in NOT_BUILT:
-            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, mesh, "
+            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, fit, mesh, "
                           "export, view")
         app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()

@@ -6,9 +6,12 @@ Vibration is written for one mode under a base acceleration a sin: r = drive ove
 and input a in the same unit (an acceleration, or a force over the same mass), motions as a multiple of a/omega_n^2.
 """
 
+from itertools import pairwise
+
 import numpy as np
+from scipy.integrate import quad
 from scipy.optimize import brentq
-from scipy.special import gamma, gammainc, gammaincc, hyp1f1
+from scipy.special import gamma, gammainc, gammaincc, gammaln, hyp1f1, xlogy
 
 from .closed_contact import (  # noqa: F401  (one door for users: contact forms are read from here too)
     cattaneo_shear,
@@ -42,6 +45,46 @@ COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven a
 def _reading(reading):
     if reading not in ("stretch", "report"):
         raise ValueError(f"reading must be 'stretch' or 'report', got {reading!r}")
+
+
+def weight_along(relative_path, order=1.0):
+    """Weight of a bond along the path (eq. 2.14, Fig. 13): x^p e^-x/p!, x = R/eps >= 0; unit area, largest at x = p.
+
+    For -1 < p < 0 it is infinite at x = 0. ValueError for p <= -1 or a path < 0.
+    """
+    x = np.asarray(relative_path, float)
+    if order <= -1:
+        raise ValueError(f"order must exceed -1, got {order}")
+    if np.any(x < 0):
+        raise ValueError("a path is never negative (2.9)")
+    with np.errstate(divide="ignore"):
+        return np.exp(xlogy(order, x) - x - gammaln(order + 1))
+
+
+def weight_across(relative_distance):
+    """Weight of a bond perpendicular to the path (eq. 2.15, Fig. 14): e^(-y^2/2)/sqrt(2 pi), y = eta/rho; unit area
+    over y, so 2.16 divides by rho."""
+    return np.exp(-np.asarray(relative_distance, float)**2 / 2) / np.sqrt(2 * np.pi)
+
+
+def growth_factor(share, order=1.0) -> float:
+    """Steady friction of bonds that grow from zero (2.10 as printed) over that of full-grown ones (2.18).
+
+    G(a; p) = int_0^inf phi_p(s/(1 - e^(-s/a))) ds, a = share = ell/eps with 1/ell = a_s/v^2 + 1/l_k: the path on which
+    a bond ripens, in bond lengths. G(0; p) = 1 and G(p; p) = 1; it falls like e^-a for bonds that break unripe.
+    ValueError for a < 0 or p <= -1. To 1e-12, by adaptive quadrature between the scales of the integrand.
+    """
+    if share < 0:
+        raise ValueError(f"share must not be negative, got {share}")
+    weight_along(1.0, order)  # refuses the order
+    if share == 0:
+        return 1.0
+    ends = [share * 4.0**k for k in range(-2, 30)] + [1.0, *(order + 4.0 * 3.0**k for k in range(4))]
+    last = order + 40 + 12 * np.sqrt(order + 40)
+    cuts = np.unique([0.0, last, *(end for end in ends if 0 < end < last)])
+    parts = [quad(lambda s: float(weight_along(s / -np.expm1(-s / share) if s > 0 else share, order)), a, b,
+                  epsabs=0.0, epsrel=1e-13, limit=200)[0] for a, b in pairwise(cuts)]
+    return float(np.sum(parts))
 
 
 def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):

@@ -43,7 +43,8 @@ class SceneError(Exception):
 
 @dataclass(frozen=True)
 class Scene:
-    """A valid scene in SI: its tables (None where absent), the kind of run, its text and remarks on unused keys."""
+    """A valid scene in SI: its tables (None where absent), the kind of run, its text, remarks on unused keys and the
+    --set strings that were applied."""
 
     path: Path
     text: str
@@ -59,6 +60,7 @@ class Scene:
     accuracy: tables.Accuracy
     measured: tables.Measured | None
     remarks: list[str]
+    sets: tuple[str, ...] = ()
 
     def tables(self) -> tables.Tables:
         """All tables as one model, absent ones None."""
@@ -125,6 +127,7 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) 
         raw = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError([_syntax(error, text, path)]) from None
+    sets = tuple(sets)
     draft = Draft(str(path), key_lines(text), raw)
     for one in sets:
         apply_set(draft, one)
@@ -140,7 +143,7 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) 
     if draft.mistakes:
         raise SceneError(draft.lines_of_mistakes())
     values = {name: getattr(found, name) for name in tables.Tables.model_fields}
-    return Scene(path=Path(path), text=text, kind=kind, remarks=draft.remarks, **values)
+    return Scene(path=Path(path), text=text, kind=kind, remarks=draft.remarks, sets=sets, **values)
 
 
 def _syntax(error: Exception, text: str, path: str | Path) -> str:

@@ -72,15 +72,16 @@ def bonds_of(scene) -> Bonds:
                  f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds, f.breakaway)
 
 
-def run(scene, patch, steps: int, frames: int = 0, say=None) -> BenchRun:
-    """Slide the interface of a scene along its path with `steps` per cycle; patch None for [normal]."""
+def run(scene, patch, steps: int, frames: int = 0, say=None, path=None) -> BenchRun:
+    """Slide the interface of a scene along its path with `steps` per cycle, or along `path` in the form of `path_of`;
+    patch None for [normal]."""
     begin, sideways, more = perf_counter(), lateral_corners(scene) is not None, {}
     if sideways:
         from .simulate_plane import refuse, run_plane
 
         refuse(scene)
     scene = acting(scene)
-    time, slide, first, omega = path_of(scene, steps)
+    time, slide, first, omega = path_of(scene, steps) if path is None else path
     if varies(scene):
         start = time[first]
         time, slide = refined(scene, time, slide, steps)

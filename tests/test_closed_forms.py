@@ -66,6 +66,66 @@ def test_exact_steady_friction_of_2_18_and_2_11():
         assert exact.steady_shear(-1, 2.0, 0.6, share) == pytest.approx(-1.2 * bonds, rel=1e-9)
 
 
+@pytest.mark.parametrize("order", [-0.9, -0.5, 0.0, 0.4, 1.0, 2.0, 7.5])
+def test_figure_13_weight_along_the_path(order):
+    """2.14 by many-digit arithmetic; unit area; where p > 0 the largest value stands at R = p eps."""
+    for x in (1e-12, 0.03, 1.0, 2.5, 40.0):
+        with mpmath.workdps(30):
+            want = mpmath.mpf(x)**order * mpmath.exp(-mpmath.mpf(x)) / mpmath.gamma(order + 1)
+        assert exact.weight_along(x, order) == pytest.approx(float(want), rel=1e-13)
+    power = 1 / (order + 1)  # x = t^power takes the infinity at x = 0 away
+    area = quad(lambda t: exact.weight_along(t**power, order) * power * t**(power - 1), 0, 1)[0]
+    area += quad(lambda x: exact.weight_along(x, order), 1, np.inf)[0]
+    assert area == pytest.approx(1, abs=1e-10)
+    if order > 0:
+        top = exact.weight_along(order, order)
+        assert top > exact.weight_along(order * np.array([0.999, 1.001]), order).max() and \
+            top == pytest.approx(order**order * np.exp(-order) / gamma(order + 1), rel=1e-13)
+    assert exact.weight_along(0.0, order) == (np.inf if order < 0 else 1.0 if order == 0 else 0.0)
+
+
+def test_figure_14_weight_across_the_path():
+    """2.15 by many-digit arithmetic; unit area over eta/rho; 68.27 % of it within one rho."""
+    for y in (0.0, -0.3, 1.0, 4.0, 20.0):
+        with mpmath.workdps(30):
+            want = mpmath.exp(-mpmath.mpf(y)**2 / 2) / mpmath.sqrt(2 * mpmath.pi)
+        assert exact.weight_across(y) == pytest.approx(float(want), rel=1e-13)
+    assert quad(exact.weight_across, -np.inf, np.inf)[0] == pytest.approx(1, abs=1e-12)
+    assert quad(exact.weight_across, -1, 1)[0] == pytest.approx(float(mpmath.erf(1 / mpmath.sqrt(2))), abs=1e-14)
+    assert exact.weight_across(0) == pytest.approx(0.39894228, abs=1e-8)
+
+
+def test_refuses_weights_that_do_not_exist():
+    for bad in ((0.5, -1.0), (-0.1, 1.0)):
+        with pytest.raises(ValueError):
+            exact.weight_along(*bad)
+    for bad in ((-0.1, 1.0), (0.5, -1.0)):
+        with pytest.raises(ValueError):
+            exact.growth_factor(*bad)
+
+
+@pytest.mark.parametrize("share", [1e-6, 0.01, 0.1, 0.5, 1.0, 5.0, 10.0])
+@pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
+def test_exact_growth_factor_by_many_digit_quadrature(share, order):
+    def phi(s):
+        y = s / -mpmath.expm1(-s / share)
+        return y**order * mpmath.exp(-y)
+
+    cuts = sorted({0, share / 4, *(share * 4**k for k in range(6)), 1, 4, 12, order + 40, order + 120})
+    want = float(mpmath.quad(phi, cuts) / mpmath.gamma(order + 1))
+    assert exact.growth_factor(share, order) == pytest.approx(want, rel=1e-11)
+
+
+def test_exact_growth_factor_known_values():
+    """G(0; p) = G(p; p) = 1; 1 - G ~ (pi^2/6) a^2 for p = 0; digits computed twice by others."""
+    for p in (0.3, 1.0, 2.7, 6.0):
+        assert exact.growth_factor(0.0, p) == 1 and exact.growth_factor(p, p) == pytest.approx(1, abs=1e-12)
+    assert (1 - exact.growth_factor(1e-3, 0.0)) / 1e-6 == pytest.approx(np.pi**2 / 6, rel=2e-3)
+    for share, order, want in ((0.05, -0.5, 0.83711504), (0.2, 0, 0.95220888), (0.2, 1, 1.03361547),
+                               (5, 2, 0.21800048), (10, 1, 0.00093833)):
+        assert exact.growth_factor(share, order) == pytest.approx(want, abs=6e-9)
+
+
 @pytest.mark.parametrize("order", [-0.5, 0.0, 0.5, 1.0, 2.0])
 @pytest.mark.parametrize("initial", [0.0, 1.0, 0.4])
 def test_exact_virgin_force_is_the_sum_over_its_bonds(order, initial):

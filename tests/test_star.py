@@ -121,7 +121,7 @@ def cycles(tree: dict) -> list:
 
 def test_exact_the_package_is_a_star():
     tree = sources()
-    assert {"mesh", "contact", "friction", "structure", "dynamics", "response", "export"} <= stages_of(tree)
+    assert {"mesh", "contact", "friction", "structure", "dynamics", "response", "identify", "export"} <= stages_of(tree)
     assert faults(tree) == []
 
 
@@ -146,6 +146,8 @@ def test_exact_the_checker_sees_what_there_is():
     ("closed_forms", "from .friction.law import Bonds", "closed_forms imports friction.law"),
     ("core", "from .quantities import parse", "core imports quantities"),
     ("effects", "from . import simulate", "effects imports simulate"),
+    ("identify.least_squares", "from ..response.loops import Loop", "identify.least_squares imports response.loops"),
+    ("identify.words", "from .. import simulate_fit", "identify.words imports simulate_fit"),
     ("core", "import scipy", "core imports ['scipy']"),
 ])  # fmt: skip
 def test_refuses_a_breach(name, text, fault):
@@ -183,7 +185,7 @@ def test_exact_reading_order():
 def test_exact_reading_order_follows_the_physics():
     named = re.findall(r"^\d+\. `(\w+)`", patchfem.__doc__, re.M)
     chain = ["core", "scene", "effects", "mesh", "surface", "contact", "friction", "structure", "dynamics", "response",
-             "export", "closed_forms", "simulate"]
+             "identify", "export", "closed_forms", "simulate"]
     assert [name for name in named if name in chain] == chain
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..core import Missing, PatchfemError
 
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml", "fields.pvd",
-         "fields_frames")
+         "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml")
 LOCK = ".writer"
 
 

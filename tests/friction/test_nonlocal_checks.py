@@ -30,17 +30,6 @@ ONE = upper_pressure([1.0])
 OMEGA = 2 * np.pi * 143
 
 
-def growth_factor(a, p):
-    """G(a; p) = int_0^inf phi_p(s/(1 - e^-s/a)) ds by many-digit quadrature."""
-    def phi(s):
-        y = s / -mpmath.expm1(-s / a)
-        return y**p * mpmath.exp(-y)
-
-    cuts = sorted({0, a / 4, a, 4 * a, 1, p + 1, p + 4, p + 12, p + 40, p + 120})
-    return float(mpmath.quad(phi, cuts) / mpmath.gamma(p + 1))
-
-
-
 # ---- C1, C2: steady sliding
 
 @pytest.mark.parametrize("speed, printed, want", [
@@ -55,7 +44,7 @@ def test_exact_c1_steady_friction_with_every_bond_grown_from_zero(speed, printed
     assert 0.6 * eps / 2e-6 == pytest.approx(printed, abs=1e-6)
     ell = 1 / (10.0 / speed**2 + 1 / 0.2e-6)
     for p, mu in zip((-0.5, 0.0, 1.0, 2.0), want):
-        truth = 0.6 * eps / 2e-6 * growth_factor(ell / eps, p)
+        truth = 0.6 * eps / 2e-6 * closed_forms.growth_factor(ell / eps, p)
         assert truth == pytest.approx(mu, abs=1e-6)
         law = Bonds(0.6, 2e-6, p, "report", 0.7, 10.0, 0.2e-6, 1e-9, 0.0)
         assert settled_at(law, speed, ell) == pytest.approx(truth, abs=1e-12)
@@ -77,7 +66,7 @@ def settled_at(law, speed, ell):
                                         (0.5, 1, 1.07542363), (1, 2, 1.14354323)])
 def test_exact_c2_growth_factor(a, p, want):
     """Bonds that grow from zero to eps_0 over the path a eps_0 carry G(a; p) of the full friction; G(p; p) = 1."""
-    truth = growth_factor(a, p)
+    truth = closed_forms.growth_factor(a, p)
     assert truth == pytest.approx(want, abs=1e-8)
     law = Bonds(1.0, 1.0, float(p), "report", 1.0, 1e-300, float(a), 1e-3, 0.0)
     assert settled_at(law, 1.0, a) == pytest.approx(truth, abs=1e-12)

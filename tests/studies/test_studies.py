@@ -70,3 +70,20 @@ def test_always_the_fixture_decides_the_contact_fraction():
         assert fixtures.tilt_for(0.5, spring, 14) == pytest.approx(half, rel=0.03)
     assert fixtures.case(1e-3, 1e2)["contact_fraction"] == 1
     assert fixtures.case(1e-3, None)["contact_fraction"] < 0.03
+
+
+def test_figure_13_curves_of_the_study(tmp_path):
+    rows = {row["order"]: row for row in study("figures/figure_13.py").main(tmp_path / "figure.svg")}
+    assert list(rows) == [-0.5, 0.0, 1.0, 2.0]
+    assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
+    assert [rows[p]["top_at"] for p in (0.0, 1.0, 2.0)] == [0, 1, 2]
+    assert (rows[1]["top"], rows[2]["top"]) == pytest.approx((0.3679, 0.2707), abs=5e-5)
+    assert [row["nine_tenths"] for row in rows.values()] == pytest.approx([1.35, 2.30, 3.89, 5.32], abs=5e-3)
+    assert "<svg" in (tmp_path / "figure.svg").read_text()
+
+
+def test_figure_14_curve_of_the_study(tmp_path):
+    rows = study("figures/figure_14.py").main(tmp_path / "figure.svg")
+    assert [weight for _, weight, _ in rows] == pytest.approx([0.3989, 0.2420, 0.0540, 0], abs=5e-5)
+    assert [share for *_, share in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
+    assert "<svg" in (tmp_path / "figure.svg").read_text()

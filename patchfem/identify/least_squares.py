@@ -1,0 +1,144 @@
+"""Least squares of a residual within bounds: values, 95 % intervals, and what the rows do not determine.
+
+The search runs in the unit cube of the bounds (logarithms where they are positive and wide) from several starts, the
+same every time. The intervals are those of the linearised problem (Student t with rows - values degrees of freedom);
+where the residual is not linear over them, and at a bound, they come from the profile of the sum of squares.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from ..core import NotConverged, Outcome, frozen_array
+from .intervals import Answer, intervals, nothing
+from .space import Counted, space, spread_points
+
+MOST = 100  # evaluations of one descent, Jacobians not counted
+EXACT = 1e-9  # of the largest residual seen: an answer this good needs no other start
+NEAR = 1e-3  # of the range: a value this close to a bound is tried on it
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fit:
+    """values (n,); intervals (n, 2): 95 %, NaN where the rows do not determine a value; methods (n,):
+    "linear", "profile" or "none"; open_ends (n, 2): an end that is only the bound. correlation (n, n), NaN likewise.
+
+    rms: root mean square of the residual; sensitivity (n,): rms change of the residual per range of a value;
+    at_bound (n,): "low", "high" or ""; unknown (d, n): directions of relative change (of change over range where a
+    value is 0) that leave the residual as it is; failures and reason: evaluations that failed, and the first cause;
+    agreed: descents that ended at the same sum of squares.
+    """
+
+    values: np.ndarray
+    intervals: np.ndarray
+    methods: tuple
+    open_ends: np.ndarray
+    correlation: np.ndarray
+    rms: float
+    sensitivity: np.ndarray
+    at_bound: tuple
+    unknown: np.ndarray
+    evaluations: int
+    failures: int
+    reason: str
+    agreed: int
+    outcome: Outcome
+
+
+def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: bool = True) -> Fit:
+    """Values within [low, high] (n,) that minimise the sum of squares of residual(values (n,)) -> (r,).
+
+    log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
+    `start` alone where it works; bars=False leaves the intervals NaN and looks for no bound or unknown. A residual that
+    raises a PatchfemError or is not finite is a failed evaluation, counted and passed over. ValueError for bad bounds
+    or fewer rows than values, NotConverged where every start fails.
+    """
+    box = space(low, high, log)
+    model, n = Counted(residual, box), box.low.size
+    begins = _starts(model, None if start is None else box.unit(start), starts)
+    if model.rows < n:
+        raise ValueError(f"{model.rows} rows cannot determine {n} values")
+    everything = list(range(n))
+    found = []
+    for begin in begins:
+        found.append(descend(model, begin, everything))
+        if found[-1][1] <= (EXACT * model.largest)**2 * model.rows:
+            break
+    u, cost, done = min(found, key=lambda one: one[1])
+    agreed = sum(abs(other[1] - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
+    if bars:
+        u, cost = _onto_bounds(model, u, cost)
+        answer = intervals(model, u, cost, descend)
+    else:
+        answer = nothing(n)
+    rms = float(np.sqrt(cost / model.rows))
+    return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done else Outcome.NOT_CONVERGED)
+
+
+def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome: Outcome) -> Fit:
+    sides = tuple("low" if x <= 0 else "high" if x >= 1 else "" for x in u)
+    return Fit(frozen_array(model.space.values(u)), frozen_array(answer.ends), answer.methods,
+               frozen_array(answer.open_ends, bool), frozen_array(answer.correlation), rms,
+               frozen_array(answer.sensitivity), sides, frozen_array(answer.unknown), model.evaluations,
+               model.failures, model.reason, agreed, outcome)
+
+
+def _starts(model: Counted, own, count: int) -> list:
+    """The own start, where it works, then the best of a set that fills the cube."""
+    n = model.space.low.size
+    if count == 1 and own is not None and model(own) is not None:
+        return [own]
+    scored = []
+    for u in spread_points(8 * n, n):
+        r = model(u)
+        if r is not None:
+            scored.append((float(r @ r), len(scored), u))
+    best = [u for _, _, u in sorted(scored, key=lambda one: one[:2])]
+    if own is not None and model(own) is not None:
+        best = [own, *best]
+    if not best:
+        raise NotConverged(f"the model failed at every one of {model.evaluations} starts: {model.reason}")
+    return best[:max(1, count)]
+
+
+def descend(model: Counted, u, free) -> tuple:
+    """(u, sum of squares, whether it settled) from u, moving the coordinates `free` alone."""
+    u, free = np.array(u, float), list(free)
+    here = model(u)
+    if not free or here is None:
+        return u, np.inf if here is None else float(here @ here), here is not None
+
+    def whole(part):
+        out = u.copy()
+        out[free] = part
+        return out
+
+    begin = np.clip(u[free], 1e-3, 1 - 1e-3)
+    if model(whole(begin)) is None:
+        begin = np.clip(u[free], 1e-9, 1 - 1e-9)
+        if model(whole(begin)) is None:
+            return u, float(here @ here), False
+    size = max(float(np.abs(model.penalised(whole(begin))).max()), 1e-300)
+    found = least_squares(lambda p: model.penalised(whole(p)) / size, begin, bounds=(0, 1), method="trf",
+                          jac=lambda p: model.jacobian(whole(p), free) / size, ftol=1e-10, xtol=1e-9, gtol=1e-15,
+                          max_nfev=MOST)
+    end = whole(found.x)
+    last = model(end)
+    if last is None or last @ last > here @ here:
+        return u, float(here @ here), found.status > 0
+    return end, float(last @ last), found.status > 0
+
+
+def _onto_bounds(model: Counted, u, cost: float) -> tuple:
+    """Values pressed against a bound are put on it and the others settled once more, where that is no worse."""
+    r = model(u)
+    pull = model.jacobian(u, range(u.size)).T @ r
+    near = [i for i in range(u.size) if (u[i] < NEAR and pull[i] > 0) or (u[i] > 1 - NEAR and pull[i] < 0)]
+    if not near:
+        return u, cost
+    on = u.copy()
+    on[near] = np.round(u[near])
+    on, settled, _ = descend(model, on, [i for i in range(u.size) if i not in near])
+    return (on, settled) if settled <= cost * (1 + 1e-9) else (u, cost)

@@ -1,0 +1,35 @@
+"""What a fit did not determine, as sentences with the names of the values."""
+
+import numpy as np
+
+from .least_squares import Fit
+
+
+def remarks(found: Fit, names) -> list:
+    """One sentence each for values on a bound, without effect, known only in a combination, or open to a bound."""
+    out = [f"{names[i]} is at its {side} bound {found.values[i]:.6g}: widen the range or doubt the law"
+           for i, side in enumerate(found.at_bound) if side]
+    told = {i for row in found.unknown for i in np.flatnonzero(row)}
+    out += [_combination(row, names) for row in found.unknown]
+    for i, name in enumerate(names):
+        if np.isfinite(found.intervals[i]).all():
+            if found.open_ends[i].any() and not found.at_bound[i]:
+                side = "low" if found.open_ends[i, 0] else "high"
+                out.append(f"{name}: the rows do not rule out its {side} bound")
+        elif found.sensitivity[i] <= 1e-9 * max(float(np.max(found.sensitivity)), found.rms):
+            out.append(f"{name} has no effect on the rows: it is not determined")
+        elif i not in told:
+            out.append(f"{name} is not determined: the rows allow the whole of its range")
+    if found.failures:
+        out.append(f"{found.failures} of {found.evaluations} evaluations failed and were passed over, the first: "
+                   f"{found.reason}")
+    return out
+
+
+def _combination(row, names) -> str:
+    used = np.flatnonzero(row)
+    changes = ", ".join(f"{names[i]} by {row[i]:+.3g} %" for i in used)
+    known = ""
+    if used.size == 2 and abs(abs(row[used[0]]) - abs(row[used[1]])) < 2e-3:
+        known = f": only their {'product' if row[used[0]] * row[used[1]] < 0 else 'ratio'} is known"
+    return f"{' and '.join(names[i] for i in used)} cannot be told apart ({changes} changes nothing){known}"

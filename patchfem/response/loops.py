@@ -1,0 +1,76 @@
+"""A measured friction loop: displacement and force row by row, with time and labels where the table has them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..core import PatchfemError
+from .columns import read_columns
+from .paths import BESIDE, UNITS, rising
+
+HEADER = "time [s],displacement [um],force [N]"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Loop:
+    """time (k,) [s] or None; displacement (k,) [m], 0 in the first row; reading (k,): `quantity` "force" [N] or
+    "friction_ratio" [1]; labels: name -> k texts of the columns without a unit."""
+
+    path: Path
+    time: np.ndarray | None
+    displacement: np.ndarray
+    reading: np.ndarray
+    quantity: str
+    labels: dict
+
+    def rows_of(self, hold: str) -> np.ndarray:
+        """(k,) whether a row's label is among those of `column=value,value`; numbers are compared as numbers.
+
+        PatchfemError for a column that is not there and for a value that no row has.
+        """
+        name, equals, text = (part.strip() for part in hold.partition("="))
+        wanted = [one.strip() for one in text.split(",")]
+        if not equals or not all(wanted):
+            raise PatchfemError(f"--hold {hold}: column=value,value is wanted, such as cycle=1,2")
+        if name not in self.labels:
+            known = ", ".join(self.labels) or "none"
+            raise PatchfemError(f"--hold {name}: no such column without a unit in {self.path} (there: {known})")
+        there = [_plain(cell) for cell in self.labels[name]]
+        absent = [one for one in wanted if _plain(one) not in there]
+        if absent:
+            known = ", ".join(dict.fromkeys(self.labels[name]))
+            raise PatchfemError(f"--hold {name}={','.join(absent)}: no row of {self.path} has it (there: "
+                                f"{known[:200]})")
+        kept = {_plain(one) for one in wanted}
+        return np.array([cell in kept for cell in there])
+
+
+def read_loop(path, units: Mapping = UNITS) -> Loop:
+    """The Loop of a CSV whose header is like `time [s],displacement [um],force [N]`; time may be absent, a column
+    friction_ratio stands in for force. The displacement is counted from its first row.
+
+    PatchfemError names file and line of a mistake, Missing where there is no file.
+    """
+    path = Path(path)
+    found = read_columns(path, {**BESIDE, **units}, ("displacement",), HEADER, "a measured loop")
+    read = [name for name in BESIDE if name in found.values]
+    if len(read) != 1:
+        raise PatchfemError(f"{path}:1: " + ("force and friction_ratio stand side by side: keep one" if read else
+                            f"no column force, a header like `{HEADER}` is wanted (or friction_ratio for the force)"))
+    place, time = found.values["displacement"], found.values.get("time")
+    if time is not None:
+        rising(path, time)
+    if not np.ptp(place):
+        raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
+    if not found.values[read[0]].any():
+        raise PatchfemError(f"{path}: {read[0]} is 0 in every row, so there is nothing to fit")
+    return Loop(path, time, place - place[0], found.values[read[0]], read[0], found.labels)
+
+
+def _plain(text: str):
+    try:
+        return float(text)
+    except ValueError:
+        return text

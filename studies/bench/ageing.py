@@ -1,0 +1,96 @@
+"""How does a contact age at rest, and what does it show when it breaks away? `ageing.svg`, and its numbers.
+
+In the stretch reading the force at rest never moves; only the bond length grows, eps_d = eps_0 - (eps_0 - eps_k) times
+exp(-a_s t/v_h) (2.10 with the floor v_h under the speed), and the peak after the rest with it. So ageing is exponential
+with the one time v_h/a_s, here 0.5 s: half of it by 0.35 s, nine tenths by 1.15 s, none after some seconds; a contact
+that ages with log t over decades does not follow 2.10. The peak stays below mu_s eps_d/eps_0 because the bonds shrink
+again on the way: of the rise that a full rest promises 28 % shows with l_k = 0.5 eps_0, 68 % with 5 eps_0, 92 % with
+50 eps_0. As printed, the force of the resting contact itself rises with no motion, from 0.517 to 1.000 of mu_s N in
+10 s (l_k = 0.1 eps_0, p = 1).
+
+Run: python studies/bench/ageing.py
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from patchfem import scene, simulate_bench
+from patchfem.closed_forms import steady_bond_length
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+
+HERE = Path(__file__).parent
+HOLDS = tuple(10.0 ** np.linspace(-2, 1, 10))
+LENGTH, RATIO, STATIC, REST, FLOOR, SPEED = 2e-6, 0.5, 0.3, 2e-6, 1e-6, 1e-3
+SCENE = """
+[normal]
+load = "100 N"
+[friction]
+law = "nonlocal"
+static = 0.3
+kinetic = 0.15
+bond_length = "2 um"
+rest_growth = "2e-6 m/s^2"
+rest_speed = "1 um/s"
+[slide]
+kind = "dwell"
+speed = "1 mm/s"
+"""
+
+
+def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
+    """(before the rest, at its end, peak after it) over mu_s N for l_k = part eps_0, after a slide that has settled."""
+    sets = [f"slide.hold={float(hold)!r} s", f"slide.distance={(40 + 20 * part) * LENGTH!r} m",
+            f"slide.distance_after={20 * LENGTH!r} m", f"friction.slip_growth={part * LENGTH!r} m",
+            f"accuracy.steps_per_cycle={steps}", *more]
+    found = simulate_bench.run(scene.loads(SCENE, sets=sets), None, steps)
+    force = found.force / (STATIC * found.load[0])
+    rest = np.flatnonzero(np.diff(found.slide) == 0)
+    return force[rest[0]], force[rest[-1] + 1], force[rest[-1] + 1:].max()
+
+
+def aged(hold, part: float):
+    """Bond length over eps_0 after a rest, in closed form."""
+    slow = steady_bond_length(SPEED, LENGTH, RATIO, REST, part * LENGTH) / LENGTH
+    return 1 - (1 - slow) * np.exp(-REST * np.asarray(hold) / FLOOR)
+
+
+def main(holds=HOLDS, parts=(0.5, 5.0, 50.0), path: Path | None = HERE / "ageing.svg", steps: int = 2000) -> list:
+    """One dict per l_k (in eps_0) and rest: closed eps_d/eps_0, force before, at the end of and peak after the rest;
+    then of the law as printed, l_k = 0.1 eps_0, p = 1."""
+    rows = [{"part": part, "hold": float(hold), "aged": float(aged(hold, part)), "reading": "stretch",
+             **dict(zip(("before", "rested", "peak"), map(float, dwell(hold, part, steps=steps))))}
+            for part in parts for hold in holds]
+    printed = ("friction.reading=report", "friction.initial_bonds=0")
+    rows += [{"part": 0.1, "hold": float(hold), "aged": float(aged(hold, 0.1)), "reading": "report",
+              **dict(zip(("before", "rested", "peak"), map(float, dwell(hold, 0.1, *printed, steps=800))))}
+             for hold in (holds[0], holds[-1])]
+    for row in rows:
+        print(f"{row['reading']:<8} l_k = {row['part']:4g} eps_0, rest {row['hold']:7.3f} s: eps_d {row['aged']:.5f}, "
+              f"force {row['before']:.5f} -> {row['rested']:.5f}, peak {row['peak']:.5f}")
+    if path is not None:
+        draw(path, rows, parts)
+    return rows
+
+
+def draw(path: Path, rows: list, parts) -> None:
+    """Peaks of the stretch reading against the rest, below the closed form of the bond length."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(6.4, 3.6))
+        FigureCanvasSVG(figure)
+        axis, time = figure.subplots(), 10.0 ** np.linspace(-2, 1, 121)
+        axis.semilogx(time, aged(time, parts[-1]), color="0.2", label="ε_d/ε₀ (2.10 at rest)")
+        for part, colour in zip(parts, (GREY, ORANGE, BLUE)):
+            mine = [row for row in rows if row["part"] == part]
+            axis.semilogx([row["hold"] for row in mine], [row["peak"] for row in mine], "o-", color=colour, ms=4,
+                          label=f"peak, l_k = {part:g} ε₀")
+        axis.set(xlabel="rest [s]", ylabel="friction over μ_s N", title="Breakaway after a rest", ylim=(0.45, 1.05))
+        axis.legend()
+        figure.savefig(path, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""How does friction depend on speed in steady sliding, as benches compute it? `stribeck.svg`, and its numbers.
+
+The stretch reading gives the curve that 2.11 and 2.18-2.21 promise, a Lorentzian in the speed, mu_k + (mu_s - mu_k) /
+(1 + (v/v_c)^2) with v_c = sqrt(a_s l_k), to 1e-12 at every speed from 0.01 to 100 v_c, whatever the slip growth. The
+law as printed grows every bond from zero and so carries G(ell/eps; p) of it, 1/ell = a_s/v^2 + 1/l_k: fast sliding with
+l_k = 0.1 eps_0 changes 2.18 by +2.1 % (p = 1) and -2.7 % (p = 0); with l_k = eps_0 by -15 % and -63 %, so that there
+mu_k is not mu_s eps_k/eps_0 as 2.21 has it. The benches follow G to 2e-6.
+
+Run: python studies/bench/stribeck.py
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from patchfem import scene, simulate_bench
+from patchfem.closed_forms import growth_factor, steady_bond_length
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+
+HERE = Path(__file__).parent
+SHARES = 10.0 ** np.linspace(-2, 2, 9)  # v/v_c
+LENGTH, RATIO, STATIC, REST = 2e-6, 0.7, 0.6, 10.0
+SCENE = """
+[normal]
+load = "100 N"
+[friction]
+law = "nonlocal"
+static = 0.6
+kinetic = 0.42
+bond_length = "2 um"
+rest_growth = "10 m/s^2"
+initial_bonds = 0.0
+[slide]
+kind = "constant"
+[accuracy]
+tail = 1e-12
+"""
+
+
+def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -> float:
+    """Friction over load after so many bond lengths at a constant speed [m/s], ten steps each."""
+    sets = [f"slide.speed={speed!r} m/s", f"slide.distance={lengths * LENGTH!r} m", f"friction.slip_growth={slip!r} m",
+            f"friction.reading={reading}", f"friction.order={order}", "friction.rest_speed=1e-9 m/s"]
+    return simulate_bench.run(scene.loads(SCENE, sets=sets), None, 10 * lengths).values["friction_ratio_end"]
+
+
+def promised(speed: float, slip: float) -> float:
+    """2.18 with the bond length of 2.11."""
+    return STATIC * steady_bond_length(speed, LENGTH, RATIO, REST, slip) / LENGTH
+
+
+def grown(speed: float, slip: float, order: float) -> float:
+    """The same with every bond grown from zero."""
+    ell = 1 / (REST / speed**2 + 1 / slip)
+    return promised(speed, slip) * growth_factor(ell / steady_bond_length(speed, LENGTH, RATIO, REST, slip), order)
+
+
+def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = HERE / "stribeck.svg") -> list:
+    """One dict per slip growth (in eps_0) and speed (in v_c): promised, stretch, (computed, G) per printed order."""
+    rows = []
+    for part in slips:
+        slip = part * LENGTH
+        for share in shares:
+            speed = float(share * np.sqrt(REST * slip))
+            row = {"slip": part, "share": float(share), "promised": promised(speed, slip),
+                   "stretch": bench(speed, slip, "stretch", 1.0, 32)}
+            row |= {order: (bench(speed, slip, "report", order, 20), grown(speed, slip, order)) for order in (0, 1)}
+            rows.append(row)
+            print(f"l_k = {part:g} eps_0, v = {share:7.3g} v_c: promised {row['promised']:.6f}, stretch "
+                  f"{row['stretch']:.6f}, printed p = 0 {row[0][0]:.6f} (G {row[0][1]:.6f}), p = 1 {row[1][0]:.6f} "
+                  f"(G {row[1][1]:.6f})")
+    if path is not None:
+        draw(path, rows, slips)
+    return rows
+
+
+def draw(path: Path, rows: list, slips) -> None:
+    """One panel per slip growth: lines are closed forms, marks are benches."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 3.4))
+        FigureCanvasSVG(figure)
+        for axis, part in zip(figure.subplots(1, len(slips), sharey=True, squeeze=False)[0], slips):
+            slip, mine = part * LENGTH, [row for row in rows if row["slip"] == part]
+            fine = 10.0 ** np.linspace(-2, 2, 81)
+            speeds, at = fine * np.sqrt(REST * slip), [row["share"] for row in mine]
+            axis.semilogx(fine, [promised(v, slip) for v in speeds], color=BLUE, label="2.18, Lorentzian")
+            axis.semilogx(at, [row["stretch"] for row in mine], "o", color=BLUE, ms=5, label="stretch reading")
+            for order, colour in ((1, ORANGE), (0, GREY)):
+                axis.semilogx(fine, [grown(v, slip, order) for v in speeds], color=colour, label=f"2.18 G, p = {order}")
+                axis.semilogx(at, [row[order][0] for row in mine], "s", color=colour, ms=4, label="as printed")
+            axis.set(xlabel="speed over √(a_s l_k)", title=f"l_k = {part:g} ε₀", ylim=(0, 0.65))
+        axis.legend(fontsize=7)
+        figure.axes[0].set_ylabel("friction over load")
+        figure.savefig(path, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main()

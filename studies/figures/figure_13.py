@@ -1,0 +1,57 @@
+"""What does Fig. 13 of the report show? The weight of a bond along the path (eq. 2.14), phi(R/eps) for several p.
+
+Each curve encloses unit area, so p moves the force along the path and leaves steady friction alone. p = 0 starts at 1
+and only falls; p = 1 and 2 rise from 0 to 0.3679 and 0.2707 at R = p eps, a bond strongest after p bond lengths; p =
+-0.5 is infinite at the start. Nine tenths of the force are gone after R/eps = 1.35, 2.30, 3.89 and 5.32. Of the print
+only the caption could be read, neither axes nor the values of p: these p span the kinds of curve that 2.14 has.
+
+Run: python studies/figures/figure_13.py
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from scipy.special import gammaincinv
+
+from patchfem.closed_forms import weight_along
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+
+HERE = Path(__file__).parent
+ORDERS = (-0.5, 0.0, 1.0, 2.0)
+COLOURS = (GREY, ORANGE, BLUE, "#4f9bd9")
+
+
+def main(path: Path | None = HERE / "figure_13.svg") -> list:
+    """One dict per p: at 0, where it is largest, how large, and the R/eps behind which a tenth of the area lies."""
+    x = np.linspace(0, 8, 1601)
+    rows = []
+    for p in ORDERS:
+        top = float(x[np.argmax(weight_along(x, p))])
+        rows.append({"order": p, "start": float(weight_along(0.0, p)), "top_at": top,
+                     "top": float(weight_along(top, p)), "nine_tenths": float(gammaincinv(p + 1, 0.9))})
+        print(f"p = {p:4.1f}: phi(0) = {rows[-1]['start']:.4g}, largest {rows[-1]['top']:.4f} at R/eps = {top:.3f}, "
+              f"nine tenths within R/eps = {rows[-1]['nine_tenths']:.3f}")
+    if path is not None:
+        draw(path, x)
+    return rows
+
+
+def draw(path: Path, x) -> None:
+    """The figure as SVG."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(6.0, 3.4))
+        FigureCanvasSVG(figure)
+        axis = figure.subplots()
+        for p, colour in zip(ORDERS, COLOURS):
+            shown = x[1:] if p < 0 else x
+            axis.plot(shown, weight_along(shown, p), color=colour, label=f"p = {p:g}")
+        axis.set(xlabel="R/ε", ylabel="φ", xlim=(0, 8), ylim=(0, 1.2), title="Weight along the path (2.14)")
+        axis.legend()
+        figure.savefig(path, metadata={"Date": None})
+
+
+if __name__ == "__main__":
+    main()

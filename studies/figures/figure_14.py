@@ -1,0 +1,42 @@
+"""What does Fig. 14 of the report show? The weight of a bond across the path (eq. 2.15), W(eta/rho).
+
+A normal density in eta/rho: 0.3989 on the path, 0.2420 at one rho, 0.0540 at two; 68.3 and 95.4 % of a bond lie within.
+Over eta its area is rho, which 2.16 divides out, so where the pressure does not change across the path rho drops out
+of the law: only a pad narrower than a few rho or roughness finer than rho can show it. Of the print only the caption
+could be read.
+
+Run: python studies/figures/figure_14.py
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from scipy.integrate import quad
+
+from patchfem.closed_forms import weight_across
+from patchfem.export.pictures import BLUE, STYLE
+
+HERE = Path(__file__).parent
+
+
+def main(path: Path | None = HERE / "figure_14.svg") -> list:
+    """(eta/rho, W, share of the area within) at 0, 1 and 2, and at infinity."""
+    rows = [(y, float(weight_across(y)), quad(weight_across, -y, y)[0]) for y in (0.0, 1.0, 2.0, np.inf)]
+    for y, weight, share in rows:
+        print(f"eta/rho = {y:3g}: W = {weight:.4f}, {100 * share:.2f} % within")
+    if path is not None:
+        with rc_context(STYLE):
+            figure = Figure(figsize=(6.0, 3.4))
+            FigureCanvasSVG(figure)
+            axis, y = figure.subplots(), np.linspace(-4, 4, 401)
+            axis.plot(y, weight_across(y), color=BLUE)
+            axis.set(xlabel="η/ρ", ylabel="W", xlim=(-4, 4), ylim=(0, 0.45), title="Weight across the path (2.15)")
+            figure.savefig(path, metadata={"Date": None})
+    return rows
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+"""Least squares within bounds against linear algebra, closed profiles and known truths."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import t as student
+
+from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
+from patchfem.identify import least_squares as module
+from patchfem.identify.least_squares import fit
+from patchfem.identify.space import Counted, space, spread_points
+from patchfem.identify.words import remarks
+
+RNG = np.random.default_rng(7)
+DESIGN = RNG.normal(size=(30, 3))
+NOISY = DESIGN @ [1.0, 2.0, -0.5] + 0.1 * RNG.normal(size=30)
+LINE = np.linspace(0, 1, 40)
+
+
+def linear(design, data):
+    """(values, half-widths of 95 %, covariance, sum of squares) of a linear problem by the normal equations."""
+    inverse = np.linalg.inv(design.T @ design)
+    values = inverse @ design.T @ data
+    rest = float(((design @ values - data)**2).sum())
+    dof = len(data) - design.shape[1]
+    covariance = inverse * rest / dof
+    return values, student.ppf(0.975, dof) * np.sqrt(np.diag(covariance)), covariance, rest
+
+
+def test_exact_a_linear_problem_has_the_closed_form_intervals():
+    values, half, covariance, rest = linear(DESIGN, NOISY)
+    found = fit(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5])
+    assert found.values == pytest.approx(values, abs=1e-9)
+    assert found.intervals == pytest.approx(np.stack([values - half, values + half], axis=1), abs=1e-9)
+    scale = np.sqrt(np.diag(covariance))
+    assert found.correlation == pytest.approx(covariance / np.outer(scale, scale), abs=1e-8)
+    assert found.rms == pytest.approx(np.sqrt(rest / 30), rel=1e-12)
+    assert found.sensitivity == pytest.approx(10 * np.sqrt((DESIGN**2).mean(axis=0)), rel=1e-8)
+    assert found.methods == ("linear",) * 3 and found.at_bound == ("",) * 3 and found.unknown.shape == (0, 3)
+    assert found.outcome is Outcome.DONE and found.agreed == 3 and remarks(found, "abc") == []
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10_000), st.floats(-3, 3), st.integers(-8, 8))
+def test_always_scaling_rows_and_values_changes_nothing(seed, shift, power):
+    rng, scale = np.random.default_rng(seed), 10.0**power
+    design, data = rng.normal(size=(12, 2)), rng.normal(size=12)
+    values, half, *_ = linear(design, data)
+    low, high = values - 20 * half + shift * half, values + 20 * half + shift * half
+    found = fit(lambda v: scale * (design @ (v / scale) - data), scale * low, scale * high, log=[False, False])
+    assert found.values / scale == pytest.approx(values, abs=1e-6 * half.max())
+    assert np.ptp(found.intervals, axis=1) / scale == pytest.approx(2 * half, rel=1e-4)
+
+
+def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
+    """Slope -0.1 by the data, low bound 0.3: the sum of squares is a parabola in the slope, so its profile is known."""
+    data = 1.0 - 0.1 * LINE + 0.1 * RNG.normal(size=40)
+    design = np.stack([np.ones(40), LINE], axis=1)
+    values, _, covariance, rest = linear(design, data)
+    free = covariance[1, 1] / (rest / 38)
+    pressed = rest + (0.3 - values[1])**2 / free
+    end = values[1] + np.sqrt(free * (pressed * (1 + student.ppf(0.975, 38)**2 / 38) - rest))
+    found = fit(lambda v: design @ v - data, [0, 0.3], [3, 5])
+    assert found.values[1] == 0.3 and found.at_bound == ("", "low") and found.methods[1] == "profile"
+    assert found.values[0] == pytest.approx((data - 0.3 * LINE).mean(), abs=1e-7)
+    assert found.intervals[1] == pytest.approx([0.3, end], rel=2e-3) and found.open_ends[1].tolist() == [True, False]
+    assert remarks(found, ["a", "b"]) == ["b is at its low bound 0.3: widen the range or doubt the law"]
+
+
+def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
+    """A constant w = v^3 has the ends mean -+ t s/sqrt(k), so v has their cube roots, which no straight line gives."""
+    data = 1.0 + 1.5 * RNG.normal(size=12)
+    half = student.ppf(0.975, 11) * data.std(ddof=1) / np.sqrt(12)
+    low, high = data.mean() - half, data.mean() + half
+    found = fit(lambda v: v[0]**3 - data, [-4], [4])
+    assert found.methods == ("profile",)
+    assert found.values[0] == pytest.approx(np.cbrt(data.mean()), rel=1e-6)
+    assert found.intervals[0] == pytest.approx(np.cbrt([low, high]), rel=2e-3)
+
+
+def test_exact_two_values_known_by_their_product_are_named():
+    truth = 2 * np.sin(3 * LINE) + LINE
+
+    def residual(v):
+        return v[0] * v[1] * np.sin(3 * LINE) + v[2] * LINE - truth + 0.0 * v[3]
+
+    found = fit(residual, [0.1, 0.1, 0, 0], [10, 100, 5, 1])
+    assert found.values[0] * found.values[1] == pytest.approx(2, rel=1e-8) and found.values[2] == pytest.approx(1)
+    assert np.isnan(found.intervals[[0, 1, 3]]).all() and found.intervals[2] == pytest.approx([1, 1])
+    assert np.abs(found.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
+    assert found.unknown[0, 0] * found.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
+    product, flat = remarks(found, "abcd")
+    assert "a and b cannot be told apart" in product and product.endswith("only their product is known")
+    assert flat == "d has no effect on the rows: it is not determined"
+
+
+def test_exact_a_ratio_is_named_and_the_rest_keeps_its_interval():
+    noise = 0.01 * RNG.normal(size=40)
+    found = fit(lambda v: v[0] / v[1] * LINE + v[2] - 2 * LINE - 1 - noise, [1, 1, -3], [9, 9, 3])
+    alone = fit(lambda v: v[0] * LINE + v[1] - 2 * LINE - 1 - noise, [1, -3], [9, 3])
+    assert found.intervals[2] == pytest.approx(alone.intervals[1], rel=2e-2)
+    assert "only their ratio is known" in remarks(found, "abc")[0]
+
+
+def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
+    data = RNG.normal(size=20)
+    found = fit(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1])
+    alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
+    assert "cannot be told apart" in remarks(found, "ab")[0]
+    assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
+    assert "b is not determined: the rows allow the whole of its range" in remarks(alone, "ab")
+
+
+def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():
+    found = fit(lambda v: np.sin(v[0] * 9 * LINE) - np.sin(13.7 * 9 * LINE / 9), [0.05], [3], [False], start=[0.3])
+    assert found.values[0] == pytest.approx(13.7 / 9, rel=1e-8)
+
+
+def test_exact_a_wide_positive_range_is_searched_in_logarithms():
+    found = fit(lambda v: np.log(v[0]) * np.ones(5) - np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6]), [1e-9], [1.0])
+    spread = np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6])
+    half = student.ppf(0.975, 4) * spread.std(ddof=1) / np.sqrt(5)
+    assert np.log(found.values[0]) == pytest.approx(spread.mean(), abs=1e-9)
+    assert np.log(found.intervals[0]) == pytest.approx([spread.mean() - half, spread.mean() + half], abs=1e-6)
+    assert space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).log.tolist() == [False, True, False]
+
+
+def test_always_failures_are_counted_and_passed_over():
+    def residual(v):
+        if v[0] > 2:
+            raise PatchfemError("too long")
+        return np.full(5, np.nan) if v[0] < 0.5 else v[0] - np.array([1.0, 1.1, 0.9, 1.0, 1.0])
+
+    found = fit(residual, [0.0], [6.0], start=[5.0])
+    assert found.values[0] == pytest.approx(1, abs=1e-9) and found.failures >= 5
+    assert found.reason in ("too long", "the residual is not finite")
+    assert f"{found.failures} of {found.evaluations} evaluations failed" in remarks(found, "a")[-1]
+
+
+def test_refuses_what_cannot_be_fitted():
+    with pytest.raises(NotConverged, match="failed at every one of 9 starts: nothing works"):
+        fit(raising(PatchfemError("nothing works")), [0.0], [1.0], start=[0.5])
+    with pytest.raises(Missing, match="no file"):
+        fit(raising(Missing("no file")), [0.0], [1.0])
+    with pytest.raises(KeyError):
+        fit(raising(KeyError("a fault of ours")), [0.0], [1.0])
+    with pytest.raises(ValueError, match="2 rows cannot determine 3 values"):
+        fit(lambda v: v[:2], [0, 0, 0], [1, 1, 1])
+    for low, high, log in (([1.0], [1.0], None), ([2.0], [1.0], None), ([0.0], [np.inf], None), ([], [], None),
+                           ([0.0, 1.0], [1.0], None), ([0.0], [1.0], [True]), ([np.nan], [1.0], None)):
+        with pytest.raises(ValueError):
+            fit(lambda v: v, low, high, log)
+
+
+def raising(error):
+    def residual(v):
+        raise error
+    return residual
+
+
+def test_always_a_descent_cut_short_says_so(monkeypatch):
+    monkeypatch.setattr(module, "MOST", 2)
+    found = fit(lambda v: 10 * np.array([v[1] - v[0]**2, 0.1 * (1 - v[0]), 0.0]), [-2, -1], [2, 3], start=[-1.9, 2.0])
+    assert found.outcome is Outcome.NOT_CONVERGED
+
+
+def test_exact_differences_at_a_bound_and_beside_a_failure_keep_their_order():
+    def residual(v):
+        if v[0] > 0.5:
+            raise PatchfemError("beyond")
+        return np.array([np.sin(3 * v[0]), v[0]**2])
+
+    model = Counted(residual, space([0.0], [1.0]))
+    for u in (0.0, 0.2, 0.5):
+        got = model.jacobian(np.array([u]), [0])[:, 0]
+        assert got == pytest.approx([3 * np.cos(3 * u), 2 * u], abs=1e-8)
+
+
+def test_exact_the_starts_fill_the_cube_and_never_change():
+    one = spread_points(64, 1)[:, 0]
+    assert np.diff(np.sort(one)).max() < 2.7 / 64  # three distances at most, the largest phi^2 of the mean
+    assert np.unique(np.floor(4 * spread_points(64, 2)).astype(int), axis=0).shape[0] == 16
+    assert (spread_points(5, 3) == spread_points(9, 3)[:5]).all()
+
+
+@pytest.mark.slow
+def test_exact_intervals_of_a_decay_cover_its_truth_in_19_of_20():
+    """2000 intervals of amplitude and rate; the binomial share of 0.95 has a deviation of 0.005."""
+    inside = 0
+    for seed in range(1000):
+        data = np.exp(-3 * LINE) + 0.15 * np.random.default_rng(seed).normal(size=40)
+        found = fit(lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50])
+        inside += sum(a <= x <= b for (a, b), x in zip(found.intervals, (1.0, 3.0)))
+    assert 0.935 < inside / 2000 < 0.965

@@ -1,0 +1,433 @@
+"""Measured friction loops identified: every law from loops whose numbers are known, and what the verb answers."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+from command_line import cli
+from scipy.integrate import solve_ivp
+from scipy.stats import t as student
+
+from patchfem import simulate_bench as bench
+from patchfem.core import PatchfemError
+from patchfem.response.loops import read_loop
+from patchfem.scene import SceneError, load, loads
+from patchfem.simulate_fit import fit_loop
+from patchfem.simulate_fit_files import fitted_scene
+
+LOAD = 100.0
+POINT = '[normal]\nload = "100 N"\n'
+SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
+LAWS = {
+    "coulomb": '[friction]\nlaw = "coulomb"\nstatic = 0.5\n',
+    "elastic-plastic": '[friction]\nlaw = "elastic-plastic"\nstatic = 0.5\nbond_length = "5 um"\n',
+    "tanh": '[friction]\nlaw = "tanh"\nstatic = 0.5\nreference_speed = "5 mm/s"\n',
+    "bonds": '[friction]\nlaw = "nonlocal"\nstatic = 0.5\nbond_length = "5 um"\n',
+    "growth": '[friction]\nlaw = "nonlocal"\nstatic = 0.35\nkinetic = 0.2\nbond_length = "3 um"\nrest_growth = '
+              '"4 m/s^2"\nslip_growth = "2 um"\nrest_speed = "0.01 mm/s"\n',
+}  # fmt: skip
+TRUTH = {
+    "coulomb": {"friction.static": 0.31},
+    "elastic-plastic": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
+    "tanh": {"friction.static": 0.31, "friction.reference_speed": 1.7e-3},
+    "bonds": {"friction.static": 0.31, "friction.bond_length": 2.3e-6},
+    "growth": {"friction.static": 0.31, "friction.kinetic": 0.22, "friction.bond_length": 2.3e-6,
+               "friction.rest_growth": 7.0, "friction.slip_growth": 1.1e-6},
+}
+FREE = {
+    "friction.static": "0.1..0.7", "friction.kinetic": "0.1..0.3", "friction.bond_length": "0.3 um..20 um",
+    "friction.reference_speed": "0.1 mm/s..100 mm/s", "friction.rest_growth": "1 m/s^2..50 m/s^2",
+    "friction.slip_growth": "0.2 um..10 um", "normal.load": "50 N..200 N",
+}  # fmt: skip
+
+
+def rows(count=80, cycles=2):
+    """(time, slide) of a sine of 10 um at 100 Hz."""
+    time = np.arange(count * cycles + 1) / count / 100
+    return time, 10e-6 * np.sin(2 * np.pi * 100 * time)
+
+
+def play(slide, mu, eps):
+    """Elastic-plastic force in N: the play operator, one clip per straight leg."""
+    out = [0.0]
+    for dq in np.diff(slide):
+        out.append(min(max(out[-1] + mu * LOAD * dq / eps, -mu * LOAD), mu * LOAD))
+    return np.array(out)
+
+
+def dahl(slide, mu, eps):
+    """Force of bonds of constant length: F' = mu N (sgn v - F/mu N) |v|/eps, solved leg by leg."""
+    out = [0.0]
+    for dq in np.diff(slide):
+        g = np.sign(dq) * mu * LOAD
+        out.append(g + (out[-1] - g) * np.exp(-abs(dq) / eps))
+    return np.array(out)
+
+
+def grown(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
+    """z' = v - |v| z/eps beside 2.10, by a Runge-Kutta method of order 8 along straight legs; force in N."""
+    out, eps, z, m = [0.0], eps0, 0.0, 1.0
+    for dt, dq in zip(np.diff(time), np.diff(slide)):
+        v = dq / dt
+
+        def rate(_, y, v=v):
+            z, m, eps = y
+            w = abs(v)
+            return [v * m - w * z / eps, w * (1 - m) / eps,
+                    rest / max(w, floor) * (eps0 - eps) + w / slip * (kinetic / mu * eps0 - eps)]
+        z, m, eps = solve_ivp(rate, (0, dt), [z, m, eps], method="DOP853", rtol=1e-12, atol=1e-20).y[:, -1]
+        out.append(mu * LOAD / eps0 * z)
+    return np.array(out)
+
+
+def forces(law, time, slide, truth):
+    values = list(truth.values())
+    if law == "elastic-plastic":
+        return play(slide, *values)
+    if law == "bonds":
+        return dahl(slide, *values)
+    if law == "growth":
+        return grown(time, slide, *values)
+    speed = np.diff(slide) / np.diff(time)
+    side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
+    both = np.concatenate([side[:1], (side[1:] + side[:-1]) / 2, side[-1:]])  # a row stands between two legs
+    return values[0] * LOAD * both
+
+
+def table(path, time, slide, force, cycle=None, quantity="force [N]"):
+    with open(path, "w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow(["time [ms]", "displacement [um]", quantity, *(["cycle"] if cycle is not None else [])])
+        for k in range(len(force)):
+            more = [int(cycle[k])] if cycle is not None else []
+            out.writerow([repr(float(1e3 * time[k])), repr(float(1e6 * slide[k])), repr(float(force[k])), *more])
+    return path
+
+
+def scene_of(tmp_path, law, *sets, slide=SINE):
+    path = tmp_path / "scene.toml"
+    path.write_text(POINT + LAWS[law] + slide, "utf-8")
+    return load(path, sets)
+
+
+def free_of(*names):
+    return [",".join(f"{name}={FREE[name]}" for name in names)]
+
+
+# ---- every law from a loop of known numbers
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "tanh", "bonds"])
+def test_exact_known_values_are_found_again(tmp_path, law):
+    time, slide = rows()
+    loop = table(tmp_path / "loop.csv", time, slide, forces(law, time, slide, TRUTH[law]))
+    found = fit_loop(scene_of(tmp_path, law), loop, free_of(*TRUTH[law]))
+    assert found.found.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
+    assert found.rms < 1e-7 * LOAD and found.held_rms is None and found.step_error == 0
+    assert (found.found.intervals[:, 0] <= found.found.values).all() and found.warnings == []
+    assert np.ptp(found.found.intervals, axis=1) == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_exact_growth_is_found_again_from_an_integrated_loop(tmp_path):
+    """All five numbers of the growing bonds, the loop by an independent integration; steps until 1e-7 of the peak."""
+    time, slide = rows(60)
+    loop = table(tmp_path / "loop.csv", time, slide, forces("growth", time, slide, TRUTH["growth"]))
+    scene = scene_of(tmp_path, "growth", "accuracy.tolerance=2e-5")
+    found = fit_loop(scene, loop, free_of(*TRUTH["growth"]))
+    assert found.found.values == pytest.approx(list(TRUTH["growth"].values()), rel=1e-3)
+    assert found.step_error < 2e-6 * 31
+
+
+def test_exact_growth_is_found_again(tmp_path):
+    """The same numbers at the steps of the rows, the loop by the law itself: nothing is left over."""
+    time, slide = rows(40)
+    names = ["friction.static", "friction.kinetic", "friction.slip_growth"]
+    fixed = [f"friction.bond_length={2.3e-6} m", "friction.rest_growth=7 m/s^2", "accuracy.steps_per_cycle=80"]
+    scene = scene_of(tmp_path, "growth", *fixed)
+    true = loads(scene.text, sets=[*fixed, "friction.static=0.31", "friction.kinetic=0.22",
+                                   "friction.slip_growth=1.1e-6 m"])
+    force = bench.run(true, None, 4, path=(time, slide, 0, 0.0)).force
+    found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force), free_of(*names))
+    assert found.found.values == pytest.approx([TRUTH["growth"][name] for name in names], rel=1e-6)
+    assert found.pieces == 1 and found.rms < 1e-6
+
+
+def test_order_of_the_growing_model_is_two(tmp_path):
+    """Steps between the rows halve until they change the loop by less than a tenth of the tolerance; the change they
+    still make bounds what is left over against the integrated loop."""
+    time, slide = rows(24, 1)
+    loop = table(tmp_path / "loop.csv", time, slide, forces("growth", time, slide, TRUTH["growth"]))
+    sets = [f"{name}={value!r}" + {"m": " m", "r": " m/s^2"}.get(
+        "m" if "length" in name or "slip" in name else "r" if "rest" in name else "", "")
+        for name, value in TRUTH["growth"].items() if name != "friction.static"]
+    rest = []
+    for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
+        scene = scene_of(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
+        found = fit_loop(scene, loop, free_of("friction.static"))
+        assert found.step_error <= 0.1 * tolerance * 31
+        assert found.rms < 1.4 * found.step_error
+        assert pieces is None or found.pieces == pieces
+        rest.append((found.pieces, found.rms))
+    (few, rough), (many, fine) = rest
+    assert rough / fine == pytest.approx((many / few)**2, rel=0.35)
+
+
+def test_exact_a_ratio_column_and_a_patch_fit_alike(tmp_path):
+    """The resultant of a patch under a rigid slide is that of one point, so its loop has the same numbers."""
+    time, slide = rows(24)
+    force = forces("bonds", time, slide, TRUTH["bonds"]) / LOAD
+    loop = table(tmp_path / "loop.csv", time, slide, force, quantity="friction_ratio")
+    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nelement_size = '
+            '"2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n')
+    (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
+    for scene in (scene_of(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
+        found = fit_loop(scene, loop, free_of(*TRUTH["bonds"]))
+        assert found.found.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+
+
+# ---- noise
+
+def noisy(law, seed, sigma=0.6, count=40):
+    time, slide = rows(count)
+    force = forces(law, time, slide, TRUTH[law])
+    return time, slide, force + sigma * np.random.default_rng(seed).normal(size=force.size)
+
+
+def covered(tmp_path, law, seeds):
+    inside = []
+    scene = scene_of(tmp_path, law)
+    for seed in seeds:
+        loop = table(tmp_path / "loop.csv", *noisy(law, seed))
+        found = fit_loop(scene, loop, free_of(*TRUTH[law]))
+        inside.append([a <= x <= b for (a, b), x in zip(found.found.intervals, TRUTH[law].values())])
+        assert found.rms == pytest.approx(0.6, rel=0.25)
+    return np.array(inside)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
+def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_path, law):
+    """Design matrix from the force of this test, not from the package, at the fitted values."""
+    time, slide, force = noisy(law, 0)
+    found = fit_loop(scene_of(tmp_path, law), table(tmp_path / "loop.csv", time, slide, force), free_of(*TRUTH[law]))
+    best, names = found.found.values, list(TRUTH[law])
+
+    def at(k, share):
+        return forces(law, time, slide, dict(zip(names, best * np.where(np.arange(best.size) == k, 1 + share, 1.0))))
+
+    design = np.stack([(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1)  # per ln of a value
+    left = at(-1, 0.0) - force
+    assert design.T @ left == pytest.approx(0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(left) / 9)
+    dof = force.size - best.size
+    half = student.ppf(0.975, dof) * np.sqrt(np.diag(np.linalg.inv(design.T @ design)) * (left @ left) / dof)
+    ends = np.stack([best * (1 - half), best * (1 + half)], axis=1)
+    if law == "elastic-plastic":  # the bond length is searched in logarithms
+        ends[1] = best[1] * np.exp([-half[1], half[1]])
+    assert found.found.methods == ("linear",) * best.size
+    assert found.found.intervals == pytest.approx(ends, rel=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "tanh", "bonds"])
+def test_exact_intervals_cover_the_truth_in_19_of_20(tmp_path, law):
+    """120 loops with noise of 2 % of the peak; the share of a fair interval has a deviation of 0.02 (one value)."""
+    inside = covered(tmp_path, law, range(120))
+    assert inside.mean() == pytest.approx(0.95, abs=0.04) and (inside.mean(axis=0) > 0.9).all()
+
+
+@pytest.mark.slow
+def test_exact_intervals_of_growing_bonds_cover_the_truth_in_19_of_20(tmp_path):
+    """100 loops, three of the five numbers free, the model at the steps of the rows as the truth is."""
+    names = ["friction.static", "friction.kinetic", "friction.slip_growth"]
+    fixed = ["friction.bond_length=2.3 um", "friction.rest_growth=7 m/s^2", "accuracy.steps_per_cycle=80"]
+    scene, (time, slide) = scene_of(tmp_path, "growth", *fixed), rows(40)
+    true = loads(scene.text, sets=[*fixed, "friction.static=0.31", "friction.kinetic=0.22",
+                                   "friction.slip_growth=1.1 um"])
+    force = bench.run(true, None, 4, path=(time, slide, 0, 0.0)).force
+    inside = []
+    for seed in range(100):
+        noise = 0.1 * np.random.default_rng(seed).normal(size=force.size)
+        found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force + noise), free_of(*names))
+        inside.append([a <= TRUTH["growth"][name] <= b for (a, b), name in zip(found.found.intervals, names)])
+    inside = np.array(inside)
+    assert inside.mean() == pytest.approx(0.95, abs=0.04) and (inside.mean(axis=0) > 0.88).all()
+
+
+# ---- what the rows do not say
+
+def test_exact_static_and_load_are_known_by_their_product(tmp_path):
+    found = fit_loop(scene_of(tmp_path, "elastic-plastic"),
+                     table(tmp_path / "loop.csv", *noisy("elastic-plastic", 3, 0.1, 24)),
+                     free_of("friction.static", "friction.bond_length", "normal.load"))
+    static, _, load_ = found.found.values
+    assert static * load_ == pytest.approx(31, rel=5e-3)
+    assert np.isnan(found.found.intervals[[0, 2]]).all() and np.isfinite(found.found.intervals[1]).all()
+    assert any("friction.static and normal.load cannot be told apart" in text and "only their product is known" in text
+               for text in found.warnings)
+
+
+def test_exact_keys_without_effect_are_named(tmp_path):
+    time, slide = rows(24, 1)
+    loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
+    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop,
+                     [*free_of("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"])
+    assert "slide.cycles has no effect on the rows: it is not determined" in found.warnings
+    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
+    assert found.found.values[0] == 0.25 and "at its high bound 0.25" in found.warnings[0]
+
+
+def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
+    """The second cycle reads twice the force: held out, it changes nothing but its own rms."""
+    time, slide = rows(40)
+    force, cycle = play(slide, 0.31, 2.3e-6), 1 + (np.arange(81) > 40)
+    wrong = table(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
+    scene = scene_of(tmp_path, "elastic-plastic")
+    found = fit_loop(scene, wrong, free_of("friction.static", "friction.bond_length"), ["cycle=2.0"])
+    assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
+    assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2]**2)), rel=1e-6)
+    assert found.held.sum() == 40
+    first = fit_loop(scene, table(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
+                     free_of("friction.static", "friction.bond_length"), ["cycle=1"])
+    assert first.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
+
+
+def test_always_doubtful_records_are_named(tmp_path):
+    time, slide = rows(40)
+    late = play(slide, 0.31, 2.3e-6)[20:]
+    found = fit_loop(scene_of(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
+                     table(tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)),
+                     free_of("friction.static", "friction.bond_length"))
+    assert [any(text in one for one in found.warnings) for text in
+            ("correlated from row to row", "the first row carries", "slide.amplitude is 1.2e-05 m")] == [True] * 3
+
+
+# ---- the pace of a record without time
+
+def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
+    slide = rows(40)[1]
+    text = "displacement [um],force [N]\n" + "\n".join(
+        f"{1e6 * q!r},{f!r}" for q, f in zip(slide.tolist(), play(slide, 0.31, 2.3e-6).tolist()))
+    loop = tmp_path / "loop.csv"
+    loop.write_text(text)
+    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of("friction.static", "friction.bond_length"))
+    assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and "even in time" in found.warnings[0]
+    with pytest.raises(PatchfemError, match=r"loop.csv:1: no column time .s., which law 'tanh' needs here"):
+        fit_loop(scene_of(tmp_path, "tanh"), loop, free_of("friction.static"))
+    pace = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
+    where = np.concatenate([np.linspace(0, 10, 11), np.linspace(9, -10, 20)])
+    ratio = np.tanh(2 / 1.7)
+    both = np.concatenate([np.full(10, ratio), [0], np.full(20, -ratio)])
+    loop.write_text("displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both)))
+    found = fit_loop(scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace), loop,
+                     free_of("friction.reference_speed"))
+    assert found.found.values == pytest.approx([1.7e-3], rel=1e-6) and "follow each other at" in found.warnings[0]
+
+
+# ---- the verb
+
+@pytest.fixture
+def asked(tmp_path):
+    table(tmp_path / "loop.csv", *noisy("elastic-plastic", 1, 0.1, 24), 1 + (np.arange(49) > 24))
+    scene_of(tmp_path, "elastic-plastic", slide='[slide]\nkind = "file"\nfile = "loop.csv"\n')
+    return ["fit", tmp_path / "scene.toml", "--to", tmp_path / "loop.csv", "-o", tmp_path / "out"]
+
+
+def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, asked):
+    """The scene's own path file is the measured loop: run along it, the fitted scene gives the fitted rows."""
+    free = "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
+    answer = cli(*asked, "--free", free, "--hold", "cycle=2", "--json")
+    assert answer.code == 0, answer.err
+    found = json.loads(answer.out)
+    assert found == json.loads((tmp_path / "out/fit.json").read_text())
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["fit.csv", "fit.json", "fit.svg",
+                                                                    "scene.fitted.toml"]
+    one = found["values"]["friction.static"]
+    assert one["interval"][0] < 0.31 < one["interval"][1] and found["held"]["rows"] == 24 and found["unit"] == "N"
+    assert (tmp_path / "out/fit.svg").read_text().startswith("<svg")
+    scene = load(tmp_path / "out/scene.fitted.toml")
+    assert scene.friction.static == one["value"] and scene.slide.file == "../loop.csv"
+    ran = bench.run(scene, None, 400)
+    written = read_loop(tmp_path / "out/fit.csv")
+    fitted = np.array(written.labels["fitted"], float)
+    at = [np.argmin(np.abs(ran.time - t)) for t in written.time]
+    assert ran.force[at] == pytest.approx(fitted, abs=1e-9)
+    assert cli("run", tmp_path / "out/scene.fitted.toml", "-o", tmp_path / "ran").code == 0
+    plain = cli(*asked, "--free", free)
+    assert plain.code == 0 and "friction.bond_length" in plain.out and "95 % in [" in plain.out
+
+
+def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
+    from patchfem.identify import least_squares
+
+    monkeypatch.setattr(least_squares, "MOST", 1)
+    assert cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um").code == 3
+    assert json.loads((tmp_path / "out/fit.json").read_text())["outcome"] == "not_converged"
+
+
+@pytest.mark.parametrize("free, says", [
+    ("friction.static=0.6..0.1", "friction.static: the low bound 0.6 must lie below the high bound 0.1"),
+    ("friction.static=0.1..0.1", "must lie below"), ("friction.static=0.1..nan", "a plain number is wanted, not nan"),
+    ("friction.static=-0.1..1", "friction.static: must be >= 0, not -0.1"), ("friction.law=1..2", "holds no number"),
+    ("friction.bond_length=1..2", "a bare number without a unit"), ("friction.statc=0..1", "did you mean 'static'?"),
+    ("friction.bond_length=1 N..2 N", "'N' is a unit of force"), ("friction.static", "table.key=low..high is wanted"),
+    ("friction=0..1", "holds no number"), ("contact.pairs=1..3", "holds no number"), ("x=1..2", "not a key of a scene"),
+    ("friction.static=0..1,friction.static=0..2", "friction.static: stands twice"),
+    ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
+])  # fmt: skip
+def test_refuses_a_bad_range(asked, free, says, tmp_path):
+    answer = cli(*asked, "--free", free)
+    assert answer.code == 2 and says in answer.err and not (tmp_path / "out").exists()
+
+
+HEAD = "time [s],displacement [um],force [N]\n"
+BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
+
+
+@pytest.mark.parametrize("text, says", [
+    ("", ":1: a header like"), (HEAD, ":1: a measured loop is at least two rows"),
+    ("time [s],displacement [um]\n" + "0,0\n1,1\n", ":1: no column force"),
+    ("time [s],displacement [um],force\n" + BODY, ":1: a header like `time [s],displacement [um],force [N]` is wanted"),
+    ("time [s],displacement [um],force [lb]\n" + BODY, ":1: force [lb]: the unit is not known; one of N, kN, lbf"),
+    ("time [s],force [N]\n0,1\n", ":1: a header like"), ("time [s],displacement [um],force [N],x [m]\n", ":1: a head"),
+    ("displacement [um],force [N],friction_ratio\n0,0,0\n1,1,1\n", ":1: force and friction_ratio stand side by side"),
+    (HEAD + "0,0,0\n1,1\n", ":3: three cells are wanted, time, displacement and force, not '1,1'"),
+    (HEAD + "0,0,0\n1,1,\n", ":3: force: '' is not a finite number"),
+    (HEAD + "0,0,0\n1,1,1\n1,2,1\n", ":4: time 1 s does not follow 1 s"),
+    (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
+    (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "2 rows that are not held cannot"),
+])  # fmt: skip
+def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
+    (tmp_path / "loop.csv").write_text(text)
+    answer = cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um")
+    assert answer.code == 2 and "loop.csv" in answer.err and says in answer.err, answer.err
+
+
+def test_refuses_other_requests(asked, tmp_path):
+    free = ["--free", "friction.static=0.1..0.7"]
+    for words, code, says in (
+            (["--hold", "cycle=3"], 2, "no row of"), (["--hold", "run=3"], 2, "no such column without a unit"),
+            (["--hold", "cycle"], 2, "column=value,value is wanted"), (["--hold", "cycle=1,2"], 2, "0 rows that are")):
+        answer = cli(*asked, *free, *words)
+        assert answer.code == code and says in answer.err, answer.err
+    assert cli(*asked[:3], tmp_path / "none.csv", *free).code == 4
+    (tmp_path / "scene.toml").write_text(POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8")
+    assert "friction.static: must be >= 0" in cli(*asked, *free).err
+    with pytest.raises(SceneError, match="a patch scene; only loops of"):
+        text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
+                '"Ti-8Al-1Mo-1V"\n')
+        fit_loop(loads(text), tmp_path / "loop.csv", ["contact.load=1 N..2 N"])
+
+
+def test_exact_the_rest_speed_of_the_measured_motion_is_written_out(tmp_path):
+    """Where the scene leaves v_h to the motion, the measured motion sets it, and the fitted scene says so."""
+    time, slide = rows(24, 1)
+    scene = scene_of(tmp_path, "growth", "friction.rest_speed=1 m/s")
+    scene = loads(scene.text.replace('rest_speed = "0.01 mm/s"\n', ""), tmp_path / "scene.toml",
+                  ["accuracy.steps_per_cycle=24"])
+    loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
+    found = fit_loop(scene, loop, free_of("friction.static"))
+    speed = np.abs(np.diff(slide) / np.diff(time)).max()
+    text = fitted_scene(found, tmp_path)
+    assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)
+    assert text.startswith("# friction.static fitted to loop.csv: ")
