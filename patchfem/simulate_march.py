@@ -9,7 +9,7 @@ from .compiled import load_kernels
 from .core import BaseSine, Missing, ModalBasis, Outcome, Response
 
 RATE = 4  # kind of a force that follows the speed, as in simulate_kernels
-LIST_CAPACITY = 20_000  # bonds of a shared list; beyond it a run is refused
+MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
 
@@ -99,14 +99,13 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     """One shared bond list for a rigid slide: any order, either reading; limit = mu_s N [N].
 
-    reach: cut-off in bond lengths; merge: widest merged bond in bond lengths at zero age.
+    reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    exact = law.reading == "report" and not law.grows
-    capacity = 4_000 if exact else LIST_CAPACITY
-    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bondlist": np.zeros((7, capacity)),
-              "now": [0.0, 0.0, 0.0, 0.0, law.length], "tally": [0.0, reach, merge],
-              "law": [law.order, float(law.reading == "report"), law.length, law.initial, float(exact)],
-              "growth": growth_numbers(law)}
+    from .friction.bond_list import law_numbers, room, share_table
+
+    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bondlist": np.zeros((10, room(law, reach, merge))),
+              "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
+              "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law)}
     return ContactModel(3, limit, fields, False, law.length)
 
 
@@ -207,6 +206,7 @@ class _Run:
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
         """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
         first, before, parts = self.done, self.ledger[8], []
+        self._make_room(size)
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, 2 * self.modes.omega.size + 5))
@@ -222,6 +222,16 @@ class _Run:
             if self.outcome is not None:
                 break
         return first, np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]), self.ledger[8] - before
+
+    def _make_room(self, steps: int) -> None:
+        """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
+        have, used = self.contact.bondlist.shape[1], int(self.contact.tally[1] - self.contact.tally[0])
+        want = used + 4 * steps + 256
+        if not have or want <= have or have >= MOST_STRIPS:
+            return
+        wider = np.zeros((10, min(max(want, 2 * have), MOST_STRIPS)))
+        wider[:, :have] = self.contact.bondlist
+        self.contact = self.contact._replace(bondlist=wider)
 
     def _judge(self, status: int) -> None:
         if status == 1:

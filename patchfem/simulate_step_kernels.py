@@ -13,16 +13,9 @@ import numpy as np
 from numba import njit
 
 from .dynamics.kernels import safe_point
-from .friction.kernels import (
-    FAST,
-    bond_mean,
-    bond_step,
-    grow,
-    jenkins_mean,
-    jenkins_step,
-    list_mean,
-    list_step,
-)
+from .friction.bond_kernels import list_mean, list_slope, list_step
+from .friction.bond_sum_kernels import MOMENTS
+from .friction.kernels import FAST, bond_mean, bond_step, grow, jenkins_mean, jenkins_step
 
 COULOMB, JENKINS, POINTS, LIST, RATE = 0, 1, 2, 3, 4
 
@@ -33,7 +26,8 @@ class Contact(NamedTuple):
     force: (static or scale, kinetic, bound) [N]; of a rate law (limit [N], v_0 [m/s], limit). Jenkins: stretch,
     stiffness, limit (t,). Points: weight (m,) = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, source (m,),
     shear modes psi (m, r), kappa (r,), b (r,).
-    List: bondlist (7, capacity), now (5,), tally = (bonds, cut-off, merge width), law. growth of eq. 2.10.
+    List: bondlist (10, capacity), now (6,), tally (12,), law (24,), table (k,) as in friction.bond_kernels. growth of
+    eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
     """
 
@@ -51,6 +45,7 @@ class Contact(NamedTuple):
     now: np.ndarray
     tally: np.ndarray
     law: np.ndarray
+    table: np.ndarray
     growth: np.ndarray
     place: np.ndarray
     x: np.ndarray
@@ -118,11 +113,50 @@ def scalar_force(dq, kind, c, eps, v0, dt):
             force += c.weight[j] * mean
             slope += c.weight[j] * s
         return force, slope
+    return list_scalar(dq, c, v0, dt)
+
+
+@njit(error_model="numpy")
+def list_scalar(dq, c, v0, dt):
+    """Path-mean force [N] and slope [N/m] of a bond list; a slope of zero stands for an unknown one."""
     scale = c.force[0]
-    force = list_mean(dq, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, v0, dt)
-    tiny = 1e-6 * c.law[2]
-    ahead = list_mean(dq + tiny, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, v0, dt)
-    return scale * force, scale * (ahead - force) / tiny
+    if c.law[1] == MOMENTS:
+        force, slope = list_slope(dq, c.bondlist, c.tally, c.now, c.law, c.growth, v0, dt)
+        return scale * force, scale * slope
+    return scale * list_mean(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, dt), 0.0
+
+
+@njit(error_model="numpy")
+def solve_list(free, beta, guess, c, v0, dt, goal):
+    """Slide increment with dq = free - beta F(dq) without a slope: secants, then inside a bracket that is widened until
+    it holds the root. Returns (dq, F, iterations), iterations < 0 when it failed."""
+    force = list_scalar(guess, c, v0, dt)[0]
+    here, miss = guess, guess - free + beta * force
+    if abs(miss) <= goal * beta:
+        return here, force, 1
+    last, last_miss = here, miss
+    low, high = (-np.inf, last) if miss > 0 else (last, np.inf)
+    here -= miss / (1 + beta * c.force[0] / c.law[2])
+    for count in range(2, 300):
+        force = list_scalar(here, c, v0, dt)[0]
+        new = here - free + beta * force
+        if abs(new) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.force[2]):
+            return here, force, count
+        slope = (new - last_miss) / (here - last) if here != last else 1.0
+        last, last_miss, miss = here, new, new
+        if miss > 0:
+            high = here
+        else:
+            low = here
+        step = here - miss / slope if slope > 0.1 else here - miss
+        if count > 8 and not np.isfinite(low):
+            step = min(step, high - beta * c.force[2] * 2.0 ** min(count - 8, 60))
+        if count > 8 and not np.isfinite(high):
+            step = max(step, low + beta * c.force[2] * 2.0 ** min(count - 8, 60))
+        if np.isfinite(low) and np.isfinite(high) and (not low < step < high or (count > 8 and count % 2)):
+            step = 0.5 * (low + high)
+        here = step
+    return here, force, -300
 
 
 @njit(error_model="numpy")
@@ -292,7 +326,10 @@ def contact_step(free, beta, v0, dt, kind, c, work, goal):
     for i in range(y.size):
         y[i] = 2 * last[0, i] - last[1, i]
     if y.size == 1:
-        dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
+        if kind == LIST and c.law[1] != MOMENTS:
+            dq, force, count = solve_list(free, beta, y[0], c, v0, dt, goal)
+        else:
+            dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
         y[0] = dq
         return dq, force, count, middle
     force, count = solve_modes(y, free, beta, c, middle, goal, work)
@@ -315,11 +352,14 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     if kind == JENKINS:
         return jenkins_step(dq, c.stretch, c.stiffness, c.limit), True
     if kind == LIST:
-        count = list_step(dq, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, v0, v1, dt, c.tally[1], c.tally[2])
-        if count < 0:
-            return force * dq, False
-        c.tally[0] = count
-        return force * dq, True
+        before = c.tally[4]
+        ok = list_step(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, v1, dt)
+        net = force * dq - c.force[0] * (c.tally[4] - before)
+        if net < 0:
+            c.tally[6] -= net
+        else:
+            c.tally[7] += net
+        return net, ok
     weight, bonds, source, psi, b = c.weight, c.bonds, c.source, c.psi, c.b
     burnt = 0.0
     for j in range(weight.size):
@@ -354,8 +394,8 @@ def contact_state(kind, c, q, held):
             total += share
         return force, energy, slip / total if total > 0 else q
     if kind == LIST:
-        force = c.force[0] * list_mean(0.0, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, 0.0, 0.0)
-        return force, 0.0, q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
+        force = c.force[0] * c.tally[5]
+        return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
     weight, bonds, kappa, b = c.weight, c.bonds, c.kappa, c.b
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
     for j in range(weight.size):

@@ -19,13 +19,12 @@ from .bond_sum_kernels import (
     POWER,
     SECOND,
     SHARES,
-    aged_sum,
+    aged_sums,
     first_bonds,
     formed,
     moments_of,
-    power_sum,
-    shares_energy,
-    shares_sum,
+    power_sums,
+    shares_sums,
 )
 from .kernels import bond_mean, grow
 
@@ -76,55 +75,53 @@ def _young(size, before, after, more, middle, law):
 
 
 @njit(error_model="numpy")
+def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
+    """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
+
+    Friction force = mu_s N * weight. Energy: the force of each bond over its own stretch at frozen damage.
+    """
+    q, path, damage, age, eps, middle = _after(dq, now, growth, v0, v0, dt)
+    head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] > 0
+    force, energy = first_bonds(q, path, damage, law)
+    size, young = abs(dq), 0.0
+    if law[1] == MOMENTS:
+        _, z, s2 = moments_of(q, exp(now[5] - damage), bonds, head, end)
+        force += z / law[2]
+        energy += s2 / (2 * law[2])
+    elif law[1] == POWER:
+        f, g = power_sums(q, bonds, head, many, end, p, coarse, law[8:24])
+        scale = law[4] / law[2] * exp(now[5] - damage)
+        force += scale * f
+        energy += scale * g / (p + 1)
+    elif law[1] == SHARES:
+        f, g = shares_sums(q, path, bonds, head, many, end, p, law[2], table, law[4])
+        force += f
+        energy += g
+    else:
+        f, g = aged_sums(q, path, exp(now[5] - age), eps, bonds, head, many, end, p, coarse)
+        force += law[4] / law[2] * f
+        energy += law[4] / law[2] * g
+    if size > 0:
+        if law[1] == AGED:
+            young = _young(size, now[4], eps, age - now[3], middle, law)
+        else:
+            young = formed(size, middle if law[1] <= POWER else law[2], law)
+    return force + np.copysign(young, dq), energy
+
+
+@njit(error_model="numpy")
 def list_force(dq, bonds, tally, now, law, growth, table, v0, dt):
     """Weight [1] of the list after the straight increment dq: friction force = mu_s N * weight.
 
     Twin: `quadrature.Quadrature`.
     """
-    q, path, damage, age, eps, middle = _after(dq, now, growth, v0, v0, dt)
-    head, end, many = int(tally[0]), int(tally[1]), int(tally[2])
-    total, _ = first_bonds(q, path, damage, law)
-    size, g = abs(dq), np.copysign(1.0, dq)
-    if law[1] == MOMENTS:
-        old = moments_of(q, exp(now[5] - damage), bonds, head, end)[1] / law[2]
-        return total + old + g * formed(size, middle, law)
-    if law[1] == POWER:
-        scale = law[4] / law[2] * exp(now[5] - damage)
-        total += scale * power_sum(q, bonds, head, many, end, law[0], True, law[8:16])
-        return total + g * formed(size, middle, law)
-    if law[1] == SHARES:
-        total += shares_sum(q, path, bonds, head, many, end, law[0], law[2], table, law[4])
-        return total + g * formed(size, law[2], law)
-    total += law[4] / law[2] * aged_sum(q, path, exp(now[5] - age), eps, bonds, head, many, end, law[0], True)
-    return total + (g * _young(size, now[4], eps, age - now[3], middle, law) if size > 0 else 0.0)
+    return list_state(dq, bonds, tally, now, law, growth, table, v0, dt)[0]
 
 
 @njit(error_model="numpy")
-def list_energy(bonds, tally, now, law, table):
-    """Energy per mu_s N [m] in the bonds as they stand: the force of each over its own stretch at frozen damage."""
-    head, end, many = int(tally[0]), int(tally[1]), int(tally[2])
-    _, total = first_bonds(now[0], now[1], now[2], law)
-    if law[1] == MOMENTS:
-        return total + moments_of(now[0], exp(now[5] - now[2]), bonds, head, end)[2] / (2 * law[2])
-    if law[1] == POWER:
-        scale = law[4] / (law[2] * (law[0] + 1)) * exp(now[5] - now[2])
-        return total + scale * power_sum(now[0], bonds, head, many, end, law[0] + 1, False, law[16:24])
-    if law[1] == SHARES:
-        return total + shares_energy(now[0], now[1], bonds, head, many, end, law[0], law[2], table, law[4])
-    return total + law[4] / law[2] * aged_sum(now[0], now[1], exp(now[5] - now[3]), now[4], bonds, head, many, end,
-                                              law[0], False)
-
-
-@njit(error_model="numpy")
-def _panel(low, high, nodes, bonds, tally, now, law, growth, table, v0, dt):
-    """Integral of the force over a share of the increment: nodes = (dq, 3 or 5)."""
-    dq, out = nodes[0], 0.0
-    if nodes[1] == 3:
-        for y, w in ((-0.7745966692414834, 0.5555555555555556), (0.0, 0.8888888888888888),
-                     (0.7745966692414834, 0.5555555555555556)):
-            part = low + (high - low) * (1 + y) / 2
-            out += w / 2 * list_force(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
-        return (high - low) * out
+def _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Integral of the force over a share of the increment by five Gauss points."""
+    out = 0.0
     for y, w in ((-0.906179845938664, 0.23692688505618908), (-0.5384693101056831, 0.47862867049936647),
                  (0.0, 0.5688888888888889), (0.5384693101056831, 0.47862867049936647),
                  (0.906179845938664, 0.23692688505618908)):
@@ -135,20 +132,25 @@ def _panel(low, high, nodes, bonds, tally, now, law, growth, table, v0, dt):
 
 @njit(error_model="numpy")
 def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
-    """Path-mean weight over the increment: closed for the stretch reading of order 1, else Gauss points on panels that
-    double from half a bond length (three points where the increment is short and the force smooth, else five)."""
+    """Path-mean weight over the increment.
+
+    Closed for the stretch reading of order 1. Else Simpson's rule where the increment is short (its first force is
+    known), five Gauss points up to one bond length, beyond it such panels that double from half a bond length.
+    """
     if dq == 0:
         return tally[5]
     if law[1] == MOMENTS:
         return list_slope(dq, bonds, tally, now, law, growth, v0, dt)[0]
     size = abs(dq) / now[4]
-    nodes = (dq, 3 if size <= PIECE and law[0] >= 1 else 5)
+    if tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0:
+        half = list_force(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
+        return (tally[5] + 4 * half + list_force(dq, bonds, tally, now, law, growth, table, v0, dt)) / 6
     if size <= 1:
-        return _panel(0.0, 1.0, nodes, bonds, tally, now, law, growth, table, v0, dt)
+        return _panel(0.0, 1.0, dq, bonds, tally, now, law, growth, table, v0, dt)
     low, high, out = 0.0, 0.5 / size, 0.0
     while low < 1:
         high = 1.0 if high > 0.75 else high
-        out += _panel(low, high, nodes, bonds, tally, now, law, growth, table, v0, dt)
+        out += _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt)
         low, high = high, 2 * high
     return out
 
@@ -176,8 +178,7 @@ def list_step(dq, bonds, tally, now, law, growth, table, v0, v1, dt):
         _cut(bonds, tally, now, law)
         if law[5] > 0 and tally[1] - tally[0] > 1.2 * tally[3] + 12:
             merge(bonds, tally, now, law)
-    tally[5] = list_force(0.0, bonds, tally, now, law, growth, table, 0.0, 0.0)
-    tally[4] = list_energy(bonds, tally, now, law, table)
+    tally[5], tally[4] = list_state(0.0, bonds, tally, now, law, growth, table, 0.0, 0.0)
     tally[10] = max(tally[10], tally[1] - tally[0])
     return done
 

@@ -7,6 +7,9 @@ from numba import njit
 
 from .bond_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
 
+GONE = 1e-8  # share of a bond length that was there when a bond formed
+MOST_AGED = 0.5  # widest growth J across one strip of growing bonds
+
 
 @njit(error_model="numpy")
 def merge(bonds, tally, now, law):
@@ -22,7 +25,7 @@ def merge(bonds, tally, now, law):
         if k > head:
             last = out - 1
             joint = bonds[8, last] + bonds[8, k]
-            narrow = joint <= limit
+            narrow = joint <= limit and (law[1] != AGED or _evenly_aged(bonds, last, k, now))
             if narrow and law[1] == MOMENTS:
                 _join_moments(bonds, last, k)
                 continue
@@ -35,8 +38,12 @@ def merge(bonds, tally, now, law):
                 if last == head + many:
                     _spread(bonds, last, law)
                     many += 1
-                _join_spread(bonds, last, k, spread, law)
+                _join_spread(bonds, last, k, spread, now, law)
                 continue
+            if last == head + many and bonds[8, last] <= 0.5 * limit and (bonds[1, last] - bonds[0, last]) * (
+                    bonds[1, k] - bonds[0, k]) < 0 and law[1] != MOMENTS:
+                _spread(bonds, last, law)
+                many += 1
         if out != k:
             for i in range(bonds.shape[0]):
                 bonds[i, out] = bonds[i, k]
@@ -44,6 +51,15 @@ def merge(bonds, tally, now, law):
             many += 1
         out += 1
     tally[1], tally[2], tally[3] = out, many, out - head
+
+
+@njit(error_model="numpy")
+def _evenly_aged(bonds, i, k, now):
+    """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds."""
+    young = start_length(0.0, bonds[5, k], bonds[6, k])
+    if exp(now[5] - now[3]) * young <= GONE * now[4]:
+        return True
+    return young <= exp(MOST_AGED) * start_length(1.0, bonds[5, i], bonds[6, i])
 
 
 @njit(error_model="numpy")
@@ -87,8 +103,8 @@ def _join_ends(bonds, i, k, now, law):
     """Two strips of one pass, end to end; their first moments stay."""
     left, right = bonds[3, i], bonds[3, k]
     if law[1] == AGED:
-        c0 = _aged_at(FIRST * (left + right), left, right, bonds, i, k)
-        c1 = _aged_at(SECOND * (left + right), left, right, bonds, i, k)
+        c0 = _aged_at(FIRST * (left + right), left, right, bonds, i, k, now)
+        c1 = _aged_at(SECOND * (left + right), left, right, bonds, i, k, now)
     bonds[1, i] = bonds[1, k]
     _join_clock(bonds, i, k)
     if law[1] == AGED:
@@ -100,8 +116,10 @@ def _join_ends(bonds, i, k, now, law):
 
 
 @njit(error_model="numpy")
-def _aged_at(back, left, right, bonds, i, k):
-    """Scaled starting length at `back` [m] from the end of two strips."""
+def _aged_at(back, left, right, bonds, i, k, now):
+    """Scaled starting length at `back` [m] from the end of two strips, zero once it is gone from both."""
+    if exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]:
+        return 0.0
     j, part = (k, back / right) if back <= right else (i, (back - right) / left)
     return start_length(part, bonds[5, j], bonds[6, j])
 
@@ -117,7 +135,7 @@ def _spread(bonds, k, law):
 
 
 @njit(error_model="numpy")
-def _join_spread(bonds, i, k, spread, law):
+def _join_spread(bonds, i, k, spread, now, law):
     """Add strip k to the spread strip i: mean range by the path covered."""
     a, b = bonds[8, i], bonds[8, k]
     low, high = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
@@ -127,7 +145,7 @@ def _join_spread(bonds, i, k, spread, law):
         bonds[5, i] += bonds[5, k] + (0.0 if spread else bonds[6, k])
     elif law[1] == AGED:
         left, right = bonds[3, i], bonds[3, k]
-        c0 = _aged_at(FIRST * (left + right), left, right, bonds, i, k)
-        bonds[6, i] = _aged_at(SECOND * (left + right), left, right, bonds, i, k)
+        c0 = _aged_at(FIRST * (left + right), left, right, bonds, i, k, now)
+        bonds[6, i] = _aged_at(SECOND * (left + right), left, right, bonds, i, k, now)
         bonds[5, i] = c0
     _join_clock(bonds, i, k)

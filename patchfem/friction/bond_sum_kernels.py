@@ -13,7 +13,7 @@ its end. Scaled: times exp(clock - ref), so that ageing multiplies the whole sum
 from math import exp
 
 import numpy as np
-from numba import njit
+from numba import njit, uint64
 
 from .bond_math_kernels import FAST, fexp, flog, share, tabled
 
@@ -24,42 +24,43 @@ FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, see
 @njit(error_model="numpy", fastmath=FAST)
 def moments_of(q, scale, bonds, head, end):
     """(sum k, sum k u, sum k u^2) of strips in MOMENTS form, k without the factor 1/eps_0."""
-    y, var, w = bonds[0, head:end], bonds[1, head:end], bonds[5, head:end]
     m, z, s2 = 0.0, 0.0, 0.0
-    for k in range(y.size):
-        u = q - y[k]
-        m += w[k]
-        z += w[k] * u
-        s2 += w[k] * (u * u + var[k])
+    for k in range(uint64(head), uint64(end)):
+        u, w = q - bonds[0, k], bonds[5, k]
+        m += w
+        z += w * u
+        s2 += w * (u * u + bonds[1, k])
     return m * scale, z * scale, s2 * scale
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _powers(q, a, b, w0, w1, p, odd):
-    """Sum of w |u|^p, times the sign of u when odd, over both Gauss points of strips that one pass left."""
-    total = 0.0
+def _powers(q, bonds, first, end, p):
+    """Sums of w |u|^p sgn u and of w |u|^(p + 1) over both Gauss points of strips that one pass left."""
+    force, energy = 0.0, 0.0
     if p == 0.0:
-        for k in range(a.size):
-            step = b[k] - a[k]
-            u, v = q - b[k] + FIRST * step, q - b[k] + SECOND * step
-            total += w0[k] * np.sign(u) + w1[k] * np.sign(v)
-    elif p == 2.0 and odd:
-        for k in range(a.size):
-            step = b[k] - a[k]
-            u, v = q - b[k] + FIRST * step, q - b[k] + SECOND * step
-            total += w0[k] * u * abs(u) + w1[k] * v * abs(v)
-    elif p == 3.0 and not odd:
-        for k in range(a.size):
-            step = b[k] - a[k]
-            u, v = q - b[k] + FIRST * step, q - b[k] + SECOND * step
-            total += w0[k] * u * u * abs(u) + w1[k] * v * v * abs(v)
+        for k in range(uint64(first), uint64(end)):
+            b = bonds[1, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            force += np.copysign(bonds[5, k], u) + np.copysign(bonds[6, k], v)
+            energy += bonds[5, k] * abs(u) + bonds[6, k] * abs(v)
+    elif p == 2.0:
+        for k in range(uint64(first), uint64(end)):
+            b = bonds[1, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            f, g = bonds[5, k] * u * u, bonds[6, k] * v * v
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
     else:
-        for k in range(a.size):
-            step = b[k] - a[k]
-            u, v = q - b[k] + FIRST * step, q - b[k] + SECOND * step
-            f, g = w0[k] * fexp(p * flog(abs(u))), w1[k] * fexp(p * flog(abs(v)))
-            total += np.copysign(f, u) + np.copysign(g, v) if odd else f + g
-    return total
+        for k in range(uint64(first), uint64(end)):
+            b = bonds[1, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            f, g = bonds[5, k] * fexp(p * flog(abs(u))), bonds[6, k] * fexp(p * flog(abs(v)))
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
+    return force, energy
 
 
 @njit(error_model="numpy")
@@ -86,70 +87,112 @@ def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
 
 
 @njit(error_model="numpy")
-def _spread(q, a, b, p, odd):
-    """Mean of |u|^p (times its sign) over places uniform between a < b."""
-    wide = b - a
-    middle = q - (a + b) / 2
-    if wide < 1e-5 * abs(middle) or wide == 0:
-        f = fexp(p * flog(abs(middle)))
-        return f * np.sign(middle) if odd else f
+def spread_over(q, a, b, p):
+    """Means of |u|^p sgn u and of |u|^(p + 1) over places uniform between a < b."""
+    wide, middle = b - a, q - (a + b) / 2
     if p == 0.0:
-        return min(max(2 * middle / wide, -1.0), 1.0)
-    u, v = abs(q - a), abs(q - b)
-    f, g = fexp((p + 1) * flog(u)), fexp((p + 1) * flog(v))
-    if not odd:
-        f, g = f * np.sign(q - a), g * np.sign(q - b)
-    return (f - g) / ((p + 1) * wide)
+        far = abs(middle)
+        if 2 * far >= wide:
+            return np.sign(middle), far
+        return 2 * middle / wide, wide / 4 + middle * middle / wide
+    if wide < 1e-4 * abs(middle) or wide == 0:
+        f = fexp(p * flog(abs(middle)))
+        return f * np.sign(middle), f * abs(middle)
+    u, v = q - a, q - b
+    f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
+    return (f - g) / ((p + 1) * wide), (f * u - g * v) / ((p + 2) * wide)
 
 
-@njit(error_model="numpy", fastmath=FAST)
-def power_sum(q, bonds, head, many, end, p, odd, nodes):
-    """Scaled sum of w |u|^p (odd: times sgn u) over strips in POWER form; the first `many` are spread."""
+@njit(error_model="numpy")
+def power_sums(q, bonds, head, many, end, p, coarse, nodes):
+    """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
+
+    coarse: strips with u = 0 inside are taken as spread evenly over their places, as merging does.
+    """
     first = head + many
-    a, b, w0, w1 = bonds[0, first:end], bonds[1, first:end], bonds[5, first:end], bonds[6, first:end]
-    total = _powers(q, a, b, w0, w1, p, odd)
-    smooth = (odd and (p == 1.0 or p == 3.0)) or (not odd and (p == 2.0 or p == 4.0))
-    if not smooth:
-        wide = 1.0 if p == 0.0 or p == 2.0 or p == 3.0 else 5.0
-        for k in range(a.size):
-            if abs(2 * q - a[k] - b[k]) <= wide * abs(b[k] - a[k]):
-                total += _beside_turn(q, a[k], b[k], bonds[3, first + k], w0[k], p, odd, nodes) \
-                    - _powers(q, a[k:k + 1], b[k:k + 1], w0[k:k + 1], w1[k:k + 1], p, odd)
+    force, energy = _powers(q, bonds, first, end, p)
+    smooth = p == 3.0 or (coarse and p >= 1)
+    near = 1.0 if p == 0.0 or p == 2.0 or coarse else 5.0
+    for k in range(end if smooth else first, end):
+        a, b = bonds[0, k], bonds[1, k]
+        if abs(2 * q - a - b) > near * abs(b - a):
+            continue
+        less, lower = _powers(q, bonds, k, k + 1, p)
+        if coarse:
+            more, higher = spread_over(q, min(a, b), max(a, b), p)
+            more, higher = more * (bonds[5, k] + bonds[6, k]), higher * (bonds[5, k] + bonds[6, k])
+        else:
+            more = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p, True, nodes)
+            higher = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p + 1, False, nodes[8:])
+        force += more - less
+        energy += higher - lower
     for k in range(head, first):
-        total += bonds[5, k] * _spread(q, bonds[0, k], bonds[1, k], p, odd)
-    return total
+        f, g = spread_over(q, bonds[0, k], bonds[1, k], p)
+        force += bonds[5, k] * f
+        energy += bonds[5, k] * g
+    return force, energy
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def shares_sum(q, path, bonds, head, many, end, p, eps0, table, norm):
-    """Sum of the printed law at constant length; strips of one pass are split where u changes sign."""
+def _shares_closed(q, path, bonds, first, end, p, eps0):
+    """Force and energy [m] of strips of one pass for p = 0, 1, 2; S = 1 - (1 + ..) exp(-x), lever (p + 1) S - x phi."""
+    force, energy = 0.0, 0.0
+    one, two = min(p, 1.0), max(p - 1, 0.0) * 0.5
+    top = 1.0 - one  # x phi = exp(-x) x (top + one x (1 - t2) + two x x)
+    mid, most = one * (1.0 if p == 1.0 else 0.0), two
+    for k in range(uint64(first), uint64(end)):
+        b = bonds[1, k]
+        step = b - bonds[0, k]
+        g = np.copysign(1.0, step)
+        near = path - bonds[2, k]
+        turn = min(max(g * (b - q), 0.0), abs(step))
+        x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
+        ex, ey, ez = fexp(-x), fexp(-y), fexp(-z)
+        sx, sy = (1 + one * x * (1 + two * x)) * ex, (1 + one * y * (1 + two * y)) * ey
+        sz = (1 + one * z * (1 + two * z)) * ez
+        share = 2 * sy - sx - sz
+        lx, ly = ex * x * (top + x * (mid + x * most)), ey * y * (top + y * (mid + y * most))
+        lever = (p + 1) * share + 2 * ly - lx - ez * z * (top + z * (mid + z * most))
+        force += g * share
+        energy += g * (q - b - g * near) * share + eps0 * lever
+    return force, energy
+
+
+@njit(error_model="numpy")
+def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
+    """Force and energy [m] of the printed law at constant length; strips of one pass are split where u changes sign."""
     first = head + many
-    total = 0.0
-    a, b, at = bonds[0, first:end], bonds[1, first:end], bonds[2, first:end]
+    force, energy = 0.0, 0.0
     if p == 0.0 or p == 1.0 or p == 2.0:
-        one, two = min(p, 1.0), max(p - 1, 0.0) * 0.5
-        for k in range(a.size):
-            step = b[k] - a[k]
-            g = np.copysign(1.0, step)
-            near = path - at[k]
-            turn = min(max(g * (b[k] - q), 0.0), abs(step))
-            x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
-            total += g * (2 * (1 + one * y * (1 + two * y)) * fexp(-y) - (1 + one * x * (1 + two * x)) * fexp(-x)
-                          - (1 + one * z * (1 + two * z)) * fexp(-z))
+        force, energy = _shares_closed(q, path, bonds, first, end, p, eps0)
     else:
-        for k in range(a.size):
-            step = b[k] - a[k]
+        before, lever = -1.0, 0.0
+        for k in range(end - 1, first - 1, -1):
+            step = bonds[1, k] - bonds[0, k]
             g = np.copysign(1.0, step)
-            near = path - at[k]
-            turn = min(max(g * (b[k] - q), 0.0), abs(step))
-            total += g * (tabled(p, near / eps0, table, norm) + tabled(p, (near + abs(step)) / eps0, table, norm)
-                          - 2 * tabled(p, (near + turn) / eps0, table, norm))
+            near = path - bonds[2, k]
+            turn = min(max(g * (bonds[1, k] - q), 0.0), abs(step))
+            x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
+            if before < 0:
+                before = tabled(p, x, table, norm)
+                lever = _lever(p, x, before, norm)
+            sx, lx = before, lever
+            before = tabled(p, z, table, norm)
+            lever = _lever(p, z, before, norm)
+            sy, ly = (sx, lx) if turn == 0 else (before, lever)
+            if 0 < turn < abs(step):
+                sy = tabled(p, y, table, norm)
+                ly = _lever(p, y, sy, norm)
+            share = before - 2 * sy + sx
+            force += g * share
+            energy += g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx)
     for k in range(head, first):
-        near, wide = path - bonds[2, k], bonds[1, k] - bonds[0, k]
-        part = min(max((2 * q - bonds[0, k] - bonds[1, k]) / wide, -1.0), 1.0) if wide > 0 else np.sign(q - bonds[0, k])
-        if part != 0:
-            total += part * (tabled(p, (near + bonds[3, k]) / eps0, table, norm) - tabled(p, near / eps0, table, norm))
-    return total
+        near = path - bonds[2, k]
+        part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
+        own = tabled(p, (near + bonds[3, k]) / eps0, table, norm) - tabled(p, near / eps0, table, norm)
+        force += part * own
+        energy += far * own
+    return force, energy
 
 
 @njit(error_model="numpy")
@@ -160,51 +203,31 @@ def _lever(p, x, s, norm):
     return (p + 1) * s - norm * fexp((p + 1) * flog(x) - x)
 
 
-@njit(error_model="numpy")
-def shares_energy(q, path, bonds, head, many, end, p, eps0, table, norm):
-    """Sum of k |u| [m] of the printed law at constant length, exact."""
-    total = 0.0
-    for k in range(head, end):
-        a, b = bonds[0, k], bonds[1, k]
-        near = path - bonds[2, k]
-        x, z = near / eps0, (near + bonds[3, k]) / eps0
-        sx, sz = tabled(p, x, table, norm), tabled(p, z, table, norm)
-        if k < head + many:
-            wide, middle = b - a, abs(q - (a + b) / 2)
-            far = middle if 2 * middle >= wide else ((q - a)**2 + (b - q)**2) / (2 * wide)
-            total += far * (sz - sx)
-            continue
-        g = np.copysign(1.0, b - a)
-        turn = min(max(g * (b - q), 0.0), abs(b - a))
-        y = (near + turn) / eps0
-        sy = tabled(p, y, table, norm)
-        level = q - b - g * near
-        lx, ly, lz = _lever(p, x, sx, norm), _lever(p, y, sy, norm), _lever(p, z, sz, norm)
-        total += g * (level * (sz - 2 * sy + sx) + g * eps0 * (lz - 2 * ly + lx))
-    return total
-
-
 @njit(error_model="numpy", fastmath=FAST)
-def _aged(q, path, psi, length, a, b, at, wide, c0, c1, p, odd):
-    """Sum over both Gauss points of W/2 f(R/own), own = length - psi c; times sgn u (odd) or |u| [m]."""
-    total = 0.0
+def _aged(q, path, psi, length, bonds, first, end, p):
+    """Sums over both Gauss points of W/2 f(R/own), own = length - psi c, times sgn u and times |u| [m]."""
+    force, energy, least = 0.0, 0.0, 1e-9 * length
     if p == 1.0:
-        for k in range(a.size):
-            step, near = b[k] - a[k], path - at[k]
-            u, v = q - b[k] + FIRST * step, q - b[k] + SECOND * step
-            x = max(near + FIRST * wide[k], 1e-300) / max(length - psi * c0[k], 1e-9 * length)
-            y = max(near + SECOND * wide[k], 1e-300) / max(length - psi * c1[k], 1e-9 * length)
-            f, g = wide[k] * x * fexp(-x), wide[k] * y * fexp(-y)
-            total += np.copysign(f, u) + np.copysign(g, v) if odd else f * abs(u) + g * abs(v)
+        for k in range(uint64(first), uint64(end)):
+            b, wide, near = bonds[1, k], bonds[3, k], path - bonds[2, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            x = (near + FIRST * wide) / max(length - psi * bonds[5, k], least)
+            y = (near + SECOND * wide) / max(length - psi * bonds[6, k], least)
+            f, g = wide * x * fexp(-x), wide * y * fexp(-y)
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
     else:
-        for k in range(a.size):
-            step, near = b[k] - a[k], path - at[k]
-            u, v = q - b[k] + FIRST * step, q - b[k] + SECOND * step
-            x = max(near + FIRST * wide[k], 1e-300) / max(length - psi * c0[k], 1e-9 * length)
-            y = max(near + SECOND * wide[k], 1e-300) / max(length - psi * c1[k], 1e-9 * length)
-            f, g = wide[k] * fexp(p * flog(x) - x), wide[k] * fexp(p * flog(y) - y)
-            total += np.copysign(f, u) + np.copysign(g, v) if odd else f * abs(u) + g * abs(v)
-    return 0.5 * total
+        for k in range(uint64(first), uint64(end)):
+            b, wide, near = bonds[1, k], bonds[3, k], path - bonds[2, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            x = max(near + FIRST * wide, 1e-300) / max(length - psi * bonds[5, k], least)
+            y = max(near + SECOND * wide, 1e-300) / max(length - psi * bonds[6, k], least)
+            f, g = wide * fexp(p * flog(x) - x), wide * fexp(p * flog(y) - y)
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
+    return 0.5 * force, 0.5 * energy
 
 
 @njit(error_model="numpy")
@@ -221,9 +244,9 @@ def own_length(part, psi, length, c0, c1):
 
 
 @njit(error_model="numpy")
-def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p, odd):
+def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
     """One strip of growing bonds with u = 0 inside, or with R^p (p < 0) still steep: two points on each side."""
-    step, near, total = b - a, path - at, 0.0
+    step, near, force, energy = b - a, path - at, 0.0, 0.0
     turn = min(max((b - q) / step, 0.0), 1.0)
     steep = p < 0 and near < 3 * wide and own_length(0.0, psi, length, c0, c1) > 0.5 * own_length(
         1.0, psi, length, c0, c1)
@@ -243,29 +266,38 @@ def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p, odd):
                 x = max(near + part * wide, 1e-300) / own_length(part, psi, length, c0, c1)
                 f = 0.5 * (high - low) * wide * fexp(p * flog(x) - x)
             u = q - b + part * step
-            total += np.copysign(f, u) if odd else f * abs(u)
-    return total
+            force += np.copysign(f, u)
+            energy += f * abs(u)
+    return force, energy
 
 
-@njit(error_model="numpy", fastmath=FAST)
-def aged_sum(q, path, psi, length, bonds, head, many, end, p, odd):
-    """Sum over strips of growing bonds of path f(R/own) sgn u (odd) or |u| [m], without the factor 1/eps_0."""
+@njit(error_model="numpy")
+def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
+    """Sums over strips of growing bonds of path f(R/own) sgn u and of the same times |u| [m], no factor 1/eps_0."""
     first = head + many
-    a, b, at, wide = bonds[0, first:end], bonds[1, first:end], bonds[2, first:end], bonds[3, first:end]
-    c0, c1 = bonds[5, first:end], bonds[6, first:end]
-    total = _aged(q, path, psi, length, a, b, at, wide, c0, c1, p, odd)
-    for k in range(a.size):
-        if (q - a[k]) * (q - b[k]) < 0 or (p < 0 and path - at[k] < 3 * wide[k]):
-            total += _aged_split(q, path, psi, length, a[k], b[k], at[k], wide[k], c0[k], c1[k], p, odd) \
-                - _aged(q, path, psi, length, a[k:k + 1], b[k:k + 1], at[k:k + 1], wide[k:k + 1], c0[k:k + 1],
-                        c1[k:k + 1], p, odd)
+    force, energy = _aged(q, path, psi, length, bonds, first, end, p)
+    for k in range(first, end):
+        a, b, near, wide = bonds[0, k], bonds[1, k], path - bonds[2, k], bonds[3, k]
+        if (q - a) * (q - b) >= 0 and (p >= 0 or near > 3 * wide):
+            continue
+        less, lower = _aged(q, path, psi, length, bonds, k, k + 1, p)
+        if coarse and p >= 0 and near > 3 * length:
+            part, far = spread_over(q, min(a, b), max(a, b), 0.0)
+            own = _aged(max(a, b) + wide, path, psi, length, bonds, k, k + 1, p)[0]
+            more, higher = part * own, far * own
+        else:
+            more, higher = _aged_split(q, path, psi, length, a, b, bonds[2, k], wide, bonds[5, k], bonds[6, k], p)
+        force += more - less
+        energy += higher - lower
     for k in range(head, first):
         near, dl = path - bonds[2, k], bonds[3, k]
         x = max(near + FIRST * dl, 1e-300) / max(length - psi * bonds[5, k], 1e-9 * length)
         y = max(near + SECOND * dl, 1e-300) / max(length - psi * bonds[6, k], 1e-9 * length)
-        f = 0.5 * dl * (fexp(p * flog(x) - x) + fexp(p * flog(y) - y))
-        total += f * _spread(q, bonds[0, k], bonds[1, k], 0.0 if odd else 1.0, odd)
-    return total
+        own = 0.5 * dl * (fexp(p * flog(x) - x) + fexp(p * flog(y) - y))
+        part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
+        force += part * own
+        energy += far * own
+    return force, energy
 
 
 @njit(error_model="numpy")

@@ -5,7 +5,6 @@ Flags: only fast-math that keeps NaN and infinity meaningful. All arrays are C-o
 
 from math import exp, log
 
-import numpy as np
 from numba import njit
 
 FAST = {"reassoc", "contract", "arcp"}
