@@ -221,6 +221,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
     if scene.friction is not None and scene.friction.law == "tanh":
         warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
                     f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
+    warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
     warnings = [*warnings, raw.message] if raw.message else warnings
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 

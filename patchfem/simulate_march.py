@@ -261,7 +261,12 @@ class _Run:
         _, energy, _ = self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))
         motion = 0.5 * self.modes.mass * float(np.sum(self.state[:, 1]**2 + (self.modes.omega * self.state[:, 0])**2))
         names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
-        return dict(zip(names, map(float, self.ledger))) | {"stored": motion + energy}
+        book = dict(zip(names, map(float, self.ledger))) | {"stored": motion + energy}
+        tally = self.contact.tally
+        if tally.size:
+            book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),
+                     "strips": float(tally[10])}
+        return book
 
 
 def _thinned(rows, n) -> np.ndarray:

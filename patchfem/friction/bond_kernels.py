@@ -81,7 +81,7 @@ def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
     Friction force = mu_s N * weight. Energy: the force of each bond over its own stretch at frozen damage.
     """
     q, path, damage, age, eps, middle = _after(dq, now, growth, v0, v0, dt)
-    head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] > 0
+    head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] * law[2]
     force, energy = first_bonds(q, path, damage, law)
     size, young = abs(dq), 0.0
     if law[1] == MOMENTS:
@@ -89,7 +89,7 @@ def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
         force += z / law[2]
         energy += s2 / (2 * law[2])
     elif law[1] == POWER:
-        f, g = power_sums(q, bonds, head, many, end, p, coarse, law[8:24])
+        f, g = power_sums(q, damage, bonds, head, many, end, p, coarse, law[8:24])
         scale = law[4] / law[2] * exp(now[5] - damage)
         force += scale * f
         energy += scale * g / (p + 1)

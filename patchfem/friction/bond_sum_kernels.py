@@ -104,21 +104,25 @@ def spread_over(q, a, b, p):
 
 
 @njit(error_model="numpy")
-def power_sums(q, bonds, head, many, end, p, coarse, nodes):
+def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
     """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
 
-    coarse: strips with u = 0 inside are taken as spread evenly over their places, as merging does.
+    coarse: strips with u = 0 inside are taken as spread evenly over their places where they are narrower than
+    coarse exp(age/3) [m], as merging does; 0 for none.
     """
     first = head + many
     force, energy = _powers(q, bonds, first, end, p)
-    smooth = p == 3.0 or (coarse and p >= 1)
-    near = 1.0 if p == 0.0 or p == 2.0 or coarse else 5.0
+    smooth = p == 3.0
+    near = 1.0 if p == 0.0 or p == 2.0 else 5.0
     for k in range(end if smooth else first, end):
         a, b = bonds[0, k], bonds[1, k]
         if abs(2 * q - a - b) > near * abs(b - a):
             continue
+        narrow = abs(b - a) <= coarse * fexp((damage - bonds[2, k]) / 3)
+        if narrow and (p >= 1 or abs(2 * q - a - b) > abs(b - a)):
+            continue
         less, lower = _powers(q, bonds, k, k + 1, p)
-        if coarse:
+        if narrow:
             more, higher = spread_over(q, min(a, b), max(a, b), p)
             more, higher = more * (bonds[5, k] + bonds[6, k]), higher * (bonds[5, k] + bonds[6, k])
         else:
@@ -281,7 +285,7 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
         if (q - a) * (q - b) >= 0 and (p >= 0 or near > 3 * wide):
             continue
         less, lower = _aged(q, path, psi, length, bonds, k, k + 1, p)
-        if coarse and p >= 0 and near > 3 * length:
+        if p >= 0 and wide <= coarse * fexp(near / (3 * length)) and near > length:
             part, far = spread_over(q, min(a, b), max(a, b), 0.0)
             own = _aged(max(a, b) + wide, path, psi, length, bonds, k, k + 1, p)[0]
             more, higher = part * own, far * own
