@@ -225,9 +225,11 @@ class _Run:
 
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
-        have, used = self.contact.bondlist.shape[1], int(self.contact.tally[1] - self.contact.tally[0])
-        want = used + 4 * steps + 256
-        if not have or want <= have or have >= MOST_STRIPS:
+        have = self.contact.bondlist.shape[1]
+        if not have:
+            return
+        want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
+        if want <= have or have >= MOST_STRIPS:
             return
         wider = np.zeros((10, min(max(want, 2 * have), MOST_STRIPS)))
         wider[:, :have] = self.contact.bondlist

@@ -8,7 +8,7 @@ from .bond_list import AGED, MOMENTS, POWER, SHARES, form_of
 from .law import Bonds
 
 ENGINES = ("direct", "truncated", "merged", "exponential", "recursion")
-MERGING = 0.25  # largest measured error over the square of the merge width, friction limit = 1
+MERGING = (0.25, 1.0)  # largest measured error over the square of the merge width for order >= 1 and below it
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
 SHARES_ANY = 4e-8  # the same for the printed law at constant length with an order other than 0, 1, 2
 PASS, STEP = 1.5e-7, 5e-7  # seconds per pass over the list and per step besides
@@ -63,7 +63,7 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
     if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
         return Choice("recursion", 0.0, 0.0, 0.0, 0.0, RECURSION)
     cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
-    width = merge if merge is not None else min(0.02, sqrt(0.025 * tolerance / MERGING) * 2)
+    width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / MERGING[law.order < 1]))
     found = [_priced(law, name, cut, width, stroke, steps) for name in ("truncated", "merged")]
     if engine == "direct":
         return _priced(law, "direct", 0.0, 0.0, stroke, steps)
@@ -93,5 +93,5 @@ def _priced(law, name, tail, merge, stroke, steps) -> Choice:
         cost = SHARES_ANY
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
     seconds = STEP + PASSES * (PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
-    error = tail + (MERGING * merge**2 if name == "merged" and form != MOMENTS else 0.0)
+    error = tail + (MERGING[law.order < 1] * merge**2 if name == "merged" and form != MOMENTS else 0.0)
     return Choice(name, tail, merge if name == "merged" else 0.0, error, strips, seconds)
