@@ -7,7 +7,7 @@ from .friction.bond_kernels import list_mean, list_slope, list_step
 from .friction.bond_sum_kernels import MOMENTS
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def list_scalar(dq, c, v0, dt):
     """Path-mean force [N] and slope [N/m] of a bond list; a slope of zero stands for an unknown one."""
     scale = c.force[0]
@@ -50,7 +50,7 @@ def solve_list(free, beta, guess, c, v0, dt, goal):
     return here, force, -300
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def commit_list(dq, force, v0, v1, dt, c):
     """Move the list by the solved step. Returns (work that is not stored [J], ok).
 

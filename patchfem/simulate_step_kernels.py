@@ -108,10 +108,11 @@ def scalar_force(dq, kind, c, eps, v0, dt):
         return c.force[0] * part, c.force[0] * (1 - part * part) / (dt * c.force[1])
     if kind == POINTS:
         force, slope = 0.0, 0.0
-        for j in range(c.weight.size):
-            mean, s = bond_mean(c.bonds[0, j], c.bonds[1, j], dq, c.source[j], eps)
-            force += c.weight[j] * mean
-            slope += c.weight[j] * s
+        weight, bonds, source = c.weight, c.bonds, c.source
+        for j in range(weight.size):
+            mean, s = bond_mean(bonds[0, j], bonds[1, j], dq, source[j], eps)
+            force += weight[j] * mean
+            slope += weight[j] * s
         return force, slope
     return list_scalar(dq, c, v0, dt)
 
@@ -346,12 +347,12 @@ def contact_state(kind, c, q, held):
     if kind == LIST:
         force = c.force[0] * c.tally[5]
         return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
-    weight, bonds, kappa, b = c.weight, c.bonds, c.kappa, c.b
+    weight, bonds, source, kappa, b = c.weight, c.bonds, c.source, c.kappa, c.b
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
     for j in range(weight.size):
         force += weight[j] * bonds[1, j]
         energy += 0.5 * weight[j] * bonds[2, j]
-        share = weight[j] * c.source[j]
+        share = weight[j] * source[j]
         if bonds[0, j] > 0:
             slip += share * (bonds[3, j] - bonds[1, j] / bonds[0, j])
             total += share

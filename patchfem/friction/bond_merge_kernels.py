@@ -8,7 +8,7 @@ from numba import njit
 from .bond_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
 
 GONE = 1e-8  # share of a bond length that was there when a bond formed
-MOST_AGED = 0.5  # widest growth J across one strip of growing bonds
+MOST_AGED = 0.1  # widest growth J across one strip of growing bonds
 
 
 @njit(error_model="numpy")
@@ -33,14 +33,15 @@ def merge(bonds, tally, now, law):
                     and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 and law[1] != SHARES:
                 _join_ends(bonds, last, k, now, law)
                 continue
-            if narrow and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
+            grown = law[1] != AGED or _gone(bonds, k, now)
+            if narrow and grown and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
                     min(age, 200.0)), tally):
                 if last == head + many:
                     _spread(bonds, last, law)
                     many += 1
                 _join_spread(bonds, last, k, spread, now, law)
                 continue
-            if last == head + many and bonds[8, last] <= 0.5 * limit and (bonds[1, last] - bonds[0, last]) * (
+            if last == head + many and bonds[8, last] <= 0.5 * limit and grown and (bonds[1, last] - bonds[0, last]) * (
                     bonds[1, k] - bonds[0, k]) < 0 and law[1] != MOMENTS:
                 _spread(bonds, last, law)
                 many += 1
@@ -54,11 +55,17 @@ def merge(bonds, tally, now, law):
 
 
 @njit(error_model="numpy")
+def _gone(bonds, k, now):
+    """Whether nothing is left of the starting lengths of a strip."""
+    return exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]
+
+
+@njit(error_model="numpy")
 def _evenly_aged(bonds, i, k, now):
     """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds."""
-    young = start_length(0.0, bonds[5, k], bonds[6, k])
-    if exp(now[5] - now[3]) * young <= GONE * now[4]:
+    if _gone(bonds, k, now):
         return True
+    young = start_length(0.0, bonds[5, k], bonds[6, k])
     return young <= exp(MOST_AGED) * start_length(1.0, bonds[5, i], bonds[6, i])
 
 
@@ -118,7 +125,7 @@ def _join_ends(bonds, i, k, now, law):
 @njit(error_model="numpy")
 def _aged_at(back, left, right, bonds, i, k, now):
     """Scaled starting length at `back` [m] from the end of two strips, zero once it is gone from both."""
-    if exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]:
+    if _gone(bonds, k, now):
         return 0.0
     j, part = (k, back / right) if back <= right else (i, (back - right) / left)
     return start_length(part, bonds[5, j], bonds[6, j])

@@ -8,7 +8,7 @@ from .bond_list import AGED, MOMENTS, POWER, SHARES, form_of
 from .law import Bonds
 
 ENGINES = ("direct", "truncated", "merged", "exponential", "recursion")
-MERGING = (0.25, 1.0)  # largest measured error over the square of the merge width for order >= 1 and below it
+MERGING = (0.25, 0.75, 1.0)  # largest measured error over merge width squared: order >= 1, growing bonds, order < 1
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
 SHARES_ANY = 4e-8  # the same for the printed law at constant length with an order other than 0, 1, 2
 PASS, STEP = 1.5e-7, 5e-7  # seconds per pass over the list and per step besides
@@ -63,7 +63,7 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
     if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
         return Choice("recursion", 0.0, 0.0, 0.0, 0.0, RECURSION)
     cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
-    width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / MERGING[law.order < 1]))
+    width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / _merging(law)))
     found = [_priced(law, name, cut, width, stroke, steps) for name in ("truncated", "merged")]
     if engine == "direct":
         return _priced(law, "direct", 0.0, 0.0, stroke, steps)
@@ -73,6 +73,10 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
         return found[1] if merge > 0 else found[0]
     fit = [choice for choice in found if choice.error <= 0.1 * tolerance] or found[:1]
     return min(fit, key=lambda choice: choice.seconds)
+
+
+def _merging(law) -> float:
+    return MERGING[2 if law.order < 1 else 1 if form_of(law) == AGED else 0]
 
 
 def _priced(law, name, tail, merge, stroke, steps) -> Choice:
@@ -87,11 +91,11 @@ def _priced(law, name, tail, merge, stroke, steps) -> Choice:
     elif form == AGED:
         strips *= 2
     if name == "merged" and merge > 0:
-        strips = min(strips, 5 / merge + 20 + 2 * min(reach / stroke, 50))
+        strips = min(strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0))
     cost = STRIP[form]
     if form == SHARES and law.order not in (0, 1, 2):
         cost = SHARES_ANY
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
     seconds = STEP + PASSES * (PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
-    error = tail + (MERGING[law.order < 1] * merge**2 if name == "merged" and form != MOMENTS else 0.0)
+    error = tail + (_merging(law) * merge**2 if name == "merged" and form != MOMENTS else 0.0)
     return Choice(name, tail, merge if name == "merged" else 0.0, error, strips, seconds)
