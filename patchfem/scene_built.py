@@ -38,6 +38,7 @@ NOT_YET_BUILT: dict[str, str] = {
     "accuracy.method=newmark": "auto, exact or march",
     "accuracy.method=euler": "auto, exact or march",
     "accuracy.method=harmonic": "auto, exact or march",
+    "accuracy.quadrature=exponential": "auto or merged",
     "accuracy.harmonics": "",
     "accuracy.convergence": "",
     "accuracy.convergence_tolerance": "",
@@ -85,8 +86,6 @@ def combinations(draft: Draft, kind: str) -> None:
         draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
     if shear:
         _behind_shear(draft, law, shear)
-    elif kind == "rig" and law.law == "nonlocal" and law.reading == "report" and _inside(law.order, -1, 0):
-        draft.say("friction.order", f"{law.order:g} in a rig: use order >= 0 or a bench, [slide]; not yet built")
     if contact is not None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
         if contact.strips is not None and shear:

@@ -64,7 +64,7 @@ def check(draft: Draft) -> str:
     for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, _drive):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_method, _sliding, _run_length):
+    for rule in (_method, _quadrature, _sliding, _run_length):
         rule(draft, kind)
     return kind
 
@@ -349,6 +349,25 @@ def _method(draft: Draft, kind: str) -> None:
         beside = f" beside {shear}" if shear else ""
         draft.say("accuracy.method", f"no exact solution exists for law '{law.law}'{beside}; use 'march' or leave "
                                      "method out")  # fmt: skip
+
+
+def _quadrature(draft: Draft, kind: str) -> None:
+    """An engine of the sum over bonds must be able to sum the law, and the run must have such a sum."""
+    accuracy, law, contact = draft.tables.accuracy, draft.tables.friction, draft.tables.contact
+    engine = accuracy and accuracy.quadrature
+    if engine in (None, "auto") or f"accuracy.quadrature={engine}" in NOT_YET_BUILT:
+        return
+    if law is None or law.law != "nonlocal" or kind not in ("bench", "rig"):
+        draft.remark(f"accuracy.quadrature = '{engine}' has no meaning without law 'nonlocal' and is not used")
+        return
+    alone = law.reading == "stretch" and law.order == 1
+    key, shear = "accuracy.quadrature", contact.gives_way if contact is not None else ""
+    if engine == "recursion" and not alone:
+        draft.say(key, "'recursion' sums reading 'stretch' with order = 1 alone; use 'auto' or 'merged'")
+    elif engine != "recursion" and shear:
+        draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
+    elif engine == "merged" and kind == "bench":
+        draft.say(key, "'merged' in a bench: use 'auto', 'direct' or 'truncated'; not yet built")
 
 
 def method_unused(kind: str) -> tuple[str, ...]:

@@ -324,6 +324,7 @@ class Accuracy(Table):
     tolerance: Positive = 1e-3
     method: Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"] = "auto"
     steps_per_cycle: whole(4) | None = None
+    quadrature: Literal["auto", "direct", "truncated", "merged", "exponential", "recursion"] = "auto"
     tail: NotNegative | None = None
     merge: NotNegative | None = None
     harmonics: whole(1) | None = None

@@ -276,6 +276,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         law = rig.law_of(scene, drive.acceleration / drive.omega)
         warnings = [*warnings, *_unripe(law, float(np.abs(raw.window.slide_rate).max())),
                     *_creeping(law, outcome, found)]
+    warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
     warnings = [*warnings, raw.message] if raw.message else warnings
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 

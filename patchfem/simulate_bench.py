@@ -58,8 +58,11 @@ def law_for(scene, patch=None):
 
         return law_on(scene, patch)
     law = bonds_of(scene)
-    if law.reading == "stretch" and law.order == 1:
+    engine = scene.accuracy.quadrature
+    if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
         return Recursion(law)
+    if engine == "direct":
+        return Quadrature(law, 0.0)
     tail = scene.accuracy.tail if scene.accuracy.tail is not None else 1e-3 * scene.accuracy.tolerance
     return Quadrature(law, tail)
 

@@ -119,7 +119,8 @@ def follow_path(path, dt, kind, c, work, goal, burnt, forces):
     """Resultant along a prescribed slide path (k,) [m] with steps of dt [s].
 
     forces (k, 3): force at the sample, mean over the step that follows, irreversible slip; burnt (k, 2): energy
-    dissipated in the step that follows, energy stored at the sample. Returns the steps that did not converge.
+    dissipated in the step that follows, energy stored at the sample. Returns the steps that did not converge or found
+    the list of bonds full.
     """
     bad = 0
     if kind == POINTS and c.b.size == 0:
@@ -145,5 +146,6 @@ def follow_path(path, dt, kind, c, work, goal, burnt, forces):
             mean, count = solve_modes(y, dq, 0.0, c, middle, goal, work)
         bad += count < 0
         forces[i, 1] = mean
-        burnt[i, 0] = commit(dq, mean, v, v, dt, kind, c, work, middle, path[i], False)[0]
+        burnt[i, 0], ok = commit(dq, mean, v, v, dt, kind, c, work, middle, path[i], False)
+        bad += not ok
     return bad

@@ -9,7 +9,7 @@ from .compiled import load_kernels
 from .core import BaseSine, Missing, ModalBasis, Outcome, Response
 
 RATE = 4  # kind of a force that follows the speed, as in simulate_kernels
-LIST_CAPACITY = 20_000  # bonds of a shared list; beyond it a run is refused
+MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
 
@@ -100,14 +100,13 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     """One shared bond list for a rigid slide: any order, either reading; limit = mu_s N [N].
 
-    reach: cut-off in bond lengths; merge: widest merged bond in bond lengths at zero age.
+    reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    exact = law.reading == "report" and not law.grows
-    capacity = 4_000 if exact else LIST_CAPACITY
-    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bondlist": np.zeros((7, capacity)),
-              "now": [0.0, 0.0, 0.0, 0.0, law.length], "tally": [0.0, reach, merge],
-              "law": [law.order, float(law.reading == "report"), law.length, law.initial, float(exact)],
-              "growth": growth_numbers(law)}
+    from .friction.bond_list import law_numbers, room, share_table
+
+    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bondlist": np.zeros((10, room(law, reach, merge))),
+              "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
+              "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law)}
     return ContactModel(3, limit, fields, False, law.length)
 
 
@@ -208,6 +207,7 @@ class _Run:
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
         """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
         first, before, parts = self.done, self.ledger[8], []
+        self._make_room(size)
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, 2 * self.modes.omega.size + 5))
@@ -223,6 +223,18 @@ class _Run:
             if self.outcome is not None:
                 break
         return first, np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]), self.ledger[8] - before
+
+    def _make_room(self, steps: int) -> None:
+        """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
+        have = self.contact.bondlist.shape[1]
+        if not have:
+            return
+        want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
+        if want <= have or have >= MOST_STRIPS:
+            return
+        wider = np.zeros((10, min(max(want, 2 * have), MOST_STRIPS)))
+        wider[:, :have] = self.contact.bondlist
+        self.contact = self.contact._replace(bondlist=wider)
 
     def _judge(self, status: int) -> None:
         if status == 1:
@@ -252,7 +264,12 @@ class _Run:
         _, energy, _ = self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))
         motion = 0.5 * self.modes.mass * float(np.sum(self.state[:, 1]**2 + (self.modes.omega * self.state[:, 0])**2))
         names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
-        return dict(zip(names, map(float, self.ledger))) | {"stored": motion + energy}
+        book = dict(zip(names, map(float, self.ledger))) | {"stored": motion + energy}
+        tally = self.contact.tally
+        if tally.size:
+            book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),
+                     "strips": float(tally[10])}
+        return book
 
 
 def _thinned(rows, n) -> np.ndarray:

@@ -169,7 +169,7 @@ def block_shear(contact) -> float:
 
 
 def _rig_cost(scene, per_point, unknowns) -> tuple:
-    from .simulate_rig import choose, drive_of, list_cost
+    from .simulate_rig import choose, drive_of, list_cost, quadrature_of
 
     settings = choose(scene, per_point)
     drive = drive_of(scene)
@@ -179,7 +179,7 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
     f, shear = scene.friction, scene.contact is not None and bool(scene.contact.gives_way)
     each = 1e-6
     if f is not None and f.law == "nonlocal":
-        if f.reading == "report" or f.order != 1:
+        if quadrature_of(scene, settings, drive).engine != "recursion":
             each = list_cost(scene, settings, drive)[1] / steps
             unknowns["bond_list_about"] = int(list_cost(scene, settings, drive)[0])
         elif shear:
@@ -237,11 +237,13 @@ def _verdict(scene, groups, size: int) -> list:
         part = min(1.0, 1 / sqrt(tilt)) if tilt > 1 else 1.0
         out.append(f"tilt is {tilt:.3g} of the first-opening tilt: " +
                    ("full contact" if tilt <= 1 else f"partial contact, roughly {100 * part:.0f} % or less"))
-    if scene.kind == "rig" and scene.friction.law == "nonlocal" and not (
-            scene.friction.reading == "stretch" and scene.friction.order == 1):
-        from .simulate_rig import LONGEST, choose, drive_of, list_cost
+    if scene.kind == "rig" and scene.friction.law == "nonlocal":
+        from .simulate_rig import LONGEST, choose, drive_of, list_cost, quadrature_of
 
-        seconds = list_cost(scene, choose(scene), drive_of(scene))[1]
+        settings, drive = choose(scene), drive_of(scene)
+        found = quadrature_of(scene, settings, drive)
+        out.append("sum over bonds by " + found.said())
+        seconds = 0.0 if found.engine == "recursion" else list_cost(scene, settings, drive)[1]
         if seconds > LONGEST:
             out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than {LONGEST:.0f} s")
     slip = groups.get("slip_length")

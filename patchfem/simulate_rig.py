@@ -36,8 +36,6 @@ class Settings:
     cycles: float
     window: int
     shear_modes: int | None
-    tail: float
-    merge: float
     per_point: bool
     pinned: frozenset
 
@@ -113,10 +111,21 @@ def choose(scene, per_point: bool = False) -> Settings:
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * max(1.0, fastest)), 100, MOST_STEPS))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
-    tail = accuracy.tail if accuracy.tail is not None else min(1e-3 * accuracy.tolerance, 1e-6)
-    merge = accuracy.merge if accuracy.merge is not None else min(0.02, sqrt(accuracy.tolerance) / 1.6)
-    return Settings(engine, steps, cycles, window, accuracy.shear_modes, max(tail, 1e-15), merge,
-                    per_point or side == "lower", frozenset(pinned))
+    if engine == "march" and side == "lower" and accuracy.quadrature not in ("auto", "recursion"):
+        raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{accuracy.quadrature}' with pressure on the lower "
+                            "piece in the rig: not yet built; use \"recursion\" or the upper piece")
+    return Settings(engine, steps, cycles, window, accuracy.shear_modes, per_point or side == "lower",
+                    frozenset(pinned))
+
+
+def quadrature_of(scene, settings: Settings, drive: BaseSine):
+    """The engines.Choice of a nonlocal law; a stroke is taken as the drive's own amplitude."""
+    from .friction.engines import choose as engine_for
+
+    law, accuracy = law_of(scene, drive.acceleration / drive.omega), scene.accuracy
+    stroke = max(4 * drive.acceleration / drive.omega**2 / law.length, 1e-9)
+    tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
+    return engine_for(law, accuracy.tolerance, stroke, settings.steps / 2, accuracy.quadrature, tail, accuracy.merge)
 
 
 def _refuse(scene, shear: str, side: str) -> None:
@@ -160,10 +169,12 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     if f.law == "tanh":
         return hub.rate_model(limit, f.reference_speed)
     law = law_of(scene, drive.acceleration / drive.omega)
-    if law.reading == "report" or law.order != 1:
+    found = quadrature_of(scene, settings, drive)
+    if found.engine != "recursion":
         from .friction.quadrature import cutoff
 
-        return hub.list_model(law, limit, cutoff(law.order, settings.tail), settings.merge)
+        reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
+        return hub.list_model(law, limit, reach, found.merge)
     if shear:
         from .simulate_patch import shear_of
 
@@ -254,29 +265,34 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
 
 
 def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:
-    """(expected list entries, seconds) of a shared bond list; a stroke is taken as the drive's own amplitude."""
-    law = law_of(scene, drive.acceleration / drive.omega)
-    from .friction.quadrature import cutoff
-
-    reach = cutoff(law.order, settings.tail)
-    stroke = max(4 * drive.acceleration / drive.omega**2 / law.length, 1e-9)
-    if law.reading == "report" and not law.grows:
-        entries = 2 + 2 * reach / stroke
-    else:
-        entries = min(3 / max(settings.merge, 1e-9), 8 * reach) * (1 + reach / stroke) + 8 * stroke / settings.steps
-    return entries, settings.cycles * settings.steps * 15 * (2 + entries) * 3e-8
+    """(expected strips, seconds) of a shared list of bonds."""
+    found = quadrature_of(scene, settings, drive)
+    steps = settings.cycles * settings.steps
+    strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
+    return strips, steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
 
 def refuse_costly(scene, settings: Settings, drive: BaseSine, limit: float = LONGEST) -> None:
     """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = scene.friction
-    if f is None or f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
+    if f is None or f.law != "nonlocal" or quadrature_of(scene, settings, drive).engine == "recursion":
         return
     entries, seconds = list_cost(scene, settings, drive)
     if seconds > limit:
         raise Missing(f"{scene.path}: the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
                       f"more than {limit:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, loosen accuracy.tail "
                       "or accuracy.merge, or use reading = \"stretch\" with order = 1")
+
+
+def created_warning(scene, book: dict, cycles: float) -> list:
+    """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
+    if scene.friction is None or scene.friction.reading != "report":
+        return []
+    made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
+    if made <= 1e-9 * work or made <= 0:
+        return []
+    return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
+            "it dissipated; reading = \"stretch\" creates none"]
 
 
 def settle(raw: Raw, measures: dict, tolerance: float) -> tuple:

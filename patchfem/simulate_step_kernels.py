@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from .dynamics.kernels import safe_point
+from .friction.bond_sum_kernels import MOMENTS
 from .friction.kernels import (
     FAST,
     bond_mean,
@@ -20,11 +21,10 @@ from .friction.kernels import (
     grow,
     jenkins_mean,
     jenkins_step,
-    list_mean,
-    list_step,
     loose_mean,
     loose_step,
 )
+from .simulate_list_kernels import commit_list, list_scalar, solve_list
 
 COULOMB, JENKINS, POINTS, LIST, RATE = 0, 1, 2, 3, 4
 
@@ -36,7 +36,8 @@ class Contact(NamedTuple):
     stiffness, limit (t,). Points: weight (m,) = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, and play (5, m)
     where bonds stretch freely over the share growth[5] of their length; source (m,), shear modes psi (m, r),
     kappa (r,), b (r,).
-    List: bondlist (7, capacity), now (5,), tally = (bonds, cut-off, merge width), law. growth of eq. 2.10.
+    List: bondlist (10, capacity), now (6,), tally (12,), law (24,), table (k,) as in friction.bond_kernels. growth of
+    eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
     """
 
@@ -54,6 +55,7 @@ class Contact(NamedTuple):
     now: np.ndarray
     tally: np.ndarray
     law: np.ndarray
+    table: np.ndarray
     growth: np.ndarray
     place: np.ndarray
     x: np.ndarray
@@ -124,16 +126,13 @@ def scalar_force(dq, kind, c, eps, v0, dt):
         return c.force[0] * part, c.force[0] * (1 - part * part) / (dt * c.force[1])
     if kind == POINTS:
         force, slope = 0.0, 0.0
-        for j in range(c.weight.size):
+        weight = c.weight
+        for j in range(weight.size):
             mean, s = point_mean(c, j, dq, eps)
-            force += c.weight[j] * mean
-            slope += c.weight[j] * s
+            force += weight[j] * mean
+            slope += weight[j] * s
         return force, slope
-    scale = c.force[0]
-    force = list_mean(dq, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, v0, dt)
-    tiny = 1e-6 * c.law[2]
-    ahead = list_mean(dq + tiny, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, v0, dt)
-    return scale * force, scale * (ahead - force) / tiny
+    return list_scalar(dq, c, v0, dt)
 
 
 @njit(error_model="numpy")
@@ -303,7 +302,10 @@ def contact_step(free, beta, v0, dt, kind, c, work, goal):
     for i in range(y.size):
         y[i] = 2 * last[0, i] - last[1, i]
     if y.size == 1:
-        dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
+        if kind == LIST and c.law[1] != MOMENTS:
+            dq, force, count = solve_list(free, beta, y[0], c, v0, dt, goal)
+        else:
+            dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
         y[0] = dq
         return dq, force, count, middle
     force, count = solve_modes(y, free, beta, c, middle, goal, work)
@@ -326,11 +328,7 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     if kind == JENKINS:
         return jenkins_step(dq, c.stretch, c.stiffness, c.limit), True
     if kind == LIST:
-        count = list_step(dq, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, v0, v1, dt, c.tally[1], c.tally[2])
-        if count < 0:
-            return force * dq, False
-        c.tally[0] = count
-        return force * dq, True
+        return commit_list(dq, force, v0, v1, dt, c)
     weight, bonds, source, psi, b = c.weight, c.bonds, c.source, c.psi, c.b
     burnt = 0.0
     for j in range(weight.size):
@@ -370,14 +368,14 @@ def contact_state(kind, c, q, held):
             total += share
         return force, energy, slip / total if total > 0 else q
     if kind == LIST:
-        force = c.force[0] * list_mean(0.0, c.bondlist, int(c.tally[0]), c.now, c.law, c.growth, 0.0, 0.0)
-        return force, 0.0, q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
-    weight, bonds, kappa, b = c.weight, c.bonds, c.kappa, c.b
+        force = c.force[0] * c.tally[5]
+        return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
+    weight, bonds, source, kappa, b = c.weight, c.bonds, c.source, c.kappa, c.b
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
     for j in range(weight.size):
         force += weight[j] * bonds[1, j]
         energy += 0.5 * weight[j] * bonds[2, j]
-        share = weight[j] * c.source[j]
+        share = weight[j] * source[j]
         if bonds[0, j] > 0:
             slip += share * (bonds[3, j] - bonds[1, j] / bonds[0, j])
             total += share

@@ -1,0 +1,66 @@
+"""One step of a shared list of bonds in the compiled loop: force, solve without a slope, commit, energy book."""
+
+import numpy as np
+from numba import njit
+
+from .friction.bond_kernels import list_mean, list_slope, list_step
+from .friction.bond_sum_kernels import MOMENTS
+
+
+@njit(error_model="numpy", forceinline=True)
+def list_scalar(dq, c, v0, dt):
+    """Path-mean force [N] and slope [N/m] of a bond list; a slope of zero stands for an unknown one."""
+    scale = c.force[0]
+    if c.law[1] == MOMENTS:
+        force, slope = list_slope(dq, c.bondlist, c.tally, c.now, c.law, c.growth, v0, dt)
+        return scale * force, scale * slope
+    return scale * list_mean(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, dt), 0.0
+
+
+@njit(error_model="numpy")
+def solve_list(free, beta, guess, c, v0, dt, goal):
+    """Slide increment with dq = free - beta F(dq) without a slope: secants, then inside a bracket that is widened until
+    it holds the root. Returns (dq, F, iterations), iterations < 0 when it failed."""
+    force = list_scalar(guess, c, v0, dt)[0]
+    here, miss = guess, guess - free + beta * force
+    if abs(miss) <= goal * beta:
+        return here, force, 1
+    last, last_miss = here, miss
+    low, high = (-np.inf, last) if miss > 0 else (last, np.inf)
+    here -= miss / (1 + beta * c.force[0] / c.law[2])
+    for count in range(2, 300):
+        force = list_scalar(here, c, v0, dt)[0]
+        new = here - free + beta * force
+        if abs(new) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.force[2]):
+            return here, force, count
+        slope = (new - last_miss) / (here - last) if here != last else 1.0
+        last, last_miss, miss = here, new, new
+        if miss > 0:
+            high = here
+        else:
+            low = here
+        step = here - miss / slope if slope > 0.1 else here - miss
+        if count > 8 and not np.isfinite(low):
+            step = min(step, high - beta * c.force[2] * 2.0 ** min(count - 8, 60))
+        if count > 8 and not np.isfinite(high):
+            step = max(step, low + beta * c.force[2] * 2.0 ** min(count - 8, 60))
+        if np.isfinite(low) and np.isfinite(high) and (not low < step < high or (count > 8 and count % 2)):
+            step = 0.5 * (low + high)
+        here = step
+    return here, force, -300
+
+
+@njit(error_model="numpy", forceinline=True)
+def commit_list(dq, force, v0, v1, dt, c):
+    """Move the list by the solved step. Returns (work that is not stored [J], ok).
+
+    That work is dissipated where positive; the printed law also creates energy, and both are summed apart.
+    """
+    before = c.tally[4]
+    ok = list_step(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, v1, dt)
+    net = force * dq - c.force[0] * (c.tally[4] - before)
+    if net < 0:
+        c.tally[6] -= net
+    else:
+        c.tally[7] += net
+    return net, ok

@@ -1,0 +1,135 @@
+"""What does accuracy of the sum over bonds (eq. 2.17) cost?
+
+Little, and less than the steps of the path do. Cutting off old bonds loses less than the tail asked for (0.7 of it at
+A = 0.1, 0.1 of it at A = 50 and 1e-2). Merging to a width w loses less than 0.75 w^2 of the friction limit at every
+amplitude (w = 0.02: 2e-4 at A = 0.1, 1e-5 at A = 3, 4e-6 at A = 50) with at most 8/w + 300 strips however long the run;
+keeping every bond takes 10,000 strips and six times the time at A = 0.1, two to five times elsewhere, in two to five
+cycles and ever more after. Where strokes are long (A = 50) cutting off alone is as fast. The steps of the path matter
+more: 400 a cycle still miss the force at reversals of growing bonds by about 1e-2 (A <= 10), a thousand times what
+w = 0.02 costs at A = 3. Sums of J exponentials are not here: u/|u| of the printed law is no sum of powers of u.
+
+Path: q = A sin t, printed law of order 1, growing bonds (a_s = 0.3 A omega^2, l_k = 0.05, eps_k = 0.5, all in bond
+lengths), 200 steps a cycle, as long as bonds live. Error: largest of the run against every bond kept, over mu_s N.
+`error_cost.svg` is drawn from the same rows.
+
+Run: python studies/quadrature/error_cost.py
+"""
+
+from math import ceil
+from pathlib import Path
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from patchfem.compiled import load_kernels
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import cutoff
+from patchfem.simulate_march import list_model
+
+HERE = Path(__file__).parent
+AMPLITUDES = (0.1, 1.0, 3.0, 10.0, 50.0)
+TAILS = (1e-2, 1e-3, 1e-4, 1e-6)
+WIDTHS = (0.2, 0.1, 0.05, 0.02, 0.01)
+STEPS = (50, 100, 200, 400)
+FINEST = 1600
+ROOM = 200_000
+
+
+class Row(NamedTuple):
+    """One run: amplitude [eps_0], engine, knob and its value, error [mu_s N], microseconds per step, longest list."""
+
+    amplitude: float
+    engine: str
+    knob: str
+    value: float
+    error: float
+    micro: float
+    strips: int
+
+
+def bonds(amplitude: float) -> Bonds:
+    """The printed law of order 1 with growing bonds whose healing at a reversal is the same at every amplitude."""
+    return Bonds(1.0, 1.0, 1.0, "report", 0.5, 0.3 * amplitude, 0.05, 1e-2 * amplitude / 3, 0.0)
+
+
+def slide(amplitude: float, steps: int) -> tuple:
+    """(path, step) until bonds of the first stroke are gone: 20 bond lengths, two cycles at least."""
+    cycles = max(2, ceil(20 / (4 * amplitude)))
+    return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps), 2 * np.pi / steps
+
+
+def along(law, path, dt, tail, merge, repeats=1) -> tuple:
+    """(forces at the samples, microseconds per step, longest list) of one engine."""
+    hub, best = load_kernels(), np.inf
+    model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
+    model.fields["bondlist"] = np.zeros((10, ROOM)) if not merge else model.fields["bondlist"]
+    for _ in range(repeats):
+        contact, work = model.build(hub)
+        burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+        begin = process_time()
+        bad = hub.follow_path(path, dt, model.kind, contact, work, 1e-11, burnt, forces)
+        best = min(best, process_time() - begin)
+        assert bad == 0
+    return forces[:, 0], 1e6 * best / (path.size - 1), int(contact.tally[10])
+
+
+def main(amplitudes=AMPLITUDES, repeats=2) -> list:
+    """Rows of every amplitude: direct, truncated, merged, and direct on coarser steps."""
+    rows = []
+    along(bonds(1.0), slide(1.0, 50)[0], 0.1, 1e-3, 0.1)  # load the compiled loop
+    for amplitude in amplitudes:
+        law, (path, dt) = bonds(amplitude), slide(amplitude, 200)
+        truth, micro, strips = along(law, path, dt, 0.0, 0.0)
+        rows.append(Row(amplitude, "direct", "none", 0.0, 0.0, micro, strips))
+        for tail in TAILS:
+            force, micro, strips = along(law, path, dt, tail, 0.0, repeats)
+            rows.append(Row(amplitude, "truncated", "tail", tail, float(np.abs(force - truth).max()), micro, strips))
+        for width in WIDTHS:
+            force, micro, strips = along(law, path, dt, 1e-6, width, repeats)
+            rows.append(Row(amplitude, "merged", "width", width, float(np.abs(force - truth).max()), micro, strips))
+        fine = along(law, *slide(amplitude, FINEST), 1e-6, 0.01)[0][::FINEST // 50]
+        for steps in STEPS:
+            force, micro, strips = along(law, *slide(amplitude, steps), 1e-6, 0.01)
+            error = float(np.abs(force[::steps // 50] - fine).max())
+            rows.append(Row(amplitude, "steps", "steps", steps, error, micro, strips))
+    return rows
+
+
+def table(rows) -> str:
+    """The rows as text."""
+    lines = [f"{'A/eps_0':>8} {'engine':>10} {'knob':>7} {'value':>8} {'error':>9} {'us/step':>9} {'strips':>7}"]
+    lines += [f"{r.amplitude:8g} {r.engine:>10} {r.knob:>7} {r.value:8g} {r.error:9.1e} {r.micro:9.2f} {r.strips:7d}"
+              for r in rows]
+    return "\n".join(lines)
+
+
+def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
+    """Error against time per step, one panel per amplitude."""
+    amplitudes = sorted({r.amplitude for r in rows})
+    with rc_context(STYLE):
+        figure = Figure(figsize=(2.4 * len(amplitudes), 2.7))
+        FigureCanvasSVG(figure)
+        axes = np.atleast_1d(figure.subplots(1, len(amplitudes), sharey=True))
+        for ax, amplitude in zip(axes, amplitudes):
+            for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"), ("steps", GREY, "^")):
+                part = [r for r in rows if r.amplitude == amplitude and r.engine == engine]
+                ax.loglog([r.micro for r in part], [max(r.error, 1e-12) for r in part], mark + "-", color=color, ms=3,
+                          lw=0.8, label=engine)
+            whole = next(r for r in rows if r.amplitude == amplitude and r.engine == "direct")
+            ax.axvline(whole.micro, color=GREY, lw=0.6, ls=":")
+            ax.set(title=f"A = {amplitude:g} eps_0", xlabel="us per step")
+        axes[0].set_ylabel("error [mu_s N]")
+        axes[0].legend(frameon=False, fontsize=7)
+        figure.savefig(path, metadata={"Date": None})
+    return path
+
+
+if __name__ == "__main__":
+    found = main()
+    print(table(found))
+    draw(found)

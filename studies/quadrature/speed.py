@@ -1,0 +1,93 @@
+"""How fast is each engine of the sum over bonds, and how much faster than its NumPy form in the same run?
+
+Strokes of 5 bond lengths, 2000 steps a cycle, two cores shared with other programs, CPU time; a step is two or more
+passes over the list for the mean force and one for force and energy at its end. Merged lists (width 0.02) take 2 to 6
+us a step, 500 to 1000 times less than the NumPy sum in the same run, and cutting off alone 6 to 22 us. A pass costs 1
+ns per strip (p = 2, stretch) to 4 ns (growing bonds of order 2), two Gauss points each. Of every step about 1 us is
+the loop itself: a single point of the recursion, 48 times as fast as its NumPy form, pays it too. The closed strips of
+the printed law at constant length take 2 us at any strokes, most of it that.
+
+Run: OPENBLAS_NUM_THREADS=1 python studies/quadrature/speed.py
+"""
+
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+
+from patchfem.compiled import load_kernels
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import Quadrature, cutoff
+from patchfem.friction.recursion import Recursion
+from patchfem.simulate_march import list_model, points_model
+
+STEPS, CYCLES = 2000, 10
+GROWS = {"ratio": 0.7, "rest_growth": 1.5, "slip_growth": 0.05, "rest_speed": 1e-2}
+
+
+class Speed(NamedTuple):
+    """Nanoseconds per step, per step and strip (or point), and the same step by NumPy over it."""
+
+    name: str
+    step: float
+    each: float
+    ratio: float
+
+
+def path_of(amplitude: float, cycles: int = CYCLES, steps: int = STEPS) -> np.ndarray:
+    """A harmonic slide in bond lengths."""
+    return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
+
+
+def compiled(model, path, repeats: int = 3) -> tuple:
+    """(seconds per step, strips at the end or points) of the compiled loop."""
+    hub, best, dt = load_kernels(), np.inf, 2 * np.pi / STEPS
+    for _ in range(repeats):
+        contact, work = model.build(hub)
+        burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+        begin = process_time()
+        hub.follow_path(path, dt, model.kind, contact, work, 1e-11, burnt, forces)
+        best = min(best, process_time() - begin)
+    count = contact.weight.size or contact.tally[1] - contact.tally[0]
+    return best / (path.size - 1), max(count, 1.0)
+
+
+def plain(law, path, points: int = 1) -> float:
+    """Seconds per step of a NumPy law object over the last fiftieth of the path, its bonds made before."""
+    state, sigma, dt = law.start(np.ones(points)), np.ones(points), 2 * np.pi / STEPS
+    steps = np.diff(path)
+    split = len(steps) - max(len(steps) // 50, 20)
+    for dq in steps[:split]:
+        state = law._moved(state, dq, sigma, sigma, dt) if isinstance(law, Quadrature) else law.step(
+            state, dq, sigma, sigma, dt).state
+    begin = process_time()
+    for dq in steps[split:]:
+        step = law.step(state, float(dq), sigma, sigma, dt)
+        law.traction(step.state)
+        state = step.state
+    return (process_time() - begin) / (len(steps) - split)
+
+
+def main(cycles: int = CYCLES) -> list:
+    """Rows of the engines at A = 5 bond lengths, 2000 steps a cycle."""
+    rows, path = [], path_of(5.0, cycles)
+    short = path_of(5.0, max(1, cycles // 5))
+    for order, reading, growth in ((2.0, "stretch", {}), (0.5, "stretch", {}), (1.0, "report", {}),
+                                   (1.0, "report", GROWS), (2.0, "report", GROWS)):
+        law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
+        name = f"{reading} p = {order:g}{', growing' if growth else ''}"
+        slow = plain(Quadrature(law, 1e-6), short)
+        for engine, merge in (("truncated", 0.0), ("merged .02", 0.02), ("merged .05", 0.05)):
+            seconds, count = compiled(list_model(law, 1.0, cutoff(order, 1e-6), merge), path)
+            rows.append(Speed(f"{engine}, {name}", 1e9 * seconds, 1e9 * seconds / count, slow / seconds))
+    law = Bonds(1.0, 1.0)
+    for points in (1, 2000):
+        seconds, _ = compiled(points_model(law, np.full(points, 1 / points), np.ones(points)), short)
+        rows.append(Speed(f"recursion, {points} points", 1e9 * seconds, 1e9 * seconds / points,
+                          plain(Recursion(law), short, points) / seconds))
+    return rows
+
+
+if __name__ == "__main__":
+    for row in main():
+        print(f"{row.name:42s} {row.step:8.0f} ns a step {row.each:8.2f} ns a strip or point {row.ratio:6.0f} x NumPy")

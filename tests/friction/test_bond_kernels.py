@@ -1,0 +1,226 @@
+"""The compiled engines of 2.17: direct, truncated, merged; against the NumPy sum, sums by hand and mpmath."""
+
+import numpy as np
+import pytest
+from friction_paths import random_walk, sum_by_hand, triangle, upper_pressure, walk
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from list_paths import energy_by_hand, follow_list
+from scipy.special import gammainc
+
+from patchfem.friction import bond_kernels, bond_math_kernels
+from patchfem.friction.bond_list import law_numbers, room, share_table
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import Quadrature
+from patchfem.friction.recursion import Recursion
+from patchfem.simulate_march import growth_numbers
+
+ONE = upper_pressure([1.0])
+GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
+
+
+# ---- functions of one number
+
+def test_exact_exponential_and_logarithm():
+    x = np.concatenate([np.linspace(-708, 709, 3001), np.linspace(-1, 1, 1001)])
+    assert max(abs(bond_math_kernels.fexp(v) / np.exp(v) - 1) for v in x) < 1e-15
+    assert bond_math_kernels.fexp(-1e300) == bond_math_kernels.fexp(-708.0) < 1e-307
+    y = np.concatenate([np.geomspace(1e-300, 1e300, 3001), np.linspace(0.5, 2, 1001)])
+    assert max(abs(bond_math_kernels.flog(v) - np.log(v)) / max(1, abs(np.log(v))) for v in y) < 1e-15
+    assert bond_math_kernels.flog(0.0) < -709
+
+
+@pytest.mark.parametrize("a", [0.1, 0.5, 1.0, 1.5, 2.0, 3.7, 12.0, 60.0])
+def test_exact_gamma_p_is_scipy(a):
+    for x in np.concatenate([[0.0, 1e-300, 1e-12], np.geomspace(1e-6, 400, 60), [a, a + 1, a + 0.999999, 1e5]]):
+        assert bond_math_kernels.gamma_p(a, x) == pytest.approx(gammainc(a, x), rel=5e-13, abs=1e-300)
+
+
+@pytest.mark.parametrize("p", [-0.9, -0.5, 0.0, 0.5, 1.0, 2.0, 5.5])
+def test_exact_share_and_its_table_are_scipy(p):
+    law = Bonds(1.0, 1.0, p, "report")
+    table, norm = share_table(law), law_numbers(law, 1.0, 0.0)[4]
+    for x in np.concatenate([[-1.0, 0.0], np.geomspace(1e-3, 100, 200), [1e3, 1e9]]):
+        want = gammainc(p + 1, max(x, 0.0))
+        assert bond_math_kernels.share(p, x) == pytest.approx(want, rel=1e-10, abs=1e-15)
+        assert bond_math_kernels.tabled(p, x, table, norm) == pytest.approx(want, abs=2e-8)
+
+
+# ---- direct: every bond
+
+@pytest.mark.parametrize("order", [0.0, 1.0, 2.0, -0.5, 1.7])
+@pytest.mark.parametrize("initial", [0.0, 1.0])
+def test_exact_direct_of_the_printed_law_is_the_quadrature(order, initial):
+    """Closed strips, exact for p = 0, 1, 2; other orders from the table of P, 7e-9 off at most."""
+    law = Bonds(1.0, 1.0, order, "report", initial=initial)
+    path = np.concatenate([random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])])
+    got, run = follow_list(law, path), walk(Quadrature(law, tail=0.0), path, ONE)
+    within = 1e-12 if order in (0, 1, 2) else 2e-8
+    assert got.after == pytest.approx(run.traction[:, 0], abs=within)
+    assert got.ahead == pytest.approx(got.after, abs=within)
+
+
+@pytest.mark.parametrize("order, within",
+                         [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)])
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+def test_exact_direct_of_the_stretch_reading_is_the_quadrature(order, within, growth):
+    """Reversals where u = 0 falls inside a strip: order 0 was 5e-2 off there before strips were split."""
+    law = Bonds(1.0, 1.0, order, "stretch", **growth)
+    path = np.concatenate([triangle(1.5, 3, 13), [-1.43, -0.77, 4.0, 3.3, 3.9]])
+    got, run = follow_list(law, path, 0.4), walk(Quadrature(law, tail=0.0), path, ONE, 0.4)
+    assert got.after == pytest.approx(run.traction[:, 0], abs=within)
+    assert got.ahead == pytest.approx(got.after, abs=within)
+
+
+@pytest.mark.parametrize("growth", [{}, GROWTH])
+def test_exact_direct_of_stretch_order_one_is_the_recursion(growth):
+    """Every bond kept against three states: forces, means, energies to rounding."""
+    law = Bonds(1.0, 1.0, initial=0.4, **growth)
+    path = np.concatenate([random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])])
+    got, run = follow_list(law, path, 0.4), walk(Recursion(law), path, ONE, 0.4)
+    assert got.after == pytest.approx(run.traction[:, 0], abs=1e-12)
+    assert got.mean == pytest.approx(run.mean[:, 0], abs=1e-12)
+    assert got.stored == pytest.approx(run.stored[:, 0], abs=1e-11)
+
+
+@pytest.mark.parametrize("order, within", [(-0.5, 5e-4), (0.0, 1e-5), (1.0, 1e-5), (2.0, 1e-5)])
+@pytest.mark.parametrize("initial", [0.0, 1.0])
+def test_exact_direct_of_growing_bonds_is_the_sum_by_hand(order, within, initial):
+    law = Bonds(1.0, 1.0, order, "report", initial=initial, **GROWTH)
+    path = random_walk(3, 60, 0.3)
+    got = follow_list(law, path, 0.4)
+    for k in (5, 20, 40, 60):
+        assert got.after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, 0.4)[0], abs=within)
+    assert got.ahead == pytest.approx(got.after, abs=within)
+
+
+def test_exact_direct_through_a_dwell_of_growing_bonds():
+    """After a rest the first new strip must grow from the healed length, not from before the rest."""
+    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=0.1, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    path = np.concatenate([np.linspace(0, 2, 41), [2.0], 2 + np.linspace(0.0125, 0.5, 40)])
+    times = np.where(np.diff(path) == 0, 1.0, np.where(path[1:] > 2.001, 0.125, 0.5))
+    after = follow_list(law, path, times).after
+    for k in (41, 44, 60, 81):
+        assert after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, times[:k])[0], abs=1e-6)
+
+
+def test_exact_long_rests_of_growing_bonds_stay_finite():
+    """10^6 e-folds of growth in one rest: scaled lengths are moved before they overflow; all bonds full-grown then."""
+    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=1.0, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    full = Bonds(1.0, 1.0, 1.0, "report", initial=0.0)
+    path = np.array([0.0, 0.1, 0.2, 0.2])
+    got, want = follow_list(law, path, [0.1, 0.1, 1e4]).after[-1], follow_list(full, path).after[-1]
+    assert got == pytest.approx(want, abs=1e-6)
+
+
+@pytest.mark.parametrize("reading, order, growth", [
+    ("stretch", 0.0, {}), ("stretch", 0.5, {}), ("stretch", 2.0, {}), ("stretch", 1.0, {}), ("report", 0.0, {}),
+    ("report", 1.0, {}), ("report", 2.0, {}), ("report", -0.5, {}), ("report", 1.0, GROWTH), ("report", 2.0, GROWTH)])
+def test_exact_stored_energy_is_the_sum_by_hand(reading, order, growth):
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
+    path = random_walk(4, 30, 0.4)
+    got = follow_list(law, path, 0.4)
+    for k in (3, 17, 30):
+        within = 1e-3 if order < 0 else 3e-5
+        assert got.stored[k - 1] == pytest.approx(energy_by_hand(law, path[:k + 1], 0.4), abs=within)
+
+
+@pytest.mark.parametrize("reading, order", [("report", 0.0), ("report", 1.0), ("stretch", 2.0), ("stretch", 0.5)])
+def test_exact_mean_is_the_integral_of_the_force(reading, order):
+    """Work of a step = integral of the force over it: short steps by Simpson, long ones on doubling panels."""
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0)
+    lead = np.array([0.0, 1.3, 0.9])
+    for dq in (0.02, -0.05, 0.37, -3.0, 60.0):
+        got = follow_list(law, np.append(lead, lead[-1] + dq)).mean[-1]
+        fine = np.linspace(0, 1, 4001)[1:]**3
+        path = np.concatenate([lead, lead[-1] + dq * fine])
+        force = follow_list(law, path).after
+        dense = np.concatenate([force[1:2], force[2:]])
+        want = np.trapezoid(dense, np.append(0.0, fine))
+        assert got == pytest.approx(want, abs=2e-3 if abs(dq) > 1 else 3e-4)
+
+
+@pytest.mark.parametrize("reading, order, within",
+                         [("report", -0.5, 2e-3), ("report", 0.0, 1e-6), ("stretch", 2.0, 1e-5)])
+def test_exact_a_step_of_a_million_bond_lengths(reading, order, within):
+    """One nanometre bonds: the force is the friction limit, and only strips within the cut-off are made."""
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0)
+    got = follow_list(law, np.array([0.0, 1e6, 1e6 + 0.05]), tail=1e-9)
+    assert got.after == pytest.approx([1.0, 1.0], abs=within)
+    assert got.mean[0] == pytest.approx(1.0, abs=1e-4)
+    assert got.tally[10] <= 4 * 30 + 2
+
+
+def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
+    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=1e9, slip_growth=0.05, rest_speed=1.0, initial=0.0)
+    got = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
+    assert np.isfinite(got.after).all() and got.tally[10] <= 300 and got.tally[8] >= 4e6
+
+
+def test_refuses_strips_beyond_the_capacity():
+    law = Bonds(1.0, 1.0, 0.0, "report")
+    numbers, growth = law_numbers(law, np.inf, 0.0), growth_numbers(law)
+    bonds, now, tally, done = np.zeros((10, 3)), np.array([0, 0, 0, 0, 1.0, 0]), np.zeros(12), []
+    for dq in (0.1, -0.1, 0.1, -0.1):
+        done.append(bond_kernels.list_step(dq, bonds, tally, now, numbers, growth, np.zeros(0), 0.0, 0.0, 1.0))
+    assert done == [True, True, True, False]
+
+
+# ---- truncated
+
+@pytest.mark.parametrize("reading, order, growth", [("report", 1.0, {}), ("report", 0.0, GROWTH), ("stretch", 2.0, {})])
+def test_always_truncation_loses_less_than_its_tail(reading, order, growth):
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
+    path = random_walk(9, 300, 0.6)
+    whole = follow_list(law, path, 0.5)
+    for tail in (1e-2, 1e-5):
+        cut = follow_list(law, path, 0.5, tail=tail)
+        assert np.abs(cut.after - whole.after).max() <= tail
+        assert cut.tally[1] - cut.tally[0] < whole.tally[1] - whole.tally[0]
+
+
+# ---- merged
+
+@pytest.mark.parametrize("reading, order, growth",
+                         [("stretch", 2.0, {}), ("stretch", 0.5, {}), ("report", 1.0, GROWTH)])
+def test_order_of_the_merge_width_is_two(reading, order, growth):
+    """Triangle of 3 bond lengths: the error falls with the square of the width, the list with its inverse."""
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
+    path = np.concatenate([triangle(3.0, 3, 200), [-3.0]])
+    whole = follow_list(law, path, 0.05)
+    errors, held = [], []
+    for merge in (0.01, 0.1):
+        got = follow_list(law, path, 0.05, merge)
+        errors.append(np.abs(got.after - whole.after).max())
+        held.append(got.tally[10])
+    assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
+    assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)  # the age of growing bonds caps wide merges
+    assert held[1] < held[0] < 500 < whole.tally[10]
+
+
+@pytest.mark.parametrize("amplitude", [0.01, 0.1, 1.0, 50.0])
+@pytest.mark.parametrize("reading, order, growth",
+                         [("stretch", 0.0, {}), ("stretch", 2.0, {}), ("report", 1.0, GROWTH)])
+def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, reading, order, growth):
+    """Strokes far below the width join across reversals: as long a list as at large strokes, however long the run."""
+    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
+    cycles = int(np.clip(6 / amplitude, 4, 150))
+    path = amplitude * np.sin(2 * np.pi * np.arange(40 * cycles + 1) / 40)
+    got, whole = follow_list(law, path, 0.05, 0.05), follow_list(law, path, 0.05)
+    assert got.tally[10] <= 250
+    assert np.abs(got.after - whole.after).max() <= (1e-3 if order == 2 else 2.5e-3)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([0.01, 0.1, 0.7]), st.sampled_from([0.0, 0.5, 2.0]))
+def test_always_merging_of_any_path_is_close(seed, size, order):
+    law = Bonds(1.0, 1.0, order, "stretch", initial=0.0)
+    path = random_walk(seed, 150, size)
+    got, whole = follow_list(law, path, 1.0, 0.05), follow_list(law, path)
+    assert np.abs(got.after - whole.after).max() <= 2e-3
+    assert np.abs(got.stored - whole.stored).max() <= 2e-3
+
+
+def test_exact_room_grows_with_the_inverse_width():
+    law = Bonds(1.0, 1.0, 2.0, "stretch")
+    assert room(law, 20.0, 0.02) < 2000 < room(law, 20.0, 0.001)

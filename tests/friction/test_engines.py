@@ -1,0 +1,191 @@
+"""The choice of the engine, and the engines in the compiled loop: forces, energy created, marches, scene key."""
+
+import numpy as np
+import pytest
+from friction_paths import random_walk, triangle, upper_pressure, walk
+from test_friction_hub import OMEGA, follow, one_mode
+
+from patchfem import scene
+from patchfem.core import BaseSine
+from patchfem.friction.engines import ENGINES, choose, impossible
+from patchfem.friction.law import Bonds
+from patchfem.friction.quadrature import Quadrature
+from patchfem.simulate_march import list_model, march, points_model
+from patchfem.simulate_plan import plan
+from patchfem.simulate_rig import choose as settings_of
+from patchfem.simulate_rig import contact_model, created_warning, drive_of, quadrature_of
+
+TEXT = """title = "one mass"
+[normal]
+load = "98.0665 N"
+[friction]
+law = "nonlocal"
+static = 0.4
+reading = "{reading}"
+order = {order}
+bond_length = "1 um"
+initial_bonds = 0.0
+{growth}
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 3
+[accuracy]
+quadrature = "{engine}"
+"""
+GROWS = 'rest_growth = "10 m/s^2"\nslip_growth = "0.1 um"\nkinetic = 0.2'
+
+
+def rig(tmp_path, engine="auto", reading="report", order=1, growth=""):
+    file = tmp_path / "rig.toml"
+    file.write_text(TEXT.format(engine=engine, reading=reading, order=order, growth=growth))
+    return scene.load(file)
+
+
+# ---- choice
+
+def test_exact_choice_where_a_recursion_is_exact():
+    got = choose(Bonds(1.0, 1.0), 1e-3, 10.0, 200)
+    assert (got.engine, got.error, got.strips) == ("recursion", 0.0, 0.0)
+
+
+@pytest.mark.parametrize("stroke, steps, want", [(10.0, 20, "truncated"), (0.1, 200, "merged"), (2.0, 1000, "merged")])
+def test_exact_choice_follows_the_cost(stroke, steps, want):
+    """Order 2: few live strips are cut off only; many are merged."""
+    got = choose(Bonds(1.0, 1.0, 2.0), 1e-3, stroke, steps)
+    assert got.engine == want and got.error <= 1e-4
+    other = choose(Bonds(1.0, 1.0, 2.0), 1e-3, stroke, steps, {"merged": "truncated", "truncated": "merged"}[want])
+    assert got.seconds <= other.seconds
+
+
+def test_always_tighter_tolerances_tighten_the_engine():
+    found = [choose(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, "merged") for tolerance in (1e-2, 1e-3, 1e-4)]
+    assert found[0].merge >= found[1].merge > found[2].merge and found[0].tail >= found[1].tail > found[2].tail
+    assert all(choice.error <= 0.1 * tolerance * 1.01 for choice, tolerance in zip(found, (1e-2, 1e-3, 1e-4)))
+    pinned = choose(Bonds(1.0, 1.0, 0.5), 1e-3, 1.0, 500, "merged", 1e-4, 0.1)
+    assert (pinned.tail, pinned.merge) == (1e-4, 0.1)
+
+
+def test_refuses_a_recursion_of_any_other_law():
+    for reading, order in (("report", 1.0), ("stretch", 2.0)):
+        with pytest.raises(ValueError, match="order = 1 alone"):
+            choose(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
+        assert impossible("recursion", reading, order) and not impossible("merged", reading, order)
+    assert set(ENGINES) >= {"direct", "truncated", "merged", "recursion"}
+
+
+# ---- the loop along a given slide
+
+def test_exact_reading_report_creates_energy_in_the_loop():
+    """p = 1 as printed, 20 triangle cycles of A = 0.01 from rest: W/(4 A n) = -3.9761e-4; stretch: +2.1858e-5.
+
+    The book of the loop closes: work = dissipated - created + stored.
+    """
+    path = triangle(0.01, 20, 40)[:-20]
+    assert path[0] == path[-1] == 0
+    for reading, want in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
+        law = Bonds(1.0, 1.0, 1.0, reading, initial=0.0)
+        forces, burnt, bad, contact = follow(list_model(law, 1.0, np.inf, 0.0), path, 1.0)
+        work = forces[:-1, 1] @ np.diff(path)
+        assert bad == 0 and work / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
+        created, dissipated = contact.tally[6:8]
+        assert work == pytest.approx(dissipated - created + burnt[-1, 1], abs=1e-15)
+        assert (created > 1e-4) == (reading == "report") and (created == 0) == (reading == "stretch")
+
+
+def test_exact_steady_loop_of_order_two_creates_energy():
+    path = triangle(0.1, 75, 20)
+    forces, _, _, contact = follow(list_model(Bonds(1.0, 1.0, 2.0, "report", initial=0.0), 1.0, np.inf, 0.0), path, 1.0)
+    assert forces[-41:-1, 1] @ np.diff(path[-41:]) / 0.4 == pytest.approx(-1.7375e-4, rel=1e-3)
+    assert contact.tally[6] > 0
+
+
+@pytest.mark.parametrize("order", [0.0, 0.5, 2.0, 3.0])
+def test_always_the_stretch_reading_creates_next_to_nothing(order):
+    """Orders p >= 0 never create energy; what the sums' own errors look like stays below 1e-5 of the work."""
+    path = random_walk(8, 400, 0.2)
+    _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=0.0), 1.0, np.inf, 0.0), path, 1.0)
+    assert bad == 0 and contact.tally[6] <= 1e-5 * contact.tally[7]
+
+
+@pytest.mark.parametrize("order", [-0.5, -0.9])
+def test_order_of_negative_orders_converges(order):
+    """Means of the printed law with p < 0 against the NumPy law on a path four times as fine."""
+    law = Bonds(0.4, 1.0, order, "report", initial=0.0)
+    path = random_walk(2, 20, 0.6)
+    fine = np.interp(np.linspace(0, 20, 81), np.arange(21), path)
+    got = follow(list_model(law, 1.2, np.inf, 0.0), fine)[0]
+    run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
+    assert got[4::4, 0] == pytest.approx(run.traction[:, 0], abs=1e-7)
+
+
+# ---- marches
+
+@pytest.mark.parametrize("reading, order", [("report", -0.5), ("report", 0.0), ("report", 1.0), ("stretch", 0.5)])
+def test_exact_march_of_a_list_replayed_by_the_numpy_law(reading, order):
+    """The marched slide walked again by the NumPy sum gives the marched forces; the energy book closes."""
+    law = Bonds(0.4, 2e-6, order, reading, initial=0.0)
+    limit = 0.4 * 98.0665
+    got = march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), list_model(law, limit, np.inf, 0.0), 2, 100,
+                window=2)
+    run = walk(Quadrature(law, tail=0.0), got.window.slide, upper_pressure([98.0665]), 1 / 14300)
+    book = got.ledger
+    assert got.outcome is None and np.ptp(got.window.slide) > 5e-6
+    assert got.window.force[1:] == pytest.approx(run.traction[:, 0], abs=2e-4 * limit)
+    miss = book["work_in"] - book["viscous"] - book["friction"] - book["stored"]
+    assert abs(miss) <= 1e-8 * (book["power"] + book["peak_stored"])
+    assert book["friction"] == pytest.approx(book["dissipated"] - book["created"], rel=1e-9)
+
+
+def test_exact_march_of_merged_and_direct_lists_agree():
+    law = Bonds(0.4, 2e-6, 1.0, "report", 0.6, 10.0, 1e-7, 1e-4, 0.0)
+    limit = 0.4 * 98.0665
+    runs = [march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), list_model(law, limit, reach, merge), 3,
+                  200, window=3) for reach, merge in ((np.inf, 0.0), (20.0, 0.02))]
+    assert runs[0].window.slide == pytest.approx(runs[1].window.slide, abs=1e-3 * np.ptp(runs[0].window.slide))
+    assert runs[1].ledger["strips"] < runs[0].ledger["strips"]
+
+
+def test_exact_march_of_direct_stretch_is_the_recursion():
+    law = Bonds(0.4, 2e-6)
+    limit = 0.4 * 98.0665
+    runs = [march(one_mode(OMEGA, 0.003, 1.0), BaseSine(5 * 9.80665, OMEGA), model, 3, 100, window=2).window
+            for model in (list_model(law, limit, np.inf, 0.0), points_model(law, [1e-4], [98.0665e4]))]
+    assert runs[0].slide == pytest.approx(runs[1].slide, abs=1e-10 * np.ptp(runs[1].slide))
+    assert runs[0].force == pytest.approx(runs[1].force, abs=1e-10 * limit)
+
+
+# ---- scene key
+
+def test_exact_engine_of_a_scene(tmp_path):
+    for engine, order, reading, kind in (("auto", 1, "stretch", 2), ("direct", 1, "stretch", 3),
+                                         ("merged", 2, "stretch", 3), ("truncated", 0, "report", 3),
+                                         ("recursion", 1, "stretch", 2)):
+        found = rig(tmp_path, engine, reading, order)
+        assert contact_model(found, settings_of(found), None, drive_of(found)).kind == kind
+        used = quadrature_of(found, settings_of(found), drive_of(found)).engine
+        assert used == engine or engine == "auto"
+        assert any(f"sum over bonds by {used}" in line for line in plan(found).verdict)
+
+
+def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
+    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order = 1 alone"):
+        rig(tmp_path, "recursion")
+    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*not yet built"):
+        rig(tmp_path, "exponential")
+
+
+def test_exact_warning_of_energy_created(tmp_path):
+    found = rig(tmp_path)
+    assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
+        "the printed law created 5e-07 J per cycle, 0.2 % of what it dissipated; reading = \"stretch\" creates none"]
+    assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
+    assert created_warning(rig(tmp_path, reading="stretch"), {"created": 1.0, "dissipated": 1.0}, 4) == []
