@@ -3,10 +3,15 @@
 Everything here is in units of eps_0 and mu_s sigma unless a law says otherwise.
 """
 
+import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gamma
+
+sys.path.append(str(Path(__file__).parents[2] / "studies/drift"))
+from force_control import drift, slides  # noqa: F401  (force control: one door for the tests of the laws)
 
 GAUSS = np.polynomial.legendre.leggauss(12)
 

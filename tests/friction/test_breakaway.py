@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from friction_paths import random_walk, triangle, upper_pressure, walk
+from friction_paths import random_walk, slides, triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -98,30 +98,11 @@ def test_always_the_play_splits_the_slide(steps, share):
     assert abs(free) <= all_
 
 
-def dither(law, low, high, cycles):
-    """Slides (cycles,) at the low end of every cycle of a force dither, from rest."""
-    engine, one = Recursion(law), np.ones(1)
-    state, slide, ends = engine.start(one), 0.0, []
-    for _ in range(cycles):
-        for target in (high, low):
-            step, way = 0.0, 1.0 if target > float(engine.traction(state)[0]) else -1.0
-            for _ in range(200):  # Newton along a concave branch comes from one side
-                here = engine.step(state, step, one, one, 1.0)
-                miss = target - float(engine.traction(here.state)[0])
-                if abs(miss) < 1e-14:
-                    break
-                ahead = engine.step(state, step + way * 1e-9, one, one, 1.0)
-                step += miss / ((float(engine.traction(ahead.state)[0]) - target + miss) / (way * 1e-9))
-            state, slide = engine.step(state, step, one, one, 1.0).state, slide + step
-        ends.append(slide)
-    return np.array(ends)
-
-
 @pytest.mark.parametrize("share, low, high", [(0.0, 0.4, 0.6), (0.0, 0.2, 0.8), (0.1, 0.4, 0.6), (0.3, 0.2, 0.8),
                                               (0.2, 0.2, 0.8), (0.3, 0.0, 0.6), (0.5, -0.2, 0.7), (0.3, -0.5, 0.5)])
 def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
     """0 from the second cycle on where the dither stays within the elastic range, the closed form elsewhere."""
-    ends = dither(bonds(share), low, high, 8)
+    ends = slides(Recursion(bonds(share)), (high, low), (1.0, 1.0), 8)
     wanted = closed_forms.dither_drift(low, high, share)
     assert np.diff(ends) == pytest.approx(wanted, abs=1e-9)
     assert (wanted == 0) == (high - low <= 2 * share + 1e-15 or low == -high)

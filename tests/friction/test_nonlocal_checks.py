@@ -4,13 +4,12 @@ Lengths in eps_0 and forces in mu_s N unless a test says otherwise. Truths are m
 printed, closed forms, or an integrated equation; none of them calls the code under test.
 """
 
-from functools import partial
 from itertools import pairwise
 
 import mpmath
 import numpy as np
 import pytest
-from friction_paths import lower_pressure, sum_by_hand, upper_pressure, walk
+from friction_paths import drift, lower_pressure, sum_by_hand, upper_pressure, walk
 from list_paths import follow_list
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -565,36 +564,6 @@ def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
 
 
 # ---- drift under a biased dither
-
-def held_at(engine, state, target, sigma):
-    """(slide, state) that brings the traction to `target` in one straight step at constant pressure."""
-    miss = partial(lambda dq: float(engine.traction(engine.step(state, dq, sigma, sigma, 1.0).state)[0]) - target)
-    now = float(engine.traction(state)[0])
-    if abs(now - target) <= 1e-13:
-        return 0.0, state
-    way, far = (1.0 if target > now else -1.0), 0.05
-    while miss(way * far) * way < 0:
-        far *= 1.5
-        if far > 50:
-            raise AssertionError("the law cannot reach the target")
-    dq = brentq(miss, 0.0, way * far, xtol=1e-15, rtol=1e-14)
-    return dq, engine.step(state, dq, sigma, sigma, 1.0).state
-
-
-def drift(engine, forces, loads, cycles=12):
-    """Slide over the last cycle of a quasi-static dither: held at forces[k] under loads[k], k = 0, 1, ... in turn."""
-    state, slide, last = engine.start(np.ones(1)), 0.0, 0.0
-    before = np.ones(1)
-    for _ in range(cycles):
-        last = slide
-        for force, load in zip(forces, loads):
-            now = np.full(1, load)
-            state = engine.step(state, 0.0, before, now, 1.0).state
-            state = engine.step(state, 0.0, now, now, 1.0).state
-            dq, state = held_at(engine, state, force, now)
-            slide, before = slide + dq, now
-    return slide - last
-
 
 def test_exact_drift_of_the_stretch_under_a_force_dither():
     """0.5 +- 0.3: up eps ln((1 - a)/(1 - b)), down eps ln((1 + b)/(1 + a)): 0.98083 eps a cycle, for ever."""

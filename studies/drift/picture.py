@@ -1,0 +1,61 @@
+"""How far does a block creep under a dither, and what does an elastic range cost? `drift.svg`: drift per cycle about
+half the limit against the dither (lines: closed form; dashed: growing bond length), and loop area against amplitude.
+
+Run: python studies/drift/picture.py
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+import drift_table
+from force_control import OutOfReach, drift
+
+from patchfem.closed_forms import dither_drift, stretch_loop
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.friction.recursion import Recursion
+
+HERE = Path(__file__).parent
+COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
+MARCHED = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
+
+
+def growing(share: float, swing: float) -> float:
+    """Drift per cycle [bond lengths] at .5 +- swing with growth; nan where the block slides away."""
+    engine = Recursion(drift_table.ladder.bonds(breakaway=share, **drift_table.ladder.GROWTH))
+    try:
+        return drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=drift_table.PERIOD,
+                     length=drift_table.LENGTH) / drift_table.LENGTH
+    except OutOfReach:
+        return np.nan
+
+
+def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
+    """Draw both panels; the file written."""
+    swing, amplitude = np.linspace(0, 0.4, 401), 10.0 ** np.linspace(-1, 1.5, 200)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(9.6, 3.4))
+        FigureCanvasSVG(figure)
+        left, right = figure.subplots(1, 2)
+        for colour, b in zip(COLOURS, drift_table.SHARES):
+            left.plot(swing, [dither_drift(0.5 - s, 0.5 + s, b) for s in swing], color=colour, label=f"b = {b:g}")
+            left.plot(marched, [growing(b, s) for s in marched], "o--", ms=3, lw=0.8, color=colour)
+            right.semilogx(amplitude, stretch_loop(amplitude, 1.0, 1.0, b)[0] / (4 * amplitude), color=colour,
+                           label=f"b = {b:g}")
+        right.semilogx(amplitude, np.maximum(amplitude - 1, 0) / amplitude, ":", color=GREY, label="elastic-plastic")
+        left.set(xlabel="dither about half the limit [share of μs N]", ylabel="drift per cycle [bond lengths]",
+                 xlim=(0, 0.4), ylim=(-0.03, 1.6))
+        right.set(xlabel="amplitude [bond lengths]", ylabel="loop area / 4 A μs N", ylim=(0, 1))
+        left.legend(title="elastic range", alignment="left")
+        right.legend()
+        figure.savefig(path, metadata={"Date": None})
+    return path
+
+
+if __name__ == "__main__":
+    main()

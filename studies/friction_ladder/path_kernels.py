@@ -1,0 +1,98 @@
+"""Bare compiled loops of the laws along a path: mean force and new memory of every step, nothing else."""
+
+import numpy as np
+from numba import njit
+
+from patchfem.friction.kernels import (
+    bond_mean,
+    bond_step,
+    grow,
+    jenkins_mean,
+    jenkins_step,
+    list_mean,
+    list_step,
+    loose_mean,
+    loose_step,
+)
+
+
+@njit(error_model="numpy")
+def coulomb(path, force):
+    for i in range(path.size - 1):
+        dq = path[i + 1] - path[i]
+        force[i] = 1.0 if dq > 0 else -1.0
+
+
+@njit(error_model="numpy")
+def tanh(path, dt, speed, force):
+    for i in range(path.size - 1):
+        force[i] = np.tanh((path[i + 1] - path[i]) / (dt * speed))
+
+
+@njit(error_model="numpy")
+def jenkins(path, stretch, stiffness, limit, force):
+    for i in range(path.size - 1):
+        dq = path[i + 1] - path[i]
+        force[i] = jenkins_mean(dq, stretch, stiffness, limit)[0]
+        jenkins_step(dq, stretch, stiffness, limit)
+
+
+@njit(error_model="numpy")
+def bond(path, dt, growth, force):
+    m, z, s2, eps = 1.0, 0.0, 0.0, growth[3]
+    for i in range(path.size - 1):
+        dq = path[i + 1] - path[i]
+        v, middle = dq / dt, eps
+        if growth[0] >= 0:
+            middle = grow(eps, v, v, abs(dq) / 2, dt / 2, growth)[0]
+            eps = grow(eps, v, v, abs(dq), dt, growth)[0]
+        force[i] = bond_mean(m, z, dq, 1.0, middle)[0] / growth[3]
+        m, z, s2, _ = bond_step(m, z, s2, dq, 1.0, middle)
+    return s2
+
+
+@njit(error_model="numpy")
+def loose(path, growth, force):
+    m, z, s2, play, eps = 1.0, 0.0, 0.0, 0.0, growth[3]
+    for i in range(path.size - 1):
+        dq = path[i + 1] - path[i]
+        force[i] = loose_mean(m, z, play, growth[5] * eps, dq, 1.0, eps)[0] / eps
+        m, z, s2, play, _ = loose_step(m, z, s2, play, growth[5] * eps, dq, 1.0, eps)
+    return s2
+
+
+@njit(error_model="numpy")
+def listed(path, dt, bonds, now, law, growth, reach, merge, force):
+    """Bonds alive at the end, -1 for a full list."""
+    count = 0
+    for i in range(path.size - 1):
+        dq = path[i + 1] - path[i]
+        force[i] = list_mean(dq, bonds, count, now, law, growth, dq / dt, dt)
+        count = list_step(dq, bonds, count, now, law, growth, dq / dt, dq / dt, dt, reach, merge)
+        if count < 0:
+            break
+    return count
+
+
+@njit(error_model="numpy")
+def bouc_wen(path, power, force):
+    """gamma = beta = 1/2, one Runge-Kutta step of order 4 per step of the path (bond lengths)."""
+    z = 0.0
+    for i in range(path.size - 1):
+        h = path[i + 1] - path[i]
+        way = 1.0 if h > 0 else -1.0
+        a = _slope(z, way, power)
+        b = _slope(z + h / 2 * a, way, power)
+        c = _slope(z + h / 2 * b, way, power)
+        d = _slope(z + h * c, way, power)
+        force[i] = z
+        z += h / 6 * (a + 2 * b + 2 * c + d)
+
+
+@njit(error_model="numpy")
+def _slope(z, way, power):
+    size = abs(z)
+    up = size
+    for _ in range(power - 1):
+        up *= size
+    return 1.0 - up if z * way > 0 else 1.0

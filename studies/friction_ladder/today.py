@@ -1,0 +1,75 @@
+"""The hysteresis laws in use beside the ladder: Iwan's parallel elements, Bouc-Wen and a rate law, on one bond scale.
+
+Slides in bond lengths, forces in shares of mu N. Iwan and Bouc-Wen have the stiffness mu N/eps_0 and the limit mu N of
+the constant bond length, the rate law only its limit.
+"""
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+
+def iwan_elements(count: int, scale: float = 1.0) -> tuple:
+    """(stiffness, yield slide), (count,) each, of parallel Jenkins elements with the virgin curve 1 - exp(-x/scale).
+
+    Minus its second derivative is the stiffness per yield slide s of a population, exp(-s) ds. An element takes over
+    stiffness and force of its share of s: a chain of tangents, with limit and first stiffness exact. The shares are
+    cut so that the error is even.
+    """
+    cuts = -2 * np.log1p(-np.arange(count) / count)
+    left = np.append(np.exp(-cuts), 0.0)  # stiffness of all elements beyond a cut
+    force = np.append((1 + cuts) * left[:-1], 0.0)
+    stiffness = left[:-1] - left[1:]
+    return stiffness / scale, scale * (force[:-1] - force[1:]) / stiffness
+
+
+def iwan_loop(amplitude, scale: float = 1.0):
+    """Steady loop area of the continuous population by Masing's rule, 8 int F - 4 A F of the virgin curve F."""
+    x = np.asarray(amplitude, float) / scale
+    return 4 * scale * (x - 2 + np.exp(-x) * (2 + x))
+
+
+def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
+    """z at the knots of path (k, ...) of dz/dq = 1 - |z|^n (beta sgn(v z) + 1 - beta), n = power; exact for n = 1,
+    elsewhere by Runge-Kutta steps of order 4 and at most 0.05."""
+    z = np.zeros_like(path)
+    step = _exact if power == 1 else _runge_kutta
+    for i, dq in enumerate(np.diff(path, axis=0)):
+        z[i + 1] = step(z[i], dq, power, beta)
+    return z
+
+
+def _exact(z, dq, _, beta):
+    """Seen along the motion: da = 1 + c a below zero, c = 1 - 2 beta, and 1 - a above."""
+    way, left, c = np.sign(dq), np.abs(dq), 1 - 2 * beta
+    young, old = np.minimum(way * z, 0.0), np.maximum(way * z, 0.0)
+    reach = -np.log1p(c * young) / c if c else -young
+    first = np.minimum(left, reach)
+    below = young * np.exp(c * first) + (np.expm1(c * first) / c if c else first)
+    return np.where(dq == 0, z, way * np.where(first < reach, below, 1 - (1 - old) * np.exp(first - left)))
+
+
+def _runge_kutta(z, dq, power, beta):
+    def slope(y):
+        return 1 - np.abs(y)**power * (beta * np.sign(way * y) + 1 - beta)
+
+    way = np.sign(dq)
+    pieces = max(1, int(np.ceil(np.abs(dq).max() / 0.05)))
+    h = dq / pieces
+    for _ in range(pieces):
+        a = slope(z)
+        b = slope(z + h / 2 * a)
+        c = slope(z + h / 2 * b)
+        z = z + h / 6 * (a + 2 * b + 2 * c + slope(z + h * c))
+    return z
+
+
+def best_rate(share, wanted) -> float:
+    """v_0 over the greatest speed whose tanh(share/v_0) is nearest to `wanted` (k,) in rms; share (k,): speeds over
+    the greatest speed."""
+    def miss(log_speed):
+        return np.sqrt(np.mean((np.tanh(share / np.exp(log_speed)) - wanted)**2))
+
+    tries = np.linspace(np.log(1e-2), np.log(1e4), 60)
+    near = int(np.argmin([miss(t) for t in tries]))
+    low, high = tries[max(near - 1, 0)], tries[min(near + 1, tries.size - 1)]
+    return float(np.exp(minimize_scalar(miss, bounds=(low, high), method="bounded", options={"xatol": 1e-8}).x))
