@@ -8,5 +8,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, 
 
 from hypothesis import settings
 
+from patchfem.compiled import cache_folder
+
+os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
+
 settings.register_profile("patchfem", deadline=None, derandomize="PATCHFEM_SEARCH" not in os.environ)
 settings.load_profile("patchfem")

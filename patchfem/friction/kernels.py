@@ -69,16 +69,20 @@ def bond_step(m, z, s2, dq, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FAST)
 def free_part(play, dq, half):
-    """Elastic part of an increment (twin: `law.elastic_part`); play is dragged into its range first."""
-    start = min(max(play, -half), half)
-    end = min(max(start + dq, -half), half)
-    return dq if end == start + dq else end - start
+    """Elastic part of an increment and the play after it (twin: `law.elastic_part`)."""
+    start = play * half
+    end = start + dq
+    if end >= half:
+        return half - start, 1.0
+    if end <= -half:
+        return -half - start, -1.0
+    return dq, end / half
 
 
 @njit(error_model="numpy", fastmath=FAST)
 def loose_mean(m, z, play, half, dq, sigma, eps):
     """`bond_mean` with an elastic range of half width `half` (twin: `recursion.Recursion.step`)."""
-    free = free_part(play, dq, half)
+    free = free_part(play, dq, half)[0]
     rest = dq - free
     if rest == 0.0 or abs(dq) < 1e-280:  # no 1/dq of a step that small
         return z + 0.5 * m * dq, 0.5 * m
@@ -92,11 +96,11 @@ def loose_mean(m, z, play, half, dq, sigma, eps):
 @njit(error_model="numpy", fastmath=FAST)
 def loose_step(m, z, s2, play, half, dq, sigma, eps):
     """`bond_step` with an elastic range; returns the new play as well."""
-    free = free_part(play, dq, half)
+    free, play = free_part(play, dq, half)
     s2 += free * (2 * z + m * free)
     z += m * free
     m, z, s2, burnt = bond_step(m, z, s2, dq - free, sigma, eps)
-    return m, z, s2, min(max(play, -half), half) + free, burnt
+    return m, z, s2, play, burnt
 
 
 @njit(error_model="numpy")

@@ -33,6 +33,12 @@ class Bonds:
         return self.rest_growth is not None
 
 
+def won_share(growth, back):
+    """Share of the mature length won in a step (2.10 at constant speed) that was won before the place `back` [1] behind
+    its end; growth: the step multiplies the distance to its goal by exp(-growth)."""
+    return np.divide(np.expm1(-growth * (1 - back)), np.expm1(-growth), out=1 - back, where=growth > 1e-9)
+
+
 def ripening(law: Bonds, speed: float) -> float:
     """Path in which a bond that starts from nothing ripens (2.10), over its steady length (2.11), at a speed [m/s].
 
@@ -46,18 +52,20 @@ def ripening(law: Bonds, speed: float) -> float:
 
 
 def elastic_part(law: Bonds, play, dq, eps):
-    """(elastic, damaging) parts of the increment dq and the play after it; play, dq scalars or (m,) [m].
+    """(elastic, damaging) parts of the increment dq and the play after it; dq [m] and play [1] scalars or (m,).
 
-    Play is how far the slide stands from the middle of its elastic range, |play| <= breakaway * eps. Inside that range
-    bonds stretch and none breaks or forms; at its ends the range is dragged along. A damaged path counted so keeps
-    every statement about energy, and a motion to and fro within the range leaves no trace (a play operator, Visintin,
-    Differential Models of Hysteresis, 1994).
+    Play says where the slide stands in its elastic range, of half width breakaway * eps: -1 and 1 at the ends. Inside,
+    bonds stretch and none breaks or forms, and the slide keeps its share of a width that changes with eps; at an end
+    all of an outward slide drags the range along and damages. A damaged path counted so keeps every statement about
+    energy, and a motion to and fro within the range leaves no trace (a play operator, Visintin, Differential Models of
+    Hysteresis, 1994).
     """
     half = law.breakaway * eps
-    start = np.clip(play, -half, half)  # a shrinking range is dragged as well
+    start = play * half
     end = np.clip(start + dq, -half, half)
     free = np.where(end == start + dq, dq, end - start)[()]
-    return free, dq - free, end
+    inside = np.divide(end, half, out=np.zeros_like(end), where=half > 0)
+    return free, dq - free, np.where(np.abs(end) == half, np.sign(end), inside)[()]
 
 
 def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> tuple:

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import gammainc, gammaln
 
-from .law import Bonds, grow, growth_exponents
+from .law import Bonds, grow, growth_exponents, won_share
 from .local import Step
 from .plane import advance_plane, direction, refuse_breakaway
 from .quadrature import PIECE, cutoff
@@ -253,7 +253,7 @@ def _ages(state: Legs, rest, law: Bonds, owner, back, far, h) -> tuple:
         return travel / law.length, travel / law.length
     part, (won, grown) = back / h[owner][:, None], state.gain[:, rest][:, owner][..., None]
     age = state.now[3] - state.growth[rest][owner][:, None] + part * won
-    born = state.mature[rest][owner][:, None] - part * grown
+    born = state.mature[rest][owner][:, None] - (1 - won_share(won, part)) * grown
     own = np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
     return travel / own, travel / own
 

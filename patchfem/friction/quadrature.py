@@ -26,7 +26,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import gammainc, gammainccinv, gammaln, roots_jacobi
 
-from .law import Bonds, elastic_part, grow, growth_exponents
+from .law import Bonds, elastic_part, grow, growth_exponents, won_share
 from .local import Step
 from .recursion import advance, pressed, stretch
 
@@ -314,7 +314,8 @@ def _gauss_strip(state: Strips, rest, law: Bonds) -> tuple:
     else:
         before, back = state.gain[:, rest], way / h[owner][:, None]
         age = state.now[3] - state.growth[rest][owner][:, None] + back * before[0][owner][:, None]
-        born = state.mature[rest][owner][:, None] - back * before[1][owner][:, None]
+        later = 1 - won_share(before[0][owner][:, None], back)
+        born = state.mature[rest][owner][:, None] - later * before[1][owner][:, None]
         eps = np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
         harm = x = travel / eps
     with np.errstate(divide="ignore"):

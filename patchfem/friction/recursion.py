@@ -28,7 +28,7 @@ from .local import Step
 
 
 class BondState(NamedTuple):
-    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]; play [m] of `elastic_part`."""
+    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]; play [1] of `elastic_part`."""
 
     bonds: np.ndarray
     eps: float

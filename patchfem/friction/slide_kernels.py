@@ -84,12 +84,10 @@ def rigid_path(path, dt, weight, bonds, sigma, growth, eps, burnt, forces):
         middle = grow(eps[0], v, v, abs(dq) / 2, dt / 2, growth)[0]
         free, mean = 0.0, 0.0
         if loose:
-            half = growth[5] * middle
-            play = min(max(bonds[4, 0], -half), half)
-            free = free_part(play, dq, half)
+            free, play = free_part(bonds[4, 0], dq, growth[5] * middle)
             if free != 0.0:
                 mean = stretch_points(free, m, z, s2, weight)
-            bonds[4] = play + free
+            bonds[4] = play
         rest = dq - free
         if rest != 0.0 or dq == 0.0:
             more, spent = step_points(step_numbers(rest, middle), m, z, s2, sigma, weight)

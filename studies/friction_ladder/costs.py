@@ -22,7 +22,7 @@ import path_kernels as loops
 import today
 from ladder import HERTZ, LENGTH
 
-from patchfem import simulate_kernels
+from patchfem.compiled import load_kernels
 from patchfem.friction.local import Coulomb, ElasticPlastic, Rate
 from patchfem.friction.quadrature import Quadrature, cutoff
 from patchfem.friction.recursion import Recursion
@@ -61,8 +61,8 @@ def compiled(cycles: int = 100, repeats: int = 7) -> dict:
 
 def _list(law, path, dt):
     def run():
-        c, _ = list_model(law, 1.0, cutoff(1.0, 1e-6), 0.02).build(simulate_kernels)
-        loops.listed(path, dt, c.bondlist, c.now, c.law, c.growth, c.tally[1], c.tally[2], np.zeros(path.size))
+        c, _ = list_model(law, 1.0, cutoff(1.0, 1e-6), 0.02).build(load_kernels())
+        loops.listed(path, dt, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, np.zeros(path.size))
     return run
 
 

@@ -65,11 +65,13 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem import simulate_kernels
-from patchfem.friction.kernels import list_mean, list_step
+from patchfem.compiled import load_kernels
+from patchfem.friction.bond_kernels import list_mean, list_step
 from patchfem.friction.law import Bonds
 from patchfem.friction.quadrature import cutoff
 from patchfem.simulate_march import jenkins_model, list_model, points_model
+
+simulate_kernels = load_kernels()
 
 HERTZ, LENGTH, RATIO = 143.0, 2e-6, 0.7
 GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
@@ -129,14 +131,13 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     """The law as printed, every bond of its own length, by the compiled list without merging; the means of the steps
     are asked for in the last cycle only."""
     law = bonds(order=order, reading="report", **growth)
-    contact, _ = list_model(law, 1.0, cutoff(order, 1e-5), 0.0).build(simulate_kernels)
-    path, dt, count, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), 0, []
+    c, _ = list_model(law, 1.0, cutoff(order, 1e-5), 0.0).build(simulate_kernels)
+    path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
     for i, dq in enumerate(np.diff(path)):
-        args = (dq, contact.bondlist, count, contact.now, contact.law, contact.growth, dq / dt)
+        args = (dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, dq / dt)
         if i >= path.size - 1 - steps:
             force.append(list_mean(*args, dt))
-        count = list_step(*args, dq / dt, dt, contact.tally[1], contact.tally[2])
-        if count < 0:
+        if not list_step(*args, dq / dt, dt):
             raise ArithmeticError("the bond list is full")
     return Cycle(np.diff(path)[-steps:] / LENGTH, np.array(force))
 

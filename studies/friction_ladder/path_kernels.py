@@ -3,14 +3,13 @@
 import numpy as np
 from numba import njit
 
+from patchfem.friction.bond_kernels import list_mean, list_step
 from patchfem.friction.kernels import (
     bond_mean,
     bond_step,
     grow,
     jenkins_mean,
     jenkins_step,
-    list_mean,
-    list_step,
     loose_mean,
     loose_step,
 )
@@ -62,16 +61,14 @@ def loose(path, growth, force):
 
 
 @njit(error_model="numpy")
-def listed(path, dt, bonds, now, law, growth, reach, merge, force):
-    """Bonds alive at the end, -1 for a full list."""
-    count = 0
+def listed(path, dt, bonds, tally, now, law, growth, table, force):
+    """Steps taken before the list was full."""
     for i in range(path.size - 1):
         dq = path[i + 1] - path[i]
-        force[i] = list_mean(dq, bonds, count, now, law, growth, dq / dt, dt)
-        count = list_step(dq, bonds, count, now, law, growth, dq / dt, dq / dt, dt, reach, merge)
-        if count < 0:
-            break
-    return count
+        force[i] = list_mean(dq, bonds, tally, now, law, growth, table, dq / dt, dt)
+        if not list_step(dq, bonds, tally, now, law, growth, table, dq / dt, dq / dt, dt):
+            return i
+    return path.size - 1
 
 
 @njit(error_model="numpy")

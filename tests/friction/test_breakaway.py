@@ -71,10 +71,9 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
 
 @given(st.floats(0, 2), st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1), st.floats(-3, 3), st.floats(0.2, 2))
 def test_always_the_slope_with_breakaway_is_the_derivative_of_the_mean(m, z, play, half, dq, eps):
-    play = np.clip(play, -half, half)
     mean, slope = loose_mean(m, z, play, half, dq, 1.0, eps)
     ahead, behind = (loose_mean(m, z, play, half, dq + h, 1.0, eps)[0] for h in (1e-6, -1e-6))
-    kinks = abs(abs(dq + play) - half) < 1e-4 or abs(dq) < 1e-3
+    kinks = abs(abs(dq + play * half) - half) < 1e-4 or abs(dq) < 1e-3
     assert kinks or slope == pytest.approx((ahead - behind) / 2e-6, abs=1e-6)
     twin = Recursion(Bonds(1.0, eps, breakaway=half / eps if half < eps else 0.0))
     if 0 < half < eps:
@@ -83,17 +82,18 @@ def test_always_the_slope_with_breakaway_is_the_derivative_of_the_mean(m, z, pla
         assert mean / eps == pytest.approx(step.mean[0], abs=1e-12)
         after = loose_step(m, z, z * z, play, half, dq, 1.0, eps)
         assert after[:3] == pytest.approx(step.state.bonds[:, 0], abs=1e-12)
-        assert after[3] == pytest.approx(step.state.play, abs=1e-15)
+        assert after[3] == pytest.approx(step.state.play, abs=1e-12)
 
 
-@given(st.lists(st.tuples(st.floats(-2, 2), st.floats(0.1, 2)), min_size=1, max_size=20), st.floats(0, 0.99))
+@given(st.lists(st.tuples(st.floats(-2, 2), st.floats(0.1, 2)), min_size=1, max_size=20), st.floats(0.01, 0.99))
 def test_always_the_play_splits_the_slide(steps, share):
     law, play, free, all_ = bonds(share), 0.0, 0.0, 0.0
     for dq, eps in steps:
         loose, damaging, after = elastic_part(law, play, dq, eps)
-        assert loose + damaging == pytest.approx(dq, abs=1e-15) and abs(after) <= share * eps
+        assert loose + damaging == pytest.approx(dq, abs=1e-15) and abs(after) <= 1
         assert loose * dq >= 0 and damaging * np.sign(dq) >= -1e-15
-        assert abs(damaging) <= 1e-15 or abs(abs(after) - share * eps) <= 1e-15
+        assert abs(damaging) <= 1e-15 or abs(after) == 1
+        assert abs(play) < 1 or play * dq < 0 or abs(loose) <= 1e-15
         play, free, all_ = after, free + loose, all_ + abs(dq)
     assert abs(free) <= all_
 
