@@ -156,7 +156,7 @@ class Response:
 
     time [s]; modal (k, n) [m]; modal_rate (k, n) [m/s]; slide, slide_rate: interface motion; output, output_rate,
     acceleration (absolute, at the accelerometer); force: friction resultant [N]; slip: irreversible part of `slide`.
-    `extra` holds per-frame interface fields and the energy ledger.
+    `extra` may hold "ledger" (4, k) [J]: friction work, energy stored in the interface, dissipated, created.
     """
 
     time: np.ndarray

@@ -8,7 +8,7 @@ import numpy as np
 
 from .core import Missing, PatchfemError
 from .friction.law import Bonds
-from .response.measures import harmonic, interface_loop, step_harmonic
+from .response.measures import harmonic, interface_loop, ledger_measures, step_harmonic
 from .simulate_acting import acting
 from .simulate_load import load_at, refined, varies
 from .simulate_slide import lateral_corners, path_of, peak_speed
@@ -106,6 +106,7 @@ def ledger_of(work, stored, losses) -> np.ndarray:
     """(4, k): work, stored, dissipated and created energy [J] of samples, from the (gain, loss) (k, 2) [J] of every
     step over the points that create energy and those that lose it."""
     created, dissipated = np.cumsum(losses, axis=0).T
+    created = created if created[-1] > 1e-13 * dissipated[-1] else 0 * created  # round-off
     return np.stack([work, stored, dissipated, created])
 
 
@@ -126,8 +127,7 @@ def _values(scene, time, slide, force, load, slip, ledger, first, omega) -> dict
            "friction_ratio_end": float(ratio[-1]), "friction_ratio_peak": float(np.abs(ratio).max()),
            "slip_amplitude": float(slip[first:].max() - slip[first:].min()) / 2,
            "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0,
-           "friction_work": float(work[-1]), "energy_stored": float(stored[-1]),
-           "energy_dissipated": float(dissipated[-1]), "energy_created": float(created[-1])}
+           **ledger_measures(ledger)}
     if omega:
         t, q, f = time[first:], slide[first:], force[first:]
         weight = np.zeros(t.size)

@@ -15,6 +15,7 @@ from .export.summary import summary, write_json
 from .simulate import Result, run
 from .simulate_plan import chosen_mesh
 
+LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
@@ -114,11 +115,12 @@ def _histories(result: Result) -> tuple:
         across = {"lateral_displacement": r.lateral, "lateral_force": r.lateral_force, "yaw_moment": r.yaw_moment}
         return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
                 "friction_force": r.force, "normal_load": r.load,
-                **dict(zip(("friction_work", "energy_stored", "energy_dissipated", "energy_created"), r.ledger)),
+                **dict(zip(LEDGER, r.ledger)),
                 **{name: values for name, values in across.items() if values is not None}}, None
     out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
     if kind == "rig":
+        out |= dict(zip(LEDGER, r.extra["ledger"])) if "ledger" in r.extra else {}
         out |= {"friction_force": r.force, "normal_load": np.full(r.time.size, result.measures["normal_load"].value)}
     modes = [mode.name for mode in result.plan.scene.structure.mode]
     return out, (modes, r.modal)

@@ -136,7 +136,8 @@ def _response(rows, number, dt, modes, drive) -> Response:
     accel = -np.outer(base, modes.base) - rate * (2 * modes.zeta * modes.omega) - z * modes.omega**2 \
         - np.outer(rows[:, 2 * n + 2], modes.slide) / modes.mass
     return Response(time, z, rate, rows[:, 2 * n], rows[:, 2 * n + 1], z @ modes.output, rate @ modes.output,
-                    accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3])
+                    accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3],
+                    {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
 
 
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
@@ -199,6 +200,7 @@ class _Run:
         self.contact, self.work = model.build(hub)
         self.state, self.held = np.zeros((modes.omega.size, 2)), np.zeros(1)
         self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
+        self.totals = np.zeros(3)
         self.arrays = hub.Modes(*(np.array(v) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide,
                                                         modes.base, modes.output)))
         p = self.prop
@@ -210,7 +212,7 @@ class _Run:
         self._make_room(size)
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
-            rows = np.empty((piece + 1, 2 * self.modes.omega.size + 5))
+            rows = np.empty((piece + 1, 2 * self.modes.omega.size + 6))
             did, status = self.hub.march(self.done, int(piece), self.state, self.held, self.arrays, self.steps,
                                          self.drive.acceleration, self.modes.mass, self.model.kind,
                                          self.model.follow, self.contact, self.work, GOAL * self.model.limit,
@@ -222,7 +224,21 @@ class _Run:
                 snapshots.append(self._snapshot(rows[did]))
             if self.outcome is not None:
                 break
-        return first, np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:]), self.ledger[8] - before
+        rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+        return first, self._booked(rows), self.ledger[8] - before
+
+    def _booked(self, rows) -> np.ndarray:
+        """Rows with the friction work, the energy dissipated and that created since the start [J] as further columns;
+        per step the net of the work and of what the interface stores."""
+        n = 2 * self.modes.omega.size
+        work = rows[:-1, n + 4] * np.diff(rows[:, n])
+        lost = work - np.diff(rows[:, n + 5])
+        # of the step solve, and of the slide's last digit
+        noise = self.model.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n]))
+        parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
+        sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
+        self.totals = sums[:, -1]
+        return np.concatenate([rows, sums.T], axis=1)
 
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""

@@ -13,6 +13,7 @@ from .response.measures import (
     classify,
     harmonic,
     interface_loop,
+    ledger_measures,
     run_measures,
     slip_measures,
     steady_amplitude,
@@ -195,6 +196,11 @@ def whole(span: float, drive: BaseSine) -> bool:
     return span > drive.period * (1 - 1e-6)
 
 
+def _ledger(ledger) -> dict:
+    """Measures of the ledger but for what is stored, which depends on the instant at which the run ends."""
+    return {name: value for name, value in ledger_measures(ledger).items() if name != "energy_stored"}
+
+
 def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None,
               share: float = 1.0) -> Raw:
     """Closed-form run of a Coulomb scene, or of a structure without friction; share: of mu N that the law keeps."""
@@ -212,7 +218,7 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
     if f is not None:
         slip = done.window.slip
         values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
-                   "normal_load": load}
+                   "normal_load": load, **_ledger(np.array([[done.ledger["friction"]], [0.0]])[[0, 1, 0, 1]])}
         if done.starts.size:
             values["slip_start_phase"] = circular_mean(done.starts)
         time, weight, slide, rate, force = done.loop
@@ -244,7 +250,7 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     seconds = perf_counter() - begin
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
-    values |= slip_measures(done.window, drive, settings.steps)
+    values |= slip_measures(done.window, drive, settings.steps) | _ledger(done.response.extra["ledger"])
     values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
     w = done.window
     weight = np.full(w.time.size, 1.0)

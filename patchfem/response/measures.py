@@ -91,6 +91,12 @@ def circular_mean(phases) -> float:
     return float(np.angle(np.mean(np.exp(2j * np.asarray(phases)))) / 2 % np.pi)
 
 
+def ledger_measures(ledger) -> dict:
+    """Measures of a ledger (4, k) [J]: friction work, energy stored, dissipated and created at its end."""
+    names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
+    return {name: float(row[-1]) for name, row in zip(names, ledger)}
+
+
 def drift(time, slide, period: float) -> float:
     """Mean motion per cycle [m] over the window: last cycle's mean minus the first one's, per cycle between them."""
     end, start = time[-1], time[0]

@@ -178,3 +178,18 @@ def test_exact_ledger_of_every_reading_closes_and_creation_is_seen(order, readin
     creates = reading == "report" and order > 0
     assert (value["energy_created"] > 1e-3 * value["energy_stored"]) == creates
     assert any("created" in line for line in result.warnings) == creates
+
+
+def test_exact_ledger_of_a_march_closes_step_by_step():
+    """Work = stored + dissipated - created at every kept sample; the printed law creates, the stretch does not."""
+    from scene_texts import STRUCTURE
+
+    for reading, creates in (("stretch", False), ("report", True)):
+        text = STRUCTURE + BENCH.split("[slide]")[0].replace('"coulomb"', f'"nonlocal"\nbond_length = "1 um"\nreading = '
+                                                            f'"{reading}"')
+        result = run(plan(loads(text, "a.toml", ["drive.cycles=6"])))
+        work, stored, dissipated, created = result.response.extra["ledger"]
+        assert np.abs(work - stored - dissipated + created).max() <= 1e-12 * dissipated[-1]
+        assert (np.diff(dissipated) >= 0).all() and (np.diff(created) >= 0).all()
+        assert result.measures["friction_work"].value == work[-1] and work[-1] > 0
+        assert (created[-1] > 1e-6 * dissipated[-1]) == creates and (creates or created[-1] == 0)

@@ -255,7 +255,7 @@ def release(basis, model, start, steps_per_cycle, count):
     state[:, 0] = start
     modes = hub.Modes(basis.omega, 2 * basis.zeta * basis.omega, basis.slide, basis.base, basis.output)
     steps = hub.Steps(prop.step, prop.gauss, prop.sine, prop.sine_gauss, GAUSS_W.copy(), prop.dt, prop.beta)
-    held, ledger, rows = np.zeros(1), np.zeros(9), np.zeros((2, 2 * basis.omega.size + 5))
+    held, ledger, rows = np.zeros(1), np.zeros(9), np.zeros((2, 2 * basis.omega.size + 6))
 
     def energy():
         out = 0.5 * basis.mass * np.sum(state[:, 1]**2 + (basis.omega * state[:, 0])**2)

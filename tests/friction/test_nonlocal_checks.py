@@ -188,7 +188,7 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
 # ---- C15: ringing while stuck
 
 def free_rows(basis, model, start, per_cycle, count):
-    """Rows (count + 1, 2 n + 5) of a free march from a modal displacement, and its ledger."""
+    """Rows (count + 1, 2 n + 6) of a free march from a modal displacement, and its ledger."""
     hub = load_kernels()
     prop = propagator(basis, BaseSine(0.0, basis.omega[0]), per_cycle)
     contact, work = model.build(hub)
@@ -197,7 +197,7 @@ def free_rows(basis, model, start, per_cycle, count):
     state[:, 0] = start
     modes = hub.Modes(basis.omega, 2 * basis.zeta * basis.omega, basis.slide, basis.base, basis.output)
     steps = hub.Steps(prop.step, prop.gauss, prop.sine, prop.sine_gauss, GAUSS_W.copy(), prop.dt, prop.beta)
-    ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 5))
+    ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 6))
     done = hub.march(0, count, state, np.zeros(1), modes, steps, 0.0, basis.mass, model.kind, False, contact, work,
                      1e-3 * GOAL * model.limit, np.inf, ledger, rows)
     assert done == (count, 0)
