@@ -5,9 +5,10 @@ from numba import njit
 
 from .friction.bond_kernels import list_mean, list_slope, list_step
 from .friction.bond_sum_kernels import MOMENTS
+from .friction.kernels import LEAN
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def list_scalar(dq, c, v0, dt):
     """Path-mean force [N] and slope [N/m] of a bond list; a slope of zero stands for an unknown one."""
     scale = c.force[0]
@@ -17,7 +18,7 @@ def list_scalar(dq, c, v0, dt):
     return scale * list_mean(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, dt), 0.0
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def solve_list(free, beta, guess, c, v0, dt, goal):
     """Slide increment with dq = free - beta F(dq) without a slope: secants, then inside a bracket that is widened until
     it holds the root. Returns (dq, F, iterations), iterations < 0 when it failed."""
@@ -50,7 +51,7 @@ def solve_list(free, beta, guess, c, v0, dt, goal):
     return here, force, -300
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def commit_list(dq, force, v0, v1, dt, c):
     """Move the list by the solved step. Returns (work that is not stored [J], ok).
 

@@ -16,6 +16,7 @@ from .dynamics.kernels import safe_point
 from .friction.bond_sum_kernels import MOMENTS
 from .friction.kernels import (
     FAST,
+    LEAN,
     bond_mean,
     bond_step,
     grow,
@@ -98,7 +99,7 @@ class Steps(NamedTuple):
     beta: float
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def pressure_at(place, x, sigma):
     """Pressure [Pa] of the pattern sigma (m,) on x (m,) at one place, linear between nodes, 0 outside."""
     if place < x[0] or place > x[-1]:
@@ -108,7 +109,7 @@ def pressure_at(place, x, sigma):
     return (1 - part) * sigma[j] + part * sigma[j + 1]
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def point_mean(c, j, dq, eps):
     """Path-mean stretch [Pa m] of point j and its slope [Pa]."""
     if c.bonds.shape[0] > 4:
@@ -116,7 +117,7 @@ def point_mean(c, j, dq, eps):
     return bond_mean(c.bonds[0, j], c.bonds[1, j], dq, c.source[j], eps)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def scalar_force(dq, kind, c, eps, v0, dt):
     """Path-mean friction force [N] and slope [N/m] for a rigid slide increment; `c` is the contact tuple."""
     if kind == JENKINS:
@@ -135,7 +136,7 @@ def scalar_force(dq, kind, c, eps, v0, dt):
     return list_scalar(dq, c, v0, dt)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def solve_scalar(free, beta, guess, kind, c, eps, v0, dt, goal):
     """Slide increment with dq = free - beta F(dq). Returns (dq, F, iterations), iterations < 0 when it failed.
 
@@ -174,7 +175,7 @@ def solve_scalar(free, beta, guess, kind, c, eps, v0, dt, goal):
     return dq, force, -count
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def residual(y, free, beta, c, eps, out, slope):
     """Residual (1 + r,) of the step with shear modes, y = (dq, db), and the slope (m,) of every point [N/m].
 
@@ -199,7 +200,7 @@ def residual(y, free, beta, c, eps, out, slope):
     return force
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def hessian(beta, c, slope, hess):
     """Lower half of the Hessian (1 + r, 1 + r) at the slopes of the points; beta = 0: the slide is given."""
     psi, kappa = c.psi, c.kappa
@@ -219,7 +220,7 @@ def hessian(beta, c, slope, hess):
                 hess[k + 1, l + 1] += sp * psi[j, l]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def cholesky_solve(a, b):
     """Solve a x = b in place for a small symmetric positive definite a (lower part used); x replaces b."""
     n = b.size
@@ -244,7 +245,7 @@ def cholesky_solve(a, b):
     return True
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def weighted(out, scale):
     """Largest residual in force units: modal residuals are multiplied by the slide they stand for."""
     worst = abs(out[0])
@@ -253,7 +254,7 @@ def weighted(out, scale):
     return worst
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def solve_modes(y, free, beta, c, eps, goal, work):
     """Newton with step halving on y = (dq, db) in place. Returns (F, iterations), iterations < 0 when it failed."""
     out, hess, trial, other, scale = work.out, work.hess, work.trial, work.other, work.scale
@@ -283,7 +284,7 @@ def solve_modes(y, free, beta, c, eps, goal, work):
     return force, -60
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def contact_step(free, beta, v0, dt, kind, c, work, goal):
     """Solve one step of the contact, leave its memory untouched. Returns (dq, path-mean force, iterations, eps).
 
@@ -316,7 +317,7 @@ def contact_step(free, beta, v0, dt, kind, c, work, goal):
     return y[0], force, count, middle
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     """Move the memory of the contact by the solved step. Returns (energy dissipated [J], ok)."""
     y, last = work.y, work.last
@@ -353,7 +354,7 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     return burnt, True
 
 
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", cache=True, **LEAN)
 def contact_state(kind, c, q, held):
     """(friction force [N], stored energy [J], irreversible slip [m]) of the contact as it stands."""
     if kind == COULOMB or kind == RATE:

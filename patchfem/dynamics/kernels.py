@@ -2,9 +2,13 @@
 
 import numpy as np
 from numba import njit
+from numba.core.options import DefaultOptions
+
+# no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
+LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def free_slide(state, step, slide, s, c):
     """Increment of the interface slide [m] over a step without friction; state (n, 2), step (n, 2, 5), slide (n,)."""
     out = 0.0
@@ -14,7 +18,7 @@ def free_slide(state, step, slide, s, c):
     return out
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def move(state, step, slide, mass, force, s, c):
     """Advance the modes in place by one step under the constant interface force [N]."""
     for i in range(slide.size):
@@ -27,7 +31,7 @@ def move(state, step, slide, mass, force, s, c):
         state[i, 1] = v
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def step_energy(state, gauss, slide, base, damp, mass, drive, force, s, c, sines, dt, weights, out):
     """Add to `out` (3,) the work of the base [J], the viscous loss [J] and the integral of |power in| [J] of a step.
 
@@ -47,7 +51,7 @@ def step_energy(state, gauss, slide, base, damp, mass, drive, force, s, c, sines
         out[2] += share * abs(power)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def stored(state, omega, mass):
     """Kinetic and elastic energy [J] of the modes."""
     out = 0.0
@@ -56,14 +60,14 @@ def stored(state, omega, mass):
     return out
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def accelerations(state, omega, damp, slide, base, mass, drive, force, s, out):
     """Modal accelerations (n,) [m s-2] at an instant, relative to the base."""
     for i in range(omega.size):
         out[i] = -base[i] * drive * s - damp[i] * state[i, 1] - omega[i] ** 2 * state[i, 0] - slide[i] * force / mass
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def safe_point(low, high, guess):
     """`guess` if it lies inside (low, high), their middle otherwise."""
     if low < guess < high and np.isfinite(guess):

@@ -26,14 +26,14 @@ from .bond_sum_kernels import (
     power_sums,
     shares_sums,
 )
-from .kernels import bond_mean, grow
+from .kernels import LEAN, bond_mean, grow
 
 PIECE = 0.25  # longest strip in bond lengths
 GROWN = 0.5  # most growth J of one strip of growing bonds
 MOST_GROWN = 16
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _after(dq, now, growth, v0, v1, dt):
     """(q, path, damage, J, mature length, length half way) after the increment."""
     eps, more = grow(now[4], v0, v1, abs(dq), dt, growth)
@@ -41,14 +41,14 @@ def _after(dq, now, growth, v0, v1, dt):
     return now[0] + dq, now[1] + abs(dq), now[2] + abs(dq) / middle, now[3] + more, eps, middle
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def goal_length(before, after, more):
     """Length that 2.10 tends to in a step that multiplies the distance to it by exp(-more)."""
     rest = -expm1(-more)
     return after if rest == 0 else before + (after - before) / rest
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _pieces(size, eps, more, law):
     """(strips that a step is cut into, strips of it that still count)."""
     count = max(1.0, size / (PIECE * eps))
@@ -59,7 +59,7 @@ def _pieces(size, eps, more, law):
     return count, kept
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _young(size, before, after, more, middle, law):
     """Weight of the growing bonds that form in one increment."""
     goal = goal_length(before, after, more)
@@ -74,7 +74,7 @@ def _young(size, before, after, more, middle, law):
     return total * law[4] * size / (2 * count * law[2])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
     """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
 
@@ -109,7 +109,7 @@ def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
     return force + np.copysign(young, dq), energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def list_force(dq, bonds, tally, now, law, growth, table, v0, dt):
     """Weight [1] of the list after the straight increment dq: friction force = mu_s N * weight.
 
@@ -118,7 +118,7 @@ def list_force(dq, bonds, tally, now, law, growth, table, v0, dt):
     return list_state(dq, bonds, tally, now, law, growth, table, v0, dt)[0]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
     """Integral of the force over a share of the increment by five Gauss points."""
     out = 0.0
@@ -130,7 +130,7 @@ def _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
     return (high - low) * out
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     """Path-mean weight over the increment.
 
@@ -155,7 +155,7 @@ def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     return out
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def list_slope(dq, bonds, tally, now, law, growth, v0, dt):
     """(path-mean weight, its derivative [1/m]) of the stretch reading of order 1, exact."""
     m, z, _ = moments_of(now[0], exp(now[5] - now[2]), bonds, int(tally[0]), int(tally[1]))
@@ -165,7 +165,7 @@ def list_slope(dq, bonds, tally, now, law, growth, v0, dt):
     return mean / law[2], slope / law[2]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def list_step(dq, bonds, tally, now, law, growth, table, v0, v1, dt):
     """Commit dq: append its strips, drop those beyond the cut-off, merge now and then. False when the list is full."""
     before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
@@ -183,7 +183,7 @@ def list_step(dq, bonds, tally, now, law, growth, table, v0, v1, dt):
     return done
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _rescale(bonds, tally, now, law):
     """Move the reference of the scaled numbers before they overflow."""
     if law[1] == SHARES:
@@ -198,7 +198,7 @@ def _rescale(bonds, tally, now, law):
     now[5] = clock
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
     """Strips of the increment dq that began at `place`; False when there is no room."""
     mode, size, end = law[1], abs(dq), int(tally[1])
@@ -244,7 +244,7 @@ def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
     return True
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _as_moments(bonds, k, dq, eps, now):
     """Weight, centre and variance of the bonds of one increment that survive it, exact at a constant length."""
     x, g = abs(dq) / eps, np.copysign(1.0, dq)
@@ -262,7 +262,7 @@ def _as_moments(bonds, k, dq, eps, now):
     bonds[5, k] = zero * exp(now[2] - now[5])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _cut(bonds, tally, now, law):
     """Pass over the strips older than the cut-off."""
     head, end = int(tally[0]), int(tally[1])
@@ -277,7 +277,7 @@ def _cut(bonds, tally, now, law):
     tally[0] = head
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _pack(bonds, tally):
     """Move the list to the front of its array; returns its end."""
     head, end = int(tally[0]), int(tally[1])

@@ -6,12 +6,13 @@ from math import exp
 from numba import njit
 
 from .bond_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
+from .kernels import LEAN
 
 GONE = 1e-8  # share of a bond length that was there when a bond formed
 MOST_AGED = 0.1  # widest growth J across one strip of growing bonds
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def merge(bonds, tally, now, law):
     """Join neighbours while they stay narrower than delta eps_0 exp(R/3 eps_0): of one pass of the slide end to end,
     or of several passes over the same places, taken as spread evenly over them and, of those, oldest first."""
@@ -54,13 +55,13 @@ def merge(bonds, tally, now, law):
     tally[1], tally[2], tally[3] = out, many, out - head
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _gone(bonds, k, now):
     """Whether nothing is left of the starting lengths of a strip."""
     return exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _evenly_aged(bonds, i, k, now):
     """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds."""
     if _gone(bonds, k, now):
@@ -69,7 +70,7 @@ def _evenly_aged(bonds, i, k, now):
     return young <= exp(MOST_AGED) * start_length(1.0, bonds[5, i], bonds[6, i])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _alike(bonds, i, k, most, tally):
     """Whether two strips cover the same places closely enough to be spread over their mean range."""
     low, high = min(bonds[0, i], bonds[1, i]), max(bonds[0, i], bonds[1, i])
@@ -85,7 +86,7 @@ def _alike(bonds, i, k, most, tally):
     return False
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _join_moments(bonds, i, k):
     a, b = bonds[5, i], bonds[5, k]
     total = a + b
@@ -97,7 +98,7 @@ def _join_moments(bonds, i, k):
     _join_clock(bonds, i, k)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _join_clock(bonds, i, k):
     bonds[3, i] += bonds[3, k]
     bonds[4, i] += bonds[4, k]
@@ -105,7 +106,7 @@ def _join_clock(bonds, i, k):
     bonds[2, i], bonds[9, i] = bonds[2, k], bonds[9, k]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _join_ends(bonds, i, k, now, law):
     """Two strips of one pass, end to end; their first moments stay."""
     left, right = bonds[3, i], bonds[3, k]
@@ -122,7 +123,7 @@ def _join_ends(bonds, i, k, now, law):
             bonds[5 + half, i] = 0.5 * bonds[4, i] * exp(bonds[2, i] - part * bonds[3, i] - now[5])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _aged_at(back, left, right, bonds, i, k, now):
     """Scaled starting length at `back` [m] from the end of two strips, zero once it is gone from both."""
     if _gone(bonds, k, now):
@@ -131,7 +132,7 @@ def _aged_at(back, left, right, bonds, i, k, now):
     return start_length(part, bonds[5, j], bonds[6, j])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _spread(bonds, k, law):
     """Take a strip of one pass as spread evenly over its places."""
     low, high = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
@@ -141,7 +142,7 @@ def _spread(bonds, k, law):
         bonds[6, k] = 0.0
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _join_spread(bonds, i, k, spread, now, law):
     """Add strip k to the spread strip i: mean range by the path covered."""
     a, b = bonds[8, i], bonds[8, k]

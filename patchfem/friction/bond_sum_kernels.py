@@ -16,12 +16,13 @@ import numpy as np
 from numba import njit, uint64
 
 from .bond_math_kernels import FAST, fexp, flog, share, tabled
+from .kernels import LEAN
 
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
 FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, seen from the end of a strip
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def moments_of(q, scale, bonds, head, end):
     """(sum k, sum k u, sum k u^2) of strips in MOMENTS form, k without the factor 1/eps_0."""
     m, z, s2 = 0.0, 0.0, 0.0
@@ -33,7 +34,7 @@ def moments_of(q, scale, bonds, head, end):
     return m * scale, z * scale, s2 * scale
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def _powers(q, bonds, first, end, p):
     """Sums of w |u|^p sgn u and of w |u|^(p + 1) over both Gauss points of strips that one pass left."""
     force, energy = 0.0, 0.0
@@ -63,7 +64,7 @@ def _powers(q, bonds, first, end, p):
     return force, energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _reach_in(size, slope, nodes, p):
     """Integral from 0 to size of t^p exp(slope t), by four points with t^p as their weight."""
     if size <= 0:
@@ -74,7 +75,7 @@ def _reach_in(size, slope, nodes, p):
     return total * fexp((p + 1) * flog(size))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
     """One strip near u = 0, the power integrated from u = 0 where it bends: each side by the difference of two."""
     step = b - a
@@ -86,7 +87,7 @@ def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
     return front * (behind - ahead if odd else behind + ahead)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def spread_over(q, a, b, p):
     """Means of |u|^p sgn u and of |u|^(p + 1) over places uniform between a < b."""
     wide, middle = b - a, q - (a + b) / 2
@@ -103,7 +104,7 @@ def spread_over(q, a, b, p):
     return (f - g) / ((p + 1) * wide), (f * u - g * v) / ((p + 2) * wide)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
     """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
 
@@ -137,7 +138,7 @@ def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
     return force, energy
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def _shares_closed(q, path, bonds, first, end, p, eps0):
     """Force and energy [m] of strips of one pass for p = 0, 1, 2; S = 1 - (1 + ..) exp(-x), lever (p + 1) S - x phi."""
     force, energy = 0.0, 0.0
@@ -162,7 +163,7 @@ def _shares_closed(q, path, bonds, first, end, p, eps0):
     return force, energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
     """Force and energy [m] of the printed law at constant length; strips of one pass are split where u changes sign."""
     first = head + many
@@ -199,7 +200,7 @@ def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
     return force, energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _lever(p, x, s, norm):
     """Integral from 0 to x of y phi(y): (p + 1) P(p + 1, x) - x phi(x), s = P(p + 1, x)."""
     if x <= 0:
@@ -207,7 +208,7 @@ def _lever(p, x, s, norm):
     return (p + 1) * s - norm * fexp((p + 1) * flog(x) - x)
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def _aged(q, path, psi, length, bonds, first, end, p):
     """Sums over both Gauss points of W/2 f(R/own), own = length - psi c, times sgn u and times |u| [m]."""
     force, energy, least = 0.0, 0.0, 1e-9 * length
@@ -234,20 +235,20 @@ def _aged(q, path, psi, length, bonds, first, end, p):
     return 0.5 * force, 0.5 * energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def start_length(part, c0, c1):
     """Scaled starting length at the share `part` of a strip from its end, log-linear between the Gauss points."""
     rise = (part - FIRST) / (SECOND - FIRST)
     return c0 * exp(rise * (flog(c1) - flog(c0))) if c0 > 1e-300 and c1 > 1e-300 else max(c0, c1)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def own_length(part, psi, length, c0, c1):
     """Bond length at the share `part` of a strip from its end."""
     return max(length - psi * start_length(part, c0, c1), 1e-9 * length)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
     """One strip of growing bonds with u = 0 inside, or with R^p (p < 0) still steep: two points on each side."""
     step, near, force, energy = b - a, path - at, 0.0, 0.0
@@ -275,7 +276,7 @@ def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
     return force, energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
     """Sums over strips of growing bonds of path f(R/own) sgn u and of the same times |u| [m], no factor 1/eps_0."""
     first = head + many
@@ -304,7 +305,7 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
     return force, energy
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def first_bonds(q, path, damage, law):
     """(force, energy [m]) of the initial cohort of density m_0, per unit mu_s N."""
     p, eps0, m0, norm = law[0], law[2], law[3], law[4]
@@ -319,7 +320,7 @@ def first_bonds(q, path, damage, law):
     return f * np.sign(q), f * abs(q)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def formed(size, eps, law):
     """Weight of the bonds of one straight increment of length `size` at constant bond length eps."""
     return eps / law[2] * share(law[0], size / eps)

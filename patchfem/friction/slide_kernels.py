@@ -6,10 +6,10 @@ with coefficients of the step, so the loops over points hold no function and vec
 
 from numba import njit
 
-from .kernels import FAST, free_part, grow, moments, shape
+from .kernels import FAST, LEAN, free_part, grow, moments, shape
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def step_numbers(dq, eps):
     """The 13 coefficients of one damaging increment, as `step_points` uses them; 20 ns."""
     path = abs(dq)
@@ -24,7 +24,7 @@ def step_numbers(dq, eps):
             a1, 2 * g * eps * a2, eps * eps * a3, eps * eps * a4)
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def step_points(k, m, z, s2, sigma, weight):
     """Move m, z, s2 (n,) in place; weighted sums of the path-mean stretch and of the integral of s2 dR/eps.
 
@@ -41,7 +41,7 @@ def step_points(k, m, z, s2, sigma, weight):
     return mean, burnt
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def stretch_points(dq, m, z, s2, weight):
     """Stretch all points by dq without damage, in place; weighted sum of the path-mean stretch."""
     mean = 0.0
@@ -53,7 +53,7 @@ def stretch_points(dq, m, z, s2, weight):
     return mean
 
 
-@njit(error_model="numpy", fastmath=FAST)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def state_points(q, m, z, s2, sigma, weight):
     """(force [N], stored energy [J], irreversible slip [m]) of points that all stand at the slide q."""
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
@@ -66,7 +66,7 @@ def state_points(q, m, z, s2, sigma, weight):
     return force, 0.5 * energy, q - slip / total if total > 0 else q
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **LEAN)
 def rigid_path(path, dt, weight, bonds, sigma, growth, eps, burnt, forces):
     """Points (n,) under sigma (n,) [Pa] along the slide path (k,) [m] with steps of dt [s]; bonds (4 or 5, n) and the
     bond length eps (1,) are moved in place. burnt, forces: as in `simulate_kernels.follow_path`.
@@ -87,7 +87,8 @@ def rigid_path(path, dt, weight, bonds, sigma, growth, eps, burnt, forces):
             free, play = free_part(bonds[4, 0], dq, growth[5] * middle)
             if free != 0.0:
                 mean = stretch_points(free, m, z, s2, weight)
-            bonds[4] = play
+            for j in range(m.size):
+                bonds[4, j] = play
         rest = dq - free
         if rest != 0.0 or dq == 0.0:
             more, spent = step_points(step_numbers(rest, middle), m, z, s2, sigma, weight)
@@ -97,4 +98,5 @@ def rigid_path(path, dt, weight, bonds, sigma, growth, eps, burnt, forces):
             burnt[i, 0] = 0.0
         forces[i, 1] = mean
         eps[0] = grow(eps[0], v, v, abs(dq), dt, growth)[0]
-    bonds[3] += path[-1] - path[0]
+    for j in range(m.size):
+        bonds[3, j] += path[-1] - path[0]

@@ -185,8 +185,8 @@ def test_exact_ledger_of_a_march_closes_step_by_step():
     from scene_texts import STRUCTURE
 
     for reading, creates in (("stretch", False), ("report", True)):
-        text = STRUCTURE + BENCH.split("[slide]")[0].replace('"coulomb"', f'"nonlocal"\nbond_length = "1 um"\nreading = '
-                                                            f'"{reading}"')
+        law = f'"nonlocal"\nbond_length = "1 um"\nreading = "{reading}"'
+        text = STRUCTURE + BENCH.split("[slide]")[0].replace('"coulomb"', law)
         result = run(plan(loads(text, "a.toml", ["drive.cycles=6"])))
         work, stored, dissipated, created = result.response.extra["ledger"]
         assert np.abs(work - stored - dissipated + created).max() <= 1e-12 * dissipated[-1]
