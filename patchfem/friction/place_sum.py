@@ -16,14 +16,11 @@ STRIPS = 2048
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlaceSum:
-    """Arrays to start from, as in `place_sum_kernels`: cells, strips, tally, now, law, table."""
+    """Arrays to start from, as in `place_sum_kernels`: cells, strips and all numbers."""
 
     cells: np.ndarray
     strips: np.ndarray
-    tally: np.ndarray
-    now: np.ndarray
-    law: np.ndarray
-    table: np.ndarray
+    numbers: np.ndarray
 
 
 def nodes_of(law: Bonds, count: int) -> tuple:
@@ -43,7 +40,6 @@ def node_error(law: Bonds, count: int) -> float:
     if len(x) == 1 and (not law.grows or law.ratio >= 1):
         return 0.0
     y = np.cos(np.linspace(0, np.pi, 8 * count + 3)) * (1 - 1e-9)
-    rate = (nodes.max() + nodes.min()) / 2 * np.ones_like(y)
     low, high = 1 / law.length, 1 / (law.ratio * law.length)
     rate = (low + high) / 2 + y * (high - low) / 2
     share = weight / (y[:, None] - x)
@@ -86,6 +82,10 @@ def place_sum(law: Bonds, tail: float = 1e-9, nodes: int | None = None, width: f
     numbers[8:13] = (width * law.length, -log(ripe) if law.grows else 0.0, len(x), (low + high) / 2, half)
     sums = len(x) * (int(law.order) + 1)
     cells = np.zeros((ceil(7 * reach / width) + 512, 8 + 2 * sums))
-    cells[1, 2] = cells[1, 6] = misfit
-    return PlaceSum(cells, np.zeros((12, STRIPS)), np.zeros(12), np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0]),
-                    numbers, np.concatenate([x, weight, rate]))
+    cells[0, 2:8], cells[1, :3], cells[1, 6] = (3, 3, 2, 3, 0, 2), (4, 0, misfit), misfit  # two empty cells at 0
+    cells[2, :6], cells[3, :6] = (-numbers[8], 0, 0, 3, 0, -np.inf), (0, numbers[8], 2, 0, 0, -np.inf)
+    grown = [-1.0, 1.0, 1.0, law.length, law.length, 0.0]
+    if law.grows:
+        grown = [law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length, 0.0]
+    now, tally = [0.0, 0.0, 0.0, 0.0, law.length, 0.0], np.zeros(12)
+    return PlaceSum(cells, np.zeros((12, STRIPS)), np.concatenate([numbers, grown, now, tally, x, weight, rate]))

@@ -6,11 +6,12 @@ interpolated in lambda between J nodes, so sums at the nodes serve all of them; 
 bond formed, so the sums are kept by place (`place_cell_kernels`). Bonds still growing, and the last piece of a stroke,
 are strips as in `bond_sum_kernels`, and are given to the cells when they are ripe.
 
-cells as in `place_cell_kernels`; strips (12, capacity): rows 0-3, 5, 6 as in `bond_sum_kernels`; 4, 10 growth J at start
-and end; 7 whether it ends at an edge of a cell; 8, 9 integral of the logarithm of its starting lengths and first moment; 11
-growth J per length of its last step;
-law (24,): as in `bond_list`, and from 8 on: cell width, growth J of a ripe bond, nodes J, middle and half range of 1/eps;
-table (3 J,): nodes in (-1, 1), their barycentric weights, their 1/eps; now, tally as in `bond_kernels`.
+cells as in `place_cell_kernels`. strips (12, capacity): rows 0-3, 5, 6 as in `bond_sum_kernels`; 4, 10 growth J at
+start and end; 7 whether it ends at an edge of a cell; 8, 9 integral of the logarithm of its starting lengths and its first
+moment; 11 growth J per length of its last step. num (48 + 3 J,), all numbers in one array: law as in `bond_list`, and
+from 8 on cell width, growth J of a ripe bond, nodes J, middle and half range of 1/eps, path at the last turn; growth
+(GROWTH), now (NOW) and tally (TALLY) as in `bond_kernels`; nodes in (-1, 1), their barycentric weights, their 1/eps
+(TABLE).
 """
 
 from math import exp, expm1, log, sqrt
@@ -20,7 +21,7 @@ from numba import njit
 
 from .bond_kernels import PIECE, goal_length
 from .bond_math_kernels import FAST, fexp
-from .bond_sum_kernels import AGED, FIRST, SECOND, _shares_closed, aged_sums, first_bonds, formed
+from .bond_sum_kernels import AGED, FIRST, SECOND, _aged, _shares_closed, aged_sums, first_bonds, formed
 from .kernels import grow
 from .place_cell_kernels import (
     ABOVE,
@@ -36,7 +37,6 @@ from .place_cell_kernels import (
     OPEN,
     ORIGIN,
     REF,
-    STAMP,
     WAY,
     clear,
     cross,
@@ -46,7 +46,8 @@ from .place_cell_kernels import (
     sweep,
 )
 
-WIDTH, RIPE, NODES, MIDDLE, HALF = 8, 9, 10, 11, 12
+WIDTH, RIPE, NODES, MIDDLE, HALF, TURNED = 8, 9, 10, 11, 12, 13
+GROWTH, NOW, TALLY, TABLE = 24, 30, 36, 48
 GROWN = 0.5  # most growth J of a strip
 KINK = 1e-3  # most change of the growth J across a strip by a bend between two steps
 DONE = 14.0  # growth J beyond which a step's own bonds are as good as ripe
@@ -54,21 +55,21 @@ SCALED = 200.0  # path over the shortest bond length after which the sums are re
 
 
 @njit(error_model="numpy", fastmath=FAST)
-def _factors(eps, path, cells, law, table):
+def _factors(eps, path, cells, num):
     """Write the factors of the sums at a bond length and path into the room of row 1."""
-    count, orders, since, y = int(law[NODES]), int(law[0]) + 1, path - cells[0, REF], 1 / eps
-    x, total = (y - law[MIDDLE]) / law[HALF], 0.0
+    count, orders, since, y = int(num[NODES]), int(num[0]) + 1, path - cells[0, REF], 1 / eps
+    x, total = (y - num[MIDDLE]) / num[HALF], 0.0
     hit = -1
     for j in range(count):
-        gap = x - table[j]
+        gap = x - num[TABLE + j]
         if abs(gap) < 1e-14:
             hit = j
-        cells[1, HEAD + j] = table[count + j] / gap
+        cells[1, HEAD + j] = num[TABLE + count + j] / gap
         total += cells[1, HEAD + j]
     front = 1.0 if orders == 1 else y if orders == 2 else 0.5 * y * y
     for j in range(count):
         part = cells[1, HEAD + j] / total if hit < 0 else 1.0 if j == hit else 0.0
-        last = front * part * fexp(-since * table[2 * count + j])
+        last = front * part * fexp(-since * num[TABLE + 2 * count + j])
         if orders == 1:
             cells[1, HEAD + j] = last
         elif orders == 2:
@@ -130,10 +131,10 @@ def _piece(back, size, rate, eps):
 
 
 @njit(error_model="numpy")
-def _young(size, before, after, more, law):
+def _young(size, before, after, more, num):
     """Weight of the growing bonds of one straight increment."""
     goal, rate, back, total = goal_length(before, after, more), more / size, 0.0, 0.0
-    end = min(size, law[6])
+    end = min(size, num[6])
     while back < end:
         wide = _piece(back, size, rate, after)
         for half in range(2):
@@ -142,211 +143,233 @@ def _young(size, before, after, more, law):
                 goal + (before - goal) * exp(at * rate - more)) * exp(-at * rate)
             x = at / max(own, 1e-9 * after)
             f = wide * fexp(-x)
-            total += f if law[0] == 0 else f * x if law[0] == 1 else f * x * x
+            total += f if num[0] == 0 else f * x if num[0] == 1 else f * x * x
         back += wide
-    return 0.5 * total * law[4] / law[2]
+    return 0.5 * total * num[4] / num[2]
 
 
 @njit(error_model="numpy")
-def place_state(dq, cells, strips, tally, now, law, growth, table, v0, dt):
+def _grown(v, size, dt, num):
+    """(bond length, growth J) after a step at one speed: `kernels.grow` with v0 = v1."""
+    eps, rest = num[NOW + 4], num[GROWTH]
+    if rest < 0:
+        return eps, 0.0
+    rest *= dt / max(abs(v), num[GROWTH + 2])
+    slide = size / num[GROWTH + 1]
+    total = rest + slide
+    if total == 0:
+        return eps, 0.0
+    target = (rest * num[GROWTH + 3] + slide * num[GROWTH + 4]) / total
+    return target + (eps - target) * exp(-total), total
+
+
+@njit(error_model="numpy")
+def _growing(q, path, psi, eps, strips, num, head, end, back):
+    """(force, energy) of the strips; u keeps its sign in all of them where they and the slide go one way."""
+    if not back and strips[2, head] - strips[3, head] >= num[TURNED]:
+        return _aged(q, path, psi, eps, strips, head, end, num[0])
+    return aged_sums(q, path, psi, eps, strips, head, 0, end, num[0], 0.0)
+
+
+@njit(error_model="numpy")
+def place_state(dq, cells, strips, num, v0, dt):
     """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
 
     Friction force = mu_s N * weight. Twin: `quadrature.Quadrature`.
     """
-    q, size = now[0] + dq, abs(dq)
-    path = now[1] + size
-    eps, more = grow(now[4], v0, v0, size, dt, growth)
-    head, end = int(tally[0]), int(tally[1])
-    _factors(eps, path, cells, law, table)
+    q, size = num[NOW] + dq, abs(dq)
+    path = num[NOW + 1] + size
+    eps, more = _grown(v0, size, dt, num)
+    head, end = int(num[TALLY]), int(num[TALLY + 1])
+    _factors(eps, path, cells, num)
     force, energy = _ripe(q, cells)
     if end > head:
-        if law[1] == AGED:
-            f, g = aged_sums(q, path, exp(now[5] - now[3] - more), eps, strips, head, 0, end, law[0], 0.0)
-            f, g = f * law[4] / law[2], g * law[4] / law[2]
+        if num[1] == AGED:
+            f, g = _growing(q, path, exp(num[NOW + 5] - num[NOW + 3] - more), eps, strips, num, head, end,
+                            dq * cells[1, WAY] < 0)
+            f, g = f * num[4] / num[2], g * num[4] / num[2]
         else:
-            f, g = _shares_closed(q, path, strips, head, end, law[0], law[2])
+            f, g = _shares_closed(q, path, strips, head, end, num[0], num[2])
         force += f
         energy += g
-    if law[3] > 0:
-        f, g = first_bonds(q, path, 0.0, law)
+    if num[3] > 0:
+        f, g = first_bonds(q, path, 0.0, num)
         force += f
         energy += g
     if size > 0:
-        young = _young(size, now[4], eps, more, law) if law[1] == AGED else formed(size, law[2], law)
+        young = _young(size, num[NOW + 4], eps, more, num) if num[1] == AGED else formed(size, num[2], num)
         force += np.copysign(young, dq)
     return force, energy
 
 
 @njit(error_model="numpy")
-def place_force(dq, cells, strips, tally, now, law, growth, table, v0, dt):
+def place_force(dq, cells, strips, num, v0, dt):
     """Weight [1] after the straight increment dq; nothing is changed."""
-    return place_state(dq, cells, strips, tally, now, law, growth, table, v0, dt)[0]
+    return place_state(dq, cells, strips, num, v0, dt)[0]
 
 
 @njit(error_model="numpy")
-def _panel(low, high, dq, cells, strips, tally, now, law, growth, table, v0, dt):
+def _panel(low, high, dq, cells, strips, num, v0, dt):
     """Integral of the force over a share of the increment by five Gauss points."""
     out = 0.0
     for y, w in ((-0.906179845938664, 0.23692688505618908), (-0.5384693101056831, 0.47862867049936647),
                  (0.0, 0.5688888888888889), (0.5384693101056831, 0.47862867049936647),
                  (0.906179845938664, 0.23692688505618908)):
         part = low + (high - low) * (1 + y) / 2
-        out += w / 2 * place_force(part * dq, cells, strips, tally, now, law, growth, table, v0, part * dt)
+        out += w / 2 * place_force(part * dq, cells, strips, num, v0, part * dt)
     return (high - low) * out
 
 
 @njit(error_model="numpy")
-def place_mean(dq, cells, strips, tally, now, law, growth, table, v0, dt):
+def place_mean(dq, cells, strips, num, v0, dt):
     """Path-mean weight over the increment: Simpson's rule where it is short, five Gauss points up to half a bond
     length, beyond it such panels that double, as `bond_kernels.list_mean`."""
     if dq == 0:
-        return tally[5]
-    size = abs(dq) / now[4]
-    if size <= (0.1 if law[0] >= 1 else 0.03) and now[1] > 0:
-        half = place_force(0.5 * dq, cells, strips, tally, now, law, growth, table, v0, 0.5 * dt)
-        return (tally[5] + 4 * half + place_force(dq, cells, strips, tally, now, law, growth, table, v0, dt)) / 6
+        return num[TALLY + 5]
+    size = abs(dq) / num[NOW + 4]
+    if size <= (0.1 if num[0] >= 1 else 0.03) and num[NOW + 1] > 0:
+        half = place_force(0.5 * dq, cells, strips, num, v0, 0.5 * dt)
+        return (num[TALLY + 5] + 4 * half + place_force(dq, cells, strips, num, v0, dt)) / 6
     if size <= 0.5:
-        return _panel(0.0, 1.0, dq, cells, strips, tally, now, law, growth, table, v0, dt)
+        return _panel(0.0, 1.0, dq, cells, strips, num, v0, dt)
     low, high, out = 0.0, 0.5 / size, 0.0
     while low < 1:
         high = 1.0 if high > 0.75 else high
-        out += _panel(low, high, dq, cells, strips, tally, now, law, growth, table, v0, dt)
+        out += _panel(low, high, dq, cells, strips, num, v0, dt)
         low, high = high, 2 * high
     return out
 
 
 @njit(error_model="numpy")
-def place_slope(dq, cells, strips, tally, now, law, growth, table, v0, dt):
+def place_slope(dq, cells, strips, num, v0, dt):
     """(weight at the end of the increment, its derivative by the increment [1/m]) by a central difference."""
-    step = 1e-5 * now[4]
-    force = place_force(dq, cells, strips, tally, now, law, growth, table, v0, dt)
-    ahead = place_force(dq + step, cells, strips, tally, now, law, growth, table, v0, dt)
-    behind = place_force(dq - step, cells, strips, tally, now, law, growth, table, v0, dt)
+    step = 1e-5 * num[NOW + 4]
+    force = place_force(dq, cells, strips, num, v0, dt)
+    ahead = place_force(dq + step, cells, strips, num, v0, dt)
+    behind = place_force(dq - step, cells, strips, num, v0, dt)
     return force, (ahead - behind) / (2 * step)
 
 
 @njit(error_model="numpy")
-def place_step(dq, cells, strips, tally, now, law, growth, table, v0, v1, dt):
+def place_step(dq, cells, strips, num, v0, v1, dt):
     """Commit dq. Always True: cells and strips are thinned before they fill their arrays."""
-    count, orders = int(law[NODES]), int(law[0]) + 1
-    nodes, size = table[2 * count:3 * count], abs(dq)
-    if cells[0, AT] == 0:
-        clear(cells, now[0], now[1], law[WIDTH])
-    before, grown = now[4], now[3]
-    start, q, path = now[0], now[0] + dq, now[1] + size
-    eps, more = grow(before, v0, v1, size, dt, growth)
-    now[0], now[1], now[3], now[4] = q, path, now[3] + more, eps
-    if now[3] - now[5] > 300:
-        less = exp(now[5] - now[3])
-        for k in range(int(tally[0]), int(tally[1])):
+    count, orders = int(num[NODES]), int(num[0]) + 1
+    nodes, size = num[TABLE + 2 * count:TABLE + 3 * count], abs(dq)
+    before, grown = num[NOW + 4], num[NOW + 3]
+    start, q, path = num[NOW], num[NOW] + dq, num[NOW + 1] + size
+    eps, more = grow(before, v0, v1, size, dt, num[GROWTH:GROWTH + 6])
+    num[NOW], num[NOW + 1], num[NOW + 3], num[NOW + 4] = q, path, num[NOW + 3] + more, eps
+    if num[NOW + 3] - num[NOW + 5] > 300:
+        less = exp(num[NOW + 5] - num[NOW + 3])
+        for k in range(int(num[TALLY]), int(num[TALLY + 1])):
             strips[5, k] *= less
             strips[6, k] *= less
-        now[5] = now[3]
+        num[NOW + 5] = num[NOW + 3]
     if size > 0:
-        if size > law[6]:
-            start = q - np.copysign(law[6], dq)
-            tally[0] = tally[1] = 0.0
-            clear(cells, start, path - law[6], law[WIDTH])
+        if size > num[6]:
+            start = q - np.copysign(num[6], dq)
+            num[TALLY] = num[TALLY + 1] = 0.0
+            clear(cells, start, path - num[6], num[WIDTH])
         way = np.copysign(1.0, dq)
         if cells[1, WAY] * way < 0:
-            _turn(start, path - abs(q - start), way, cells, strips, tally)
+            _turn(start, path - abs(q - start), way, cells, strips, num)
         cells[1, WAY] = way
         if (path - cells[0, REF]) * nodes[0] > SCALED:
             rescale(cells, path, start, nodes, orders)
-        _run(start, dq, size, before, more, grown, cells, strips, tally, now, law)
-        _settle(cells, strips, tally, now, law, nodes, orders)
+        _run(start, dq, size, before, more, grown, cells, strips, num)
+        _settle(cells, strips, num, nodes, orders)
         room = cells.shape[0] - 2 - cells[0, COUNT]
-        need = 2 * law[6] / law[WIDTH] + 8
+        need = 2 * num[6] / num[WIDTH] + 8
         if cells[0, COUNT] > 1.3 * cells[1, KEPT] + 64 or room < need:
             oldest = path
-            if tally[1] > tally[0]:
-                oldest = strips[2, int(tally[0])] - strips[3, int(tally[0])]
-            sweep(cells, q, path, oldest, law[WIDTH], law[6], nodes, orders, need)
-    elif tally[1] > tally[0]:
-        _settle(cells, strips, tally, now, law, nodes, orders)
-    tally[5], tally[4] = place_state(0.0, cells, strips, tally, now, law, growth, table, 0.0, 0.0)
-    tally[10] = cells[1, 5]
+            if num[TALLY + 1] > num[TALLY]:
+                oldest = strips[2, int(num[TALLY])] - strips[3, int(num[TALLY])]
+            sweep(cells, q, path, oldest, num[WIDTH], num[6], nodes, orders, need)
+    elif num[TALLY + 1] > num[TALLY]:
+        _settle(cells, strips, num, nodes, orders)
+    num[TALLY + 5], num[TALLY + 4] = place_state(0.0, cells, strips, num, 0.0, 0.0)
+    num[TALLY + 10] = cells[1, 5]
     return True
 
 
 @njit(error_model="numpy")
-def _turn(place, path, way, cells, strips, tally):
+def _turn(place, path, way, cells, strips, num):
     """The slide turns: an edge where it does, and the last strip ends there."""
     split(cells, place, way, path)
+    num[TURNED] = path
     if cells[1, OPEN] > 0:
-        strips[7, int(tally[1]) - 1] = 1.0
+        strips[7, int(num[TALLY + 1]) - 1] = 1.0
     cells[1, OPEN] = 0.0
 
 
 @njit(error_model="numpy")
-def _run(start, dq, size, before, more, grown, cells, strips, tally, now, law):
+def _run(start, dq, size, before, more, grown, cells, strips, num):
     """Strips of the increment, from edge to edge of the cells."""
-    way, path0, here = np.copysign(1.0, dq), now[1] - size, start
-    aged = law[1] == AGED
-    goal, rate = goal_length(before, now[4], more), more / size
+    way, path0, here = np.copysign(1.0, dq), num[NOW + 1] - size, start
+    aged = num[1] == AGED
+    goal, rate = goal_length(before, num[NOW + 4], more), more / size
     while True:
         k = int(cells[0, AT])
         edge = cells[k, HIGH] if way > 0 else cells[k, LOW]
-        left, gap = (now[0] - here) * way, (edge - here) * way
+        left, gap = (num[NOW] - here) * way, (edge - here) * way
         run = min(left, gap)
-        last = int(tally[1]) - 1
+        last = int(num[TALLY + 1]) - 1
         held = cells[1, OPEN] > 0
         if aged:
-            most = _piece(left - run, left, rate, now[4]) if (left - run) * rate < DONE else PIECE * now[4]
+            most = _piece(left - run, left, rate, num[NOW + 4]) if (left - run) * rate < DONE else PIECE * num[NOW + 4]
             if left * rate < DONE or rate * run > GROWN:
                 most = min(most, GROWN / rate if rate > 0 else most)
             if held and abs(rate - strips[11, last]) * min(strips[3, last], run) > KINK:
                 held, cells[1, OPEN] = False, 0.0
             if held:
-                room = min(PIECE * now[4] - strips[3, last],
-                           (GROWN - (strips[10, last] - strips[4, last])) / rate if rate > 0 else PIECE * now[4])
+                room = min(PIECE * num[NOW + 4] - strips[3, last],
+                           (GROWN - (strips[10, last] - strips[4, last])) / rate if rate > 0 else PIECE * num[NOW + 4])
                 if room < 0.3 * min(run, most):
                     held, cells[1, OPEN] = False, 0.0
                 else:
                     most = min(most, room)
             run = min(run, most) if run > 1.0001 * most else run
-        to = edge if run == gap else now[0] if run == left else here + way * run
+        to = edge if run == gap else num[NOW] if run == left else here + way * run
         if run > 0:
             if not held:
-                last = _fresh(here, path0 + abs(here - (now[0] - dq)), grown + rate * (size - left), cells, strips,
-                              tally, now)
-            _extend(last, to, size - left, run, rate, goal, before, grown, path0, aged, strips, now)
+                last = _fresh(here, path0 + size - left, grown + rate * (size - left), cells, strips, num)
+            _extend(last, to, size - left, run, rate, goal, before, grown, path0, aged, strips, num)
         here = to
         if run == left and left <= gap:
             break
         if run == gap:
             if cells[1, OPEN] > 0:
-                last = int(tally[1]) - 1
-                if not aged or strips[3, last] > 0.5 * PIECE * now[4] or strips[10, last] - strips[4, last] > \
-                        0.5 * GROWN or True:
+                last = int(num[TALLY + 1]) - 1
+                if not aged or strips[3, last] > 0.5 * PIECE * num[NOW + 4] or strips[10, last] - strips[4, last] > \
+                        0.5 * GROWN:
                     strips[7, last] = 1.0
                     cells[1, OPEN] = 0.0
-            cross(cells, way, path0 + size - (now[0] - here) * way, law[WIDTH], law[6])
-    cells[int(cells[0, AT]), NEWEST] = now[1]
+            cross(cells, way, path0 + size - (num[NOW] - here) * way, num[WIDTH], num[6])
+    cells[int(cells[0, AT]), NEWEST] = num[NOW + 1]
 
 
 @njit(error_model="numpy")
-def _fresh(place, path, grown, cells, strips, tally, now):
+def _fresh(place, path, grown, cells, strips, num):
     """A strip of no length."""
-    end = int(tally[1])
+    end = int(num[TALLY + 1])
     if end == strips.shape[1]:
-        head = int(tally[0])
+        head = int(num[TALLY])
         for i in range(strips.shape[0]):
             for k in range(head, end):
                 strips[i, k - head] = strips[i, k]
         end -= head
-        tally[0] = 0.0
+        num[TALLY] = 0.0
     strips[:, end] = 0.0
     strips[0, end] = strips[1, end] = place
     strips[2, end] = path
     strips[4, end] = strips[10, end] = grown
-    tally[1] = end + 1
+    num[TALLY + 1] = end + 1
     cells[1, OPEN] = 1.0
     return end
 
 
 @njit(error_model="numpy")
-def _extend(k, to, done, run, rate, goal, before, grown, path0, aged, strips, now):
+def _extend(k, to, done, run, rate, goal, before, grown, path0, aged, strips, num):
     """Continue a strip to a place; `done` [m] of the increment lie before it, `run` are added."""
     old = strips[3, k]
     wide = old + run
@@ -363,24 +386,24 @@ def _extend(k, to, done, run, rate, goal, before, grown, path0, aged, strips, no
         strips[9, k] += 0.5 * run * value * (old + at - done)
     mean = strips[8, k] / wide
     slope = 12 * (strips[9, k] - 0.5 * wide * strips[8, k]) / (wide * wide * wide)
-    base, arm = mean + strips[4, k] - now[5], slope * wide * (0.5 / sqrt(3.0))
+    base, arm = mean + strips[4, k] - num[NOW + 5], slope * wide * (0.5 / sqrt(3.0))
     strips[5, k], strips[6, k] = exp(base + arm), exp(base - arm)
 
 
 @njit(error_model="numpy")
-def _settle(cells, strips, tally, now, law, nodes, orders):
+def _settle(cells, strips, num, nodes, orders):
     """Give the ripe strips to the cells, from edge to edge; the oldest too where there is no more room for strips."""
-    head = int(tally[0])
-    end = int(tally[1] - cells[1, OPEN])
-    last, ripe = head, law[RIPE]
+    head = int(num[TALLY])
+    end = int(num[TALLY + 1] - cells[1, OPEN])
+    last, ripe = head, num[RIPE]
     if end - head > strips.shape[1] // 2:
-        ripe = now[3] - strips[10, head + (end - head) // 4]
+        ripe = num[NOW + 3] - strips[10, head + (end - head) // 4]
         cells[1, FORCED] = max(cells[1, FORCED], exp(-ripe))
     for k in range(head, end):
-        if now[3] - strips[10, k] < ripe:
+        if num[NOW + 3] - strips[10, k] < ripe:
             break
         if strips[7, k] > 0:
             last = k + 1
     for k in range(head, last):
-        deposit(cells, strips[0, k], strips[1, k], strips[2, k], nodes, orders, law[2])
-    tally[0] = last
+        deposit(cells, strips[0, k], strips[1, k], strips[2, k], nodes, orders, num[2])
+    num[TALLY] = last
