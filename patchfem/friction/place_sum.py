@@ -10,7 +10,7 @@ from .law import Bonds
 from .quadrature import cutoff
 
 WIDTH = 0.05  # of a cell in bond lengths
-CELLS = 0.12  # largest measured error of the force over the cube of the cell width
+CELLS = 0.15  # largest measured error of the force over the cube of the cell width
 STRIPS = 2048
 
 
@@ -44,7 +44,7 @@ def node_error(law: Bonds, count: int) -> float:
     rate = (low + high) / 2 + y * (high - low) / 2
     share = weight / (y[:, None] - x)
     share /= share.sum(axis=1)[:, None]
-    rho = np.linspace(0, cutoff(law.order, 1e-9) * law.length, 4001)
+    rho = np.linspace(0, cutoff(law.order, 1e-9) * law.length, 801)
     miss = np.abs(share @ np.exp(-np.outer(nodes, rho)) - np.exp(-np.outer(rate, rho)))
     miss *= (rho * rate[:, None])**law.order / (1 if law.order < 2 else 2)
     return float(miss.sum(axis=1).max() * (rho[1] - rho[0]) / law.length)

@@ -7,8 +7,8 @@ bond formed, so the sums are kept by place (`place_cell_kernels`). Bonds still g
 are strips as in `bond_sum_kernels`, and are given to the cells when they are ripe.
 
 cells as in `place_cell_kernels`. strips (12, capacity): rows 0-3, 5, 6 as in `bond_sum_kernels`; 4, 10 growth J at
-start and end; 7 whether it ends at an edge of a cell; 8, 9 integral of the logarithm of its starting lengths and its first
-moment; 11 growth J per length of its last step. num (48 + 3 J,), all numbers in one array: law as in `bond_list`, and
+start and end; 7 whether it ends at an edge of a cell; 8, 9 integral of the logarithm of its starting lengths and its
+first moment; 11 growth J per length of its last step. num (48 + 3 J,), all numbers in one array: law of `bond_list`,
 from 8 on cell width, growth J of a ripe bond, nodes J, middle and half range of 1/eps, path at the last turn; growth
 (GROWTH), now (NOW) and tally (TALLY) as in `bond_kernels`; nodes in (-1, 1), their barycentric weights, their 1/eps
 (TABLE).
@@ -276,7 +276,7 @@ def place_step(dq, cells, strips, num, v0, v1, dt):
         cells[1, WAY] = way
         if (path - cells[0, REF]) * nodes[0] > SCALED:
             rescale(cells, path, start, nodes, orders)
-        _run(start, dq, size, before, more, grown, cells, strips, num)
+        _run(start, dq, size, before, more, grown, cells, strips, num, nodes, orders)
         _settle(cells, strips, num, nodes, orders)
         room = cells.shape[0] - 2 - cells[0, COUNT]
         need = 2 * num[6] / num[WIDTH] + 8
@@ -303,7 +303,7 @@ def _turn(place, path, way, cells, strips, num):
 
 
 @njit(error_model="numpy")
-def _run(start, dq, size, before, more, grown, cells, strips, num):
+def _run(start, dq, size, before, more, grown, cells, strips, num, nodes, orders):
     """Strips of the increment, from edge to edge of the cells."""
     way, path0, here = np.copysign(1.0, dq), num[NOW + 1] - size, start
     aged = num[1] == AGED
@@ -316,14 +316,13 @@ def _run(start, dq, size, before, more, grown, cells, strips, num):
         last = int(num[TALLY + 1]) - 1
         held = cells[1, OPEN] > 0
         if aged:
-            most = _piece(left - run, left, rate, num[NOW + 4]) if (left - run) * rate < DONE else PIECE * num[NOW + 4]
-            if left * rate < DONE or rate * run > GROWN:
-                most = min(most, GROWN / rate if rate > 0 else most)
+            old = left - DONE / rate  # of it, bonds that will be as good as ripe
+            most = min(PIECE * num[NOW + 4], old if old > 1e-9 * left else GROWN / rate)
             if held and abs(rate - strips[11, last]) * min(strips[3, last], run) > KINK:
                 held, cells[1, OPEN] = False, 0.0
             if held:
                 room = min(PIECE * num[NOW + 4] - strips[3, last],
-                           (GROWN - (strips[10, last] - strips[4, last])) / rate if rate > 0 else PIECE * num[NOW + 4])
+                           (GROWN - (strips[10, last] - strips[4, last])) / rate)
                 if room < 0.3 * min(run, most):
                     held, cells[1, OPEN] = False, 0.0
                 else:
@@ -332,6 +331,8 @@ def _run(start, dq, size, before, more, grown, cells, strips, num):
         to = edge if run == gap else num[NOW] if run == left else here + way * run
         if run > 0:
             if not held:
+                if num[TALLY + 1] - num[TALLY] > 0.75 * strips.shape[1]:
+                    _settle(cells, strips, num, nodes, orders)
                 last = _fresh(here, path0 + size - left, grown + rate * (size - left), cells, strips, num)
             _extend(last, to, size - left, run, rate, goal, before, grown, path0, aged, strips, num)
         here = to
@@ -397,8 +398,8 @@ def _settle(cells, strips, num, nodes, orders):
     end = int(num[TALLY + 1] - cells[1, OPEN])
     last, ripe = head, num[RIPE]
     if end - head > strips.shape[1] // 2:
-        ripe = num[NOW + 3] - strips[10, head + (end - head) // 4]
-        cells[1, FORCED] = max(cells[1, FORCED], exp(-ripe))
+        last = head + (end - head) // 4
+        cells[1, FORCED] = max(cells[1, FORCED], exp(min(strips[10, last] - num[NOW + 3], 0.0)))
     for k in range(head, end):
         if num[NOW + 3] - strips[10, k] < ripe:
             break
