@@ -9,7 +9,8 @@ from numba import njit
 
 from .friction.bond_kernels import list_mean, list_slope, list_step
 from .friction.bond_sum_kernels import MOMENTS
-from .friction.place_sum_kernels import TALLY, place_mean, place_step
+from .friction.place_step_kernels import place_step
+from .friction.place_sum_kernels import TALLY, place_mean
 
 PLACES = 7  # of law: whether the bonds are summed over place
 
