@@ -63,6 +63,8 @@ def place_step(dq, cells, strips, num, v0, v1, dt):
             rescale(cells, path, start, nodes, orders)
         _run(start, dq, size, before, more, grown, cells, strips, num, nodes, orders)
         _settle(cells, strips, num, nodes, orders)
+        if num[TALLY + 1] - num[TALLY] > 1.15 * num[TALLY + 3] + 4:
+            _thin(cells, strips, num)
         room = cells.shape[0] - 2 - cells[0, COUNT]
         need = 2 * num[6] / num[WIDTH] + 8
         if cells[0, COUNT] > 1.3 * cells[1, KEPT] + 64 or room < need:
@@ -172,10 +174,7 @@ def _extend(k, to, done, run, rate, goal, before, grown, path0, aged, strips, nu
         value = log(goal + (before - goal) * exp(-part)) + part + (grown - strips[4, k])
         strips[8, k] += 0.5 * run * value
         strips[9, k] += 0.5 * run * value * (old + at - done)
-    mean = strips[8, k] / wide
-    slope = 12 * (strips[9, k] - 0.5 * wide * strips[8, k]) / (wide * wide * wide)
-    base, arm = mean + strips[4, k] - num[NOW + 5], slope * wide * (0.5 / sqrt(3.0))
-    strips[5, k], strips[6, k] = exp(base + arm), exp(base - arm)
+    _lengths(strips, k, num)
 
 
 @njit(error_model="numpy")
@@ -195,3 +194,44 @@ def _settle(cells, strips, num, nodes, orders):
     for k in range(head, last):
         deposit(cells, strips[0, k], strips[1, k], strips[2, k], nodes, orders, num[2])
     num[TALLY] = last
+
+
+@njit(error_model="numpy")
+def _thin(cells, strips, num):
+    """Join neighbours of one stroke whose bonds have nearly grown: little is left of what a long strip blurs."""
+    head, end = int(num[TALLY]), int(num[TALLY + 1])
+    out = head
+    for k in range(head + 1, end):
+        i, age = out, num[NOW + 3] - strips[10, k]
+        most = 0.0 if age < 3 else 0.5 if age < 5 else 1.0 if age < 8 else 2.0
+        last = k == end - 1 and cells[1, OPEN] > 0
+        if not last and strips[1, i] == strips[0, k] and (strips[1, i] - strips[0, i]) * (
+                strips[1, k] - strips[0, k]) > 0 and strips[10, k] - strips[4, i] <= most and \
+                strips[3, i] + strips[3, k] <= PIECE * num[NOW + 4]:
+            _join(strips, i, k, num)
+            continue
+        out += 1
+        for row in range(strips.shape[0]):
+            strips[row, out] = strips[row, k]
+    num[TALLY + 1], num[TALLY + 3] = out + 1, out + 1 - head
+
+
+@njit(error_model="numpy")
+def _join(strips, i, k, num):
+    """Strip i takes its continuation k over."""
+    lag, left, right = strips[4, k] - strips[4, i], strips[3, i], strips[3, k]
+    strips[9, i] += strips[9, k] + 0.5 * lag * right * right + left * (strips[8, k] + lag * right)
+    strips[8, i] += strips[8, k] + lag * right
+    strips[3, i] = left + right
+    for row in (1, 2, 7, 10, 11):
+        strips[row, i] = strips[row, k]
+    _lengths(strips, i, num)
+
+
+@njit(error_model="numpy")
+def _lengths(strips, k, num):
+    """Scaled starting lengths at the Gauss points from a straight line through their logarithm."""
+    wide = strips[3, k]
+    slope = 12 * (strips[9, k] - 0.5 * wide * strips[8, k]) / (wide * wide * wide)
+    base, arm = strips[8, k] / wide + strips[4, k] - num[NOW + 5], slope * wide * (0.5 / sqrt(3.0))
+    strips[5, k], strips[6, k] = exp(base + arm), exp(base - arm)
