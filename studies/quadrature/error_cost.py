@@ -29,12 +29,14 @@ from patchfem.compiled import load_kernels
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.friction.law import Bonds
 from patchfem.friction.quadrature import cutoff
-from patchfem.simulate_march import list_model
+from patchfem.simulate_march import list_model, place_model
 
 HERE = Path(__file__).parent
 AMPLITUDES = (0.1, 1.0, 3.0, 10.0, 50.0)
 TAILS = (1e-2, 1e-3, 1e-4, 1e-6)
 WIDTHS = (0.2, 0.1, 0.05, 0.02, 0.01)
+NODES = (4, 6, 8, 10)  # of the exponentials, in cells of 0.05
+CELLS = (0.2, 0.1, 0.05, 0.025)  # widths, with 10 nodes
 STEPS = (50, 100, 200, 400)
 FINEST = 1600
 ROOM = 200_000
@@ -65,9 +67,19 @@ def slide(amplitude: float, steps: int) -> tuple:
 
 def along(law, path, dt, tail, merge, repeats=1) -> tuple:
     """(forces at the samples, microseconds per step, longest list) of one engine."""
-    hub, best = load_kernels(), np.inf
     model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
     model.fields["bondlist"] = np.zeros((10, ROOM)) if not merge else model.fields["bondlist"]
+    return timed(model, path, dt, repeats)
+
+
+def over_place(law, path, dt, nodes, width, repeats=1) -> tuple:
+    """The same of sums of exponentials over place, with the cells in place of the strips."""
+    return timed(place_model(law, 1.0, 1e-9, nodes, width, 1e-6), path, dt, repeats)
+
+
+def timed(model, path, dt, repeats) -> tuple:
+    """(forces at the samples, microseconds per step, longest list) of a model."""
+    hub, best = load_kernels(), np.inf
     for _ in range(repeats):
         contact, work = model.build(hub)
         burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
@@ -92,6 +104,12 @@ def main(amplitudes=AMPLITUDES, repeats=2) -> list:
         for width in WIDTHS:
             force, micro, strips = along(law, path, dt, 1e-6, width, repeats)
             rows.append(Row(amplitude, "merged", "width", width, float(np.abs(force - truth).max()), micro, strips))
+        for knob, values in (("nodes", NODES), ("width", CELLS)):
+            for value in values:
+                nodes, width = (value, 0.05) if knob == "nodes" else (10, value)
+                force, micro, cells = over_place(law, path, dt, nodes, width, repeats)
+                error = float(np.abs(force - truth).max())
+                rows.append(Row(amplitude, "exponential", knob, value, error, micro, cells))
         fine = along(law, *slide(amplitude, FINEST), 1e-6, 0.01)[0][::FINEST // 50]
         for steps in STEPS:
             force, micro, strips = along(law, *slide(amplitude, steps), 1e-6, 0.01)
@@ -116,8 +134,10 @@ def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
         FigureCanvasSVG(figure)
         axes = np.atleast_1d(figure.subplots(1, len(amplitudes), sharey=True))
         for ax, amplitude in zip(axes, amplitudes):
-            for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"), ("steps", GREY, "^")):
-                part = [r for r in rows if r.amplitude == amplitude and r.engine == engine]
+            for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"),
+                                        ("exponential", "black", "v"),
+                                        ("steps", GREY, "^")):
+                part = [r for r in rows if r.amplitude == amplitude and r.engine == engine and r.knob != "nodes"]
                 ax.loglog([r.micro for r in part], [max(r.error, 1e-12) for r in part], mark + "-", color=color, ms=3,
                           lw=0.8, label=engine)
             whole = next(r for r in rows if r.amplitude == amplitude and r.engine == "direct")
