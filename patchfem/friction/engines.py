@@ -103,7 +103,8 @@ def _over_place(law, tolerance, tail, stroke, steps) -> Choice:
     if law.grows:
         strips = min(2 * log(1 / goal), 745.0) * max(1.0, law.slip_growth / law.length / 0.125)
     crossed = each / width * PER_CELL * nodes
-    seconds = STEP + PASSES * (PLACES + (STRIP[AGED] if law.grows else 0.0) * strips) + crossed
+    force = 2.5 * PLACES + STRIP[AGED] * strips if law.grows else PLACES
+    seconds = STEP + PASSES * force + crossed
     seconds *= 1 if each <= 0.1 else 5 / 2 * (1 if each <= 1 else 2 + ceil(each).bit_length())
     return Choice("exponential", tail, 0.0, error, strips, seconds, nodes, width, goal)
 
