@@ -38,7 +38,6 @@ NOT_YET_BUILT: dict[str, str] = {
     "accuracy.method=newmark": "auto, exact or march",
     "accuracy.method=euler": "auto, exact or march",
     "accuracy.method=harmonic": "auto, exact or march",
-    "accuracy.quadrature=exponential": "auto or merged",
     "accuracy.harmonics": "",
     "accuracy.convergence": "",
     "accuracy.convergence_tolerance": "",

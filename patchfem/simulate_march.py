@@ -110,6 +110,19 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     return ContactModel(3, limit, fields, False, law.length)
 
 
+def place_model(law, limit: float, tail: float, nodes: int, width: float, ripe: float) -> ContactModel:
+    """The printed law of order 0, 1 or 2 by sums of exponentials over place; numbers as in friction.place_sum."""
+    from .friction.place_sum import place_sum
+
+    found = place_sum(law, tail, nodes, width, ripe)
+    flagged = found.numbers[:24].copy()
+    flagged[7] = 1.0
+    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bonds": found.cells, "bondlist": found.strips,
+              "now": found.numbers[30:36], "tally": np.zeros(12), "law": flagged, "table": found.numbers,
+              "growth": growth_numbers(law)}
+    return ContactModel(3, limit, fields, False, law.length)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class MarchResult:
     """A march: kept samples, the last cycles whole and their step-mean forces, extremes and phasors per cycle, the
@@ -243,7 +256,7 @@ class _Run:
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
         have = self.contact.bondlist.shape[1]
-        if not have:
+        if not have or self.contact.law[7]:
             return
         want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
         if want <= have or have >= MOST_STRIPS:

@@ -171,6 +171,8 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
         return hub.rate_model(limit, f.reference_speed)
     law = law_of(scene, drive.acceleration / drive.omega)
     found = quadrature_of(scene, settings, drive)
+    if found.engine == "exponential":
+        return hub.place_model(law, limit, found.tail, found.nodes, found.width, found.ripe)
     if found.engine != "recursion":
         from .friction.quadrature import cutoff
 

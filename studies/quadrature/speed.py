@@ -19,7 +19,7 @@ from patchfem.compiled import load_kernels
 from patchfem.friction.law import Bonds
 from patchfem.friction.quadrature import Quadrature, cutoff
 from patchfem.friction.recursion import Recursion
-from patchfem.simulate_march import list_model, points_model
+from patchfem.simulate_march import list_model, place_model, points_model
 
 STEPS, CYCLES = 2000, 10
 GROWS = {"ratio": 0.7, "rest_growth": 1.5, "slip_growth": 0.05, "rest_speed": 1e-2}
@@ -48,7 +48,7 @@ def compiled(model, path, repeats: int = 3) -> tuple:
         begin = process_time()
         hub.follow_path(path, dt, model.kind, contact, work, 1e-11, burnt, forces)
         best = min(best, process_time() - begin)
-    count = contact.weight.size or contact.tally[1] - contact.tally[0]
+    count = contact.weight.size or contact.tally[10] or contact.tally[1] - contact.tally[0]
     return best / (path.size - 1), max(count, 1.0)
 
 
@@ -80,6 +80,9 @@ def main(cycles: int = CYCLES) -> list:
         for engine, merge in (("truncated", 0.0), ("merged .02", 0.02), ("merged .05", 0.05)):
             seconds, count = compiled(list_model(law, 1.0, cutoff(order, 1e-6), merge), path)
             rows.append(Speed(f"{engine}, {name}", 1e9 * seconds, 1e9 * seconds / count, slow / seconds))
+        if reading == "report":
+            seconds, count = compiled(place_model(law, 1.0, 1e-9, 10, 0.05, 1e-6), path)
+            rows.append(Speed(f"exponential, {name}", 1e9 * seconds, 1e9 * seconds / count, slow / seconds))
     law = Bonds(1.0, 1.0)
     for points in (1, 2000):
         seconds, _ = compiled(points_model(law, np.full(points, 1 / points), np.ones(points)), short)
