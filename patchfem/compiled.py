@@ -52,7 +52,7 @@ def load_kernels(say=None):
         folder = cache_folder()
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
         if say is not None and not any(folder.rglob("*.nbi")):
-            say("compiling the time loop for this machine, once (about 15 s)")
+            say("compiling the time loop for this machine, once (10 to 30 s)")
         import numba
 
         numba.config.CACHE_DIR = str(folder)

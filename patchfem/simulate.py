@@ -186,6 +186,9 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
                     "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
     if scene.friction.law == "nonlocal":
         warnings = [*warnings, *_unripe(bench.bonds_of(scene), peak_speed(scene))]
+        if scene.friction.reading == "report" and bench.varies(scene):
+            warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
+                        "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
     steps = steps_of(scene)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(scene, patch, steps, frames, say)

@@ -118,7 +118,7 @@ def _split(losses) -> tuple:
 def _values(scene, time, slide, force, load, slip, ledger, first, omega) -> dict:
     # over the load that is applied: what slides off the pressure is friction lost
     applied = load if varies(scene) else np.full_like(load, load[0])
-    ratio = np.divide(force, applied, out=np.zeros_like(force), where=applied > 1e-9 * applied.max(initial=0.0))
+    ratio = np.divide(force, applied, out=np.zeros_like(force), where=applied > 1e-3 * applied.max(initial=0.0))
     work, stored, dissipated, created = ledger
     power = np.abs(np.diff(work)).sum()
     miss = abs(work[-1] - (stored[-1] - stored[0]) - dissipated[-1] + created[-1])
@@ -194,7 +194,7 @@ def _rigid(scene, patch, time, slide, frames):
             here = law.breaking(s0, peaks[k])
         force[k], load[k], stored[k] = weight @ here, weight @ s0, weight @ law.stored(state)
         elastic = length * force[k] / (static * load[k]) if static * load[k] > 0 else 0.0
-        slip[k] = slide[k] - elastic
+        slip[k] = slide[k] - min(max(elastic, -length), length)
         if k in pick:
             tau.append(here)
             limit = static * s0

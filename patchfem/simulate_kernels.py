@@ -1,13 +1,14 @@
 """The compiled hub: the one loop in which the laws of friction and the modes meet, and its twin for a given slide.
 
 Over a step the modes move exactly under the path-mean of the friction force along the straight increment of slide,
-which does exactly the work of the law: the sum of all energies never rises by itself.
+which does exactly the work of the law: the sum of all energies never rises by itself. A contact that is a list of bonds
+has a loop of its own, so that a scene compiles only what it names.
 """
 
 import numpy as np
 from numba import njit
 
-from .dynamics.kernels import accelerations, free_slide, move, step_energy, stored
+from .dynamics.kernels import accelerations, free_slide, move, note, sample, step_energy, stored, tell
 from .friction.kernels import LEAN, grow
 from .friction.slide_kernels import rigid_path
 from .simulate_step_kernels import (
@@ -29,7 +30,7 @@ from .simulate_step_kernels import (
 )
 
 __all__ = ["COULOMB", "JENKINS", "LIST", "POINTS", "RATE", "Contact", "Modes", "Steps", "Work", "contact_state",
-           "follow_path", "march"]
+           "follow_path", "march", "march_contact"]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -40,7 +41,6 @@ def sources(kind, c, q0, dq):
         c.source[j] = 0.5 * (pressure_at(here, c.x, c.sigma) + pressure_at(here + dq, c.x, c.sigma))
 
 
-@njit(error_model="numpy", cache=True)
 def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, work, goal, travel, ledger, rows):
     """March `steps` steps from step number `first` of the drive; 0.2-0.5 us per step and a few ns per point.
 
@@ -50,26 +50,29 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
     rows (steps + 1, 2 n + 6): z, z', q, q', F, slip, mean force of the step that follows, energy in the interface.
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 bond list full, 3 not finite.
     """
+    if kind == LIST:
+        from .simulate_list_kernels import march_list
+
+        return march_list(first, steps, state, modes, prop, drive, mass, c, work, goal, travel, ledger, rows)
+    return march_contact(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, work, goal, travel,
+                         ledger, rows)
+
+
+@njit(error_model="numpy", cache=True)
+def march_contact(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, work, goal, travel, ledger,
+                  rows):
+    """`march` of the kinds without a list."""
     omega, damp, slide, base, output = modes
     step, gauss, sine, sine_gauss, weights, dt, beta = prop
     n = omega.size
     around = sine.shape[0] - 1
     accel = np.empty(n)
     for i in range(steps + 1):
-        q, v, out = 0.0, 0.0, 0.0
-        for k in range(n):
-            rows[i, k], rows[i, n + k] = state[k, 0], state[k, 1]
-            q += slide[k] * state[k, 0]
-            v += slide[k] * state[k, 1]
-            out += output[k] * state[k, 0]
+        q, v, out = sample(rows[i], state, slide, output)
         force, energy, slip = contact_state(kind, c, q, held[0])
-        rows[i, 2 * n], rows[i, 2 * n + 1], rows[i, 2 * n + 2], rows[i, 2 * n + 3] = q, v, force, slip
-        rows[i, 2 * n + 4], rows[i, 2 * n + 5] = force, energy
-        ledger[4] = max(ledger[4], energy + stored(state, omega, mass))
-        if not np.isfinite(q + v + force):
-            return i, 3
-        if abs(out) > travel:
-            return i, 1
+        status = note(rows[i], force, energy, slip, out, travel, energy + stored(state, omega, mass), ledger)
+        if status:
+            return i, status
         if i == steps:
             break
         at = (first + i) % around
@@ -85,21 +88,14 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
                 dq, force, count, middle = contact_step(free, beta, v, dt, kind, c, work, goal)
                 if abs(dq - guess) <= 1e-12 * (abs(dq) + 1e-12):
                     break
-        ledger[5] += abs(count)
-        ledger[6] = max(ledger[6], abs(count))
-        if count < 0:
-            ledger[7] += 1
         used = (free - dq) / beta
+        tell(count, used * dq, ledger)
         step_energy(state, gauss, slide, base, damp, mass, drive, used, s, co, sine_gauss[at], dt, weights, ledger)
-        move(state, step, slide, mass, used, s, co)
-        v1 = 0.0
-        for k in range(n):
-            v1 += slide[k] * state[k, 1]
+        v1 = move(state, step, slide, mass, used, s, co)
         held[0] = used
         if kind == RATE:
             held[0] = c.force[0] * np.tanh(v1 / c.force[1])
         rows[i, 2 * n + 4] = used
-        ledger[8] += used * dq
         if kind == COULOMB and dq == 0.0:
             accelerations(state, omega, damp, slide, base, mass, drive, 0.0, sine[at + 1, 0], accel)
             need, gain = 0.0, 0.0
@@ -115,13 +111,8 @@ def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, 
 
 
 @njit(error_model="numpy", cache=True)
-def follow_path(path, dt, kind, c, work, goal, burnt, forces):
-    """Resultant along a prescribed slide path (k,) [m] with steps of dt [s].
-
-    forces (k, 3): force at the sample, mean over the step that follows, irreversible slip; burnt (k, 2): energy
-    dissipated in the step that follows, energy stored at the sample. Returns the steps that did not converge or found
-    the list of bonds full.
-    """
+def follow_contact(path, dt, kind, c, work, goal, burnt, forces):
+    """`follow_path` of the kinds without a list."""
     bad = 0
     if kind == POINTS and c.b.size == 0:
         rigid_path(path, dt, c.weight, c.bonds, c.source, c.growth, work.eps, burnt, forces)
@@ -146,6 +137,19 @@ def follow_path(path, dt, kind, c, work, goal, burnt, forces):
             mean, count = solve_modes(y, dq, 0.0, c, middle, goal, work)
         bad += count < 0
         forces[i, 1] = mean
-        burnt[i, 0], ok = commit(dq, mean, v, v, dt, kind, c, work, middle, path[i], False)
-        bad += not ok
+        burnt[i, 0] = commit(dq, mean, v, v, dt, kind, c, work, middle, path[i], False)[0]
     return bad
+
+
+def follow_path(path, dt, kind, c, work, goal, burnt, forces):
+    """Resultant along a prescribed slide path (k,) [m] with steps of dt [s].
+
+    forces (k, 3): force at the sample, mean over the step that follows, irreversible slip; burnt (k, 2): energy
+    dissipated in the step that follows, energy stored at the sample. Returns the steps that did not converge or found
+    the list of bonds full.
+    """
+    if kind == LIST:
+        from .simulate_list_kernels import follow_list
+
+        return follow_list(path, dt, c, burnt, forces)
+    return follow_contact(path, dt, kind, c, work, goal, burnt, forces)

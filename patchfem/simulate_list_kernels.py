@@ -1,4 +1,4 @@
-"""One step of a shared list of bonds in the compiled loop: force, solve without a slope, commit, energy book.
+"""The loop of a shared list of bonds: force, solve without a slope, commit, energy book.
 
 Where law[7] is set the bonds are summed over place: `bonds` are the cells, `bondlist` the strips, `table` all numbers
 of `friction.place_sum_kernels`.
@@ -7,6 +7,7 @@ of `friction.place_sum_kernels`.
 import numpy as np
 from numba import njit
 
+from .dynamics.kernels import free_slide, move, note, sample, step_energy, stored, tell
 from .friction.bond_kernels import list_mean, list_slope, list_step
 from .friction.bond_sum_kernels import MOMENTS
 from .friction.kernels import LEAN
@@ -16,7 +17,7 @@ from .friction.place_sum_kernels import TALLY, place_mean
 PLACES = 7  # of law: whether the bonds are summed over place
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", **LEAN)
 def list_scalar(dq, c, v0, dt):
     """Path-mean force [N] and slope [N/m] of a bond list; a slope of zero stands for an unknown one."""
     scale = c.force[0]
@@ -61,7 +62,7 @@ def solve_list(free, beta, guess, c, v0, dt, goal):
     return here, force, -300
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", **LEAN)
 def commit_list(dq, force, v0, v1, dt, c):
     """Move the list by the solved step. Returns (work that is not stored [J], ok).
 
@@ -79,3 +80,58 @@ def commit_list(dq, force, v0, v1, dt, c):
     else:
         c.tally[7] += net
     return net, ok
+
+
+@njit(error_model="numpy", **LEAN)
+def list_status(c, q):
+    """(friction force [N], stored energy [J], irreversible slip [m]) of the list as it stands."""
+    force = c.force[0] * c.tally[5]
+    return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
+
+
+@njit(error_model="numpy", cache=True)
+def march_list(first, steps, state, modes, prop, drive, mass, c, work, goal, travel, ledger, rows):
+    """`simulate_kernels.march` of a list."""
+    omega, damp, slide, base, output = modes
+    step, gauss, sine, sine_gauss, weights, dt, beta = prop
+    last, around = work.last, sine.shape[0] - 1
+    for i in range(steps + 1):
+        q, v, out = sample(rows[i], state, slide, output)
+        force, energy, slip = list_status(c, q)
+        status = note(rows[i], force, energy, slip, out, travel, energy + stored(state, omega, mass), ledger)
+        if status:
+            return i, status
+        if i == steps:
+            break
+        at = (first + i) % around
+        s, co = sine[at, 0], sine[at, 1]
+        free = free_slide(state, step, slide, s, co)
+        dq, force, count = solve_list(free, beta, 2 * last[0, 0] - last[1, 0], c, v, dt, goal)
+        last[1, 0], last[0, 0] = last[0, 0], dq
+        used = (free - dq) / beta
+        tell(count, used * dq, ledger)
+        step_energy(state, gauss, slide, base, damp, mass, drive, used, s, co, sine_gauss[at], dt, weights, ledger)
+        v1 = move(state, step, slide, mass, used, s, co)
+        rows[i, rows.shape[1] - 2] = used
+        burnt, ok = commit_list(dq, used, v, v1, dt, c)
+        ledger[3] += burnt
+        if not ok:
+            return i, 2
+    return steps, 0
+
+
+@njit(error_model="numpy", cache=True)
+def follow_list(path, dt, c, burnt, forces):
+    """`simulate_kernels.follow_path` of a list."""
+    bad = 0
+    for i in range(path.size):
+        forces[i, 0], burnt[i, 1], forces[i, 2] = list_status(c, path[i])
+        if i == path.size - 1:
+            break
+        dq = path[i + 1] - path[i]
+        v = dq / dt if dt > 0 else 0.0
+        mean = list_scalar(dq, c, v, dt)[0]
+        forces[i, 1] = mean
+        burnt[i, 0], ok = commit_list(dq, mean, v, v, dt, c)
+        bad += not ok
+    return bad

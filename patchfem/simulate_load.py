@@ -16,7 +16,8 @@ def load_at(scene, time) -> np.ndarray:
     """Load (k,) [N] at the times (k,) [s]."""
     normal = scene.normal
     wave = np.cos(2 * np.pi * normal.frequency * np.asarray(time) + (normal.phase or 0.0))
-    return np.maximum(normal.load + normal.amplitude * wave, 0.0)
+    load = normal.load + normal.amplitude * wave
+    return np.where(load > 1e-12 * (normal.load + normal.amplitude), load, 0.0)  # round-off carries nothing
 
 
 def refined(scene, time, slide, steps: int) -> tuple:

@@ -5,12 +5,14 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from .core import Missing
 from .quantities import KINDS
 from .response.paths import read_path
 
 LEAST = 8  # steps between two rows of a path file: two of them are left in the coarsest run of the error estimate
 REST = 4
 MOST = 20_000  # steps per cycle
+MOST_SAMPLES = 20_000_000  # of a path
 
 
 def path_of(scene, steps: int) -> tuple:
@@ -28,6 +30,9 @@ def path_of(scene, steps: int) -> tuple:
     if slide.kind == "file":
         return *_cut(*file_corners(scene), steps, _across(scene)), 0, 0.0
     count = max(1, round(slide.cycles * steps))
+    if count > MOST_SAMPLES:
+        raise Missing(f"{scene.path}: slide.cycles = {slide.cycles:g} takes {count:.3g} steps, more than "
+                      f"{MOST_SAMPLES:.0e}; lower slide.cycles or accuracy.steps_per_cycle")
     number = np.arange(count + 1)
     if slide.kind == "sine":
         phase = 2 * np.pi * (number % steps) / steps

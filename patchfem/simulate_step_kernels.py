@@ -2,9 +2,9 @@
 
 A contact is one of five kinds, chosen by an integer outside the point loop:
 0 rigid Coulomb (set-valued), 1 parallel Jenkins elements, 2 bond points with shear modes (possibly none),
-3 one shared bond list, 4 a force that follows the speed (eq. 2.4). Over a step the modes move exactly under the
-path-mean of the friction force along the straight increment of slide, which does exactly the work of the law: the sum
-of all energies never rises by itself.
+3 one shared bond list, whose steps stand in `simulate_list_kernels`, 4 a force that follows the speed (eq. 2.4). Over a
+step the modes move exactly under the path-mean of the friction force along the straight increment of slide, which does
+exactly the work of the law: the sum of all energies never rises by itself.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,6 @@ import numpy as np
 from numba import njit
 
 from .dynamics.kernels import safe_point
-from .friction.bond_sum_kernels import MOMENTS
 from .friction.kernels import (
     FAST,
     LEAN,
@@ -25,7 +24,6 @@ from .friction.kernels import (
     loose_mean,
     loose_step,
 )
-from .simulate_list_kernels import commit_list, list_scalar, solve_list
 
 COULOMB, JENKINS, POINTS, LIST, RATE = 0, 1, 2, 3, 4
 
@@ -125,15 +123,13 @@ def scalar_force(dq, kind, c, eps, v0, dt):
     if kind == RATE:
         part = np.tanh(dq / (dt * c.force[1]))
         return c.force[0] * part, c.force[0] * (1 - part * part) / (dt * c.force[1])
-    if kind == POINTS:
-        force, slope = 0.0, 0.0
-        weight = c.weight
-        for j in range(weight.size):
-            mean, s = point_mean(c, j, dq, eps)
-            force += weight[j] * mean
-            slope += weight[j] * s
-        return force, slope
-    return list_scalar(dq, c, v0, dt)
+    force, slope = 0.0, 0.0
+    weight = c.weight
+    for j in range(weight.size):
+        mean, s = point_mean(c, j, dq, eps)
+        force += weight[j] * mean
+        slope += weight[j] * s
+    return force, slope
 
 
 @njit(error_model="numpy", **LEAN)
@@ -303,10 +299,7 @@ def contact_step(free, beta, v0, dt, kind, c, work, goal):
     for i in range(y.size):
         y[i] = 2 * last[0, i] - last[1, i]
     if y.size == 1:
-        if kind == LIST and c.law[1] != MOMENTS:
-            dq, force, count = solve_list(free, beta, y[0], c, v0, dt, goal)
-        else:
-            dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
+        dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
         y[0] = dq
         return dq, force, count, middle
     force, count = solve_modes(y, free, beta, c, middle, goal, work)
@@ -328,8 +321,6 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
         return force * dq, True
     if kind == JENKINS:
         return jenkins_step(dq, c.stretch, c.stiffness, c.limit), True
-    if kind == LIST:
-        return commit_list(dq, force, v0, v1, dt, c)
     weight, bonds, source, psi, b = c.weight, c.bonds, c.source, c.psi, c.b
     burnt = 0.0
     for j in range(weight.size):

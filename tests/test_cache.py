@@ -30,8 +30,8 @@ result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estima
 hub = load_kernels()
 print(json.dumps({"amplitude": result.measures["relative_displacement_amplitude"].value,
                   "peak": result.measures["friction_force_peak"].value, "home": simulate.__file__, "said": said,
-                  "missed": sum(sum(f.stats.cache_misses.values()) for f in (hub.march, hub.contact_state)),
-                  "hit": sum(hub.march.stats.cache_hits.values())}))
+                  "missed": sum(sum(f.stats.cache_misses.values()) for f in (hub.march_contact, hub.contact_state)),
+                  "hit": sum(hub.march_contact.stats.cache_hits.values())}))
 """
 
 

@@ -20,7 +20,8 @@ def free_slide(state, step, slide, s, c):
 
 @njit(error_model="numpy", **LEAN)
 def move(state, step, slide, mass, force, s, c):
-    """Advance the modes in place by one step under the constant interface force [N]."""
+    """Advance the modes in place by one step under the constant interface force [N]; the slide's speed after it."""
+    speed = 0.0
     for i in range(slide.size):
         f = -slide[i] * force / mass
         z = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 2] * f \
@@ -29,6 +30,8 @@ def move(state, step, slide, mass, force, s, c):
             + step[i, 1, 3] * s + step[i, 1, 4] * c
         state[i, 0] = z
         state[i, 1] = v
+        speed += slide[i] * v
+    return speed
 
 
 @njit(error_model="numpy", **LEAN)
@@ -73,3 +76,38 @@ def safe_point(low, high, guess):
     if low < guess < high and np.isfinite(guess):
         return guess
     return 0.5 * (low + high)
+
+
+@njit(error_model="numpy", **LEAN)
+def sample(row, state, slide, output):
+    """(slide, its speed, output) of the modes, written with them into the first 2 n + 2 entries of a row."""
+    n = slide.size
+    q, v, out = 0.0, 0.0, 0.0
+    for k in range(n):
+        row[k], row[n + k] = state[k, 0], state[k, 1]
+        q += slide[k] * state[k, 0]
+        v += slide[k] * state[k, 1]
+        out += output[k] * state[k, 0]
+    row[2 * n], row[2 * n + 1] = q, v
+    return q, v, out
+
+
+@njit(error_model="numpy", **LEAN)
+def note(row, force, energy, slip, out, travel, total, ledger):
+    """Write force, slip and the interface's energy into a row, the peak of all energy into the ledger. Returns 0, or 1
+    beyond the travel and 3 for a motion that is not finite."""
+    n = row.size - 4
+    row[n], row[n + 1], row[n + 2], row[n + 3] = force, slip, force, energy
+    ledger[4] = max(ledger[4], total)
+    if not np.isfinite(row[n - 2] + row[n - 1] + force):
+        return 3
+    return 1 if abs(out) > travel else 0
+
+
+@njit(error_model="numpy", **LEAN)
+def tell(count, work, ledger):
+    """Book the iterations of a step (below 0: it failed) and its friction work [J]."""
+    ledger[5] += abs(count)
+    ledger[6] = max(ledger[6], abs(count))
+    ledger[7] += 1.0 if count < 0 else 0.0
+    ledger[8] += work

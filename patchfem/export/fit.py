@@ -39,7 +39,7 @@ def draw(displacement, measured, model, held, quantity: str) -> str:
     loop.set(xlabel=f"slide [{along}]", ylabel=f"{name} [{up}]", title="Measured and fitted")
     rest.axhline(0, color="0.4", lw=0.8)
     rest.set(xlabel="row", ylabel=f"fitted - measured [{up}]", title="What is left over")
-    loop.legend()
+    loop.legend(loc="center", frameon=False)
     return _svg(figure)
 
 

@@ -121,7 +121,7 @@ def grow(eps, v0, v1, path, dt, growth):
         rest = a_s * dt * (_primitive(v1, floor) - _primitive(v0, floor)) / (v1 - v0)
     else:
         rest = a_s * dt / max(abs(v0 + v1) / 2, floor)
-    slide = path / l_k
+    rest, slide = min(rest, 1e100), min(path / l_k, 1e100)
     total = rest + slide
     if total == 0:
         return eps, 0.0

@@ -76,7 +76,7 @@ class Rate:
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment dq [m] in dt [s] under pressure s0 -> s1 (m,) [Pa]; a jump in no time has no speed
         limit."""
-        part = np.tanh(dq / (dt * self.speed)) if dt > 0 else np.sign(dq)
+        part = np.tanh(dq / dt / self.speed) if dt > 0 else np.sign(dq)
         mean = self.static * (s0 + s1) / 2 * part
         return Step(mean, mean * dq, self.static * s1 * part)
 

@@ -25,28 +25,29 @@ class Columns:
     rows: int
 
 
-def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, remedy: str = "") -> Columns:
+def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, remedy: str = "",
+                 labels: bool = False) -> Columns:
     """A table with a header like `header`. units: column -> unit -> factor to SI ("" as unit: may stand without one);
     wanted: columns that must be there; what: what the table holds, remedy: what to do where there is no file.
 
-    Columns that `units` does not know may stand without a unit: they are labels, kept as text. PatchfemError names file
-    and line, Missing where there is no file.
+    Columns that `units` does not know may stand without a unit, or with one where `labels` says so: they are kept as
+    text. PatchfemError names file and line, Missing where there is no file.
     """
     path = Path(path)
     lines = _text(path, what, remedy).split("\n")
-    names, factors = _header(path, lines[0], units, wanted, header)
+    names, factors = _header(path, lines[0], units, wanted, header, labels)
     last = max((n for n, line in enumerate(lines) if line.strip()), default=0)
-    numbers, labels = [], []
+    numbers, texts = [], []
     for number, line in enumerate(lines[1:last + 1], 2):
         cells = _cells(path, number, line, names)
         numbers.append([_number(path, number, name, cells[name]) for name in factors])
-        labels.append([cells[name] for name in names if name not in factors])
+        texts.append([cells[name] for name in names if name not in factors])
     if len(numbers) < 2:
         raise PatchfemError(f"{path}:{last + 1}: {what} is at least two rows below its header, not {len(numbers)}")
     table = np.array(numbers).reshape(len(numbers), len(factors)) * list(factors.values())
     free = [name for name in names if name not in factors]
     return Columns({name: frozen_array(column) for name, column in zip(factors, table.T)},
-                   {name: tuple(row[k] for row in labels) for k, name in enumerate(free)}, len(numbers))
+                   {name: tuple(row[k] for row in texts) for k, name in enumerate(free)}, len(numbers))
 
 
 def _text(path: Path, what: str, remedy: str) -> str:
@@ -62,7 +63,7 @@ def _text(path: Path, what: str, remedy: str) -> str:
         raise PatchfemError(f"{path}: {what} cannot be read ({error})") from None
 
 
-def _header(path, line: str, units: Mapping, wanted: tuple, header: str) -> tuple:
+def _header(path, line: str, units: Mapping, wanted: tuple, header: str, labels: bool) -> tuple:
     """(names as they stand, factor of each column of numbers)."""
     asked = f"a header like `{header}` is wanted, not '{line.strip()[:80]}'"
     found = [_HEAD.fullmatch(cell) for cell in line.split(",")]
@@ -80,7 +81,7 @@ def _header(path, line: str, units: Mapping, wanted: tuple, header: str) -> tupl
                 known = ", ".join(text for text in units[name] if text)
                 raise PatchfemError(f"{path}:1: {name} [{unit}]: the unit is not known; one of {known}")
             factors[name] = units[name][unit or ""]
-        elif unit is not None:
+        elif unit is not None and not labels:
             raise PatchfemError(f"{path}:1: {asked} (with a unit are known: {', '.join(units)})")
     absent = [name for name in wanted if name not in names]
     if absent:

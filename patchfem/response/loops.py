@@ -16,7 +16,7 @@ HEADER = "time [s],displacement [um],force [N]"
 @dataclass(frozen=True, eq=False, slots=True)
 class Loop:
     """time (k,) [s] or None; displacement (k,) [m], 0 in the first row; reading (k,): `quantity` "force" [N] or
-    "friction_ratio" [1]; labels: name -> k texts of the columns without a unit."""
+    "friction_ratio" [1]; labels: name -> k texts of the other columns, such as `run` or `frequency [Hz]`."""
 
     path: Path
     time: np.ndarray | None
@@ -36,7 +36,8 @@ class Loop:
             raise PatchfemError(f"--hold {hold}: column=value,value is wanted, such as cycle=1,2")
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
-            raise PatchfemError(f"--hold {name}: no such column without a unit in {self.path} (there: {known})")
+            raise PatchfemError(f"--hold {name}: no such column of labels in {self.path} (there: {known}); "
+                                "add one, such as `run`, that marks the rows: time, displacement and force do not")
         there = [_plain(cell) for cell in self.labels[name]]
         absent = [one for one in wanted if _plain(one) not in there]
         if absent:
@@ -54,7 +55,7 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     PatchfemError names file and line of a mistake, Missing where there is no file.
     """
     path = Path(path)
-    found = read_columns(path, {**BESIDE, **units}, ("displacement",), HEADER, "a measured loop")
+    found = read_columns(path, {**BESIDE, **units}, ("displacement",), HEADER, "a measured loop", labels=True)
     read = [name for name in BESIDE if name in found.values]
     if len(read) != 1:
         raise PatchfemError(f"{path}:1: " + ("force and friction_ratio stand side by side: keep one" if read else
