@@ -36,16 +36,12 @@ def _scene(path: Path, sets):
 
 @app.command
 def check(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False):
-    """Name every mistake in SCENE and in the tables it names; compute nothing."""
+    """Name every mistake in SCENE and in the path it slides along; compute nothing."""
     found = _scene(scene, set_)
     if found.slide is not None and found.slide.file is not None:
         from .simulate_slide import file_corners
 
         file_corners(found)
-    if found.measured is not None:
-        from .response.measured import read_table
-
-        read_table(found.beside(found.measured.file))
     for remark in found.remarks:
         say(f"{scene}: {remark}")
     if json_:

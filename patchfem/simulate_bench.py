@@ -97,7 +97,8 @@ def run(scene, patch, steps: int, frames: int = 0, say=None, path=None) -> Bench
         out = _rigid(scene, patch, time, slide, frames)
     force, load, slip, ledger, at, tau, local = out
     values = _values(scene, time, slide, force, load, slip, ledger, first, omega)
-    rate = np.gradient(slide, time) if time.size > 2 else np.zeros(time.size)
+    span = time[-1]  # endless where a slide is endlessly slow
+    rate = np.gradient(slide, time / span) / span if time.size > 2 else np.zeros(time.size)
     return BenchRun(time, slide, rate, force, load, slip, ledger, at, tau, local, values, perf_counter() - begin,
                     **more)
 

@@ -293,3 +293,27 @@ def test_exact_the_printed_law_warns_where_bonds_break_before_they_ripen():
     found = [run(plan(loads(fast, sets=sets))).warnings for sets in ([], ["friction.slip_growth=0.1 um"],
                                                                      ["friction.reading=stretch"])]
     assert [any("ripen" in line for line in lines) for lines in found] == [True, False, False]
+
+
+@pytest.mark.parametrize("speed", ["1e-160 m/s", "1e-300 m/s"])
+@pytest.mark.parametrize("keys", ["", 'reading = "report"\n'])
+def test_exact_endlessly_slow_slides_are_those_of_full_grown_bonds(speed, keys, recwarn):
+    slow = sliding(POINT + NONLOCAL + keys + f'[slide]\nkind = "constant"\nspeed = "{speed}"\ndistance = "20 um"\n')
+    assert slow.values["friction_ratio_end"] == pytest.approx(0.3 * (1 - math.exp(-10)), rel=1e-3)
+    assert all(np.isfinite(value) for value in slow.values.values()) and not recwarn.list
+
+
+def test_refuses_a_slide_of_more_steps_than_memory_holds(tmp_path):
+    scene = tmp_path / "a.toml"
+    scene.write_text(POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n'
+                     "cycles = 1e9\n")
+    answer = cli("plan", scene)
+    assert answer.code == 4 and "lower slide.cycles" in answer.err
+
+
+def test_refuses_a_broken_path_before_anything_runs(tmp_path):
+    scene = tmp_path / "a.toml"
+    scene.write_text(POINT + COULOMB + '[slide]\nkind = "file"\nfile = "p.csv"\n')
+    (tmp_path / "p.csv").write_text("time [s],displacement [um]\n0,0\n1,x\n")
+    answer = cli("check", scene)
+    assert answer.code == 2 and "p.csv:3: displacement: 'x' is not a finite number" in answer.err

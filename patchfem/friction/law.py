@@ -87,7 +87,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> 
         rest = law.rest_growth * dt * (primitive(v1) - primitive(v0)) / (v1 - v0)
     else:
         rest = law.rest_growth * dt / max(abs(v0 + v1) / 2, floor)
-    return min(rest, LONG), min(abs(dq) / law.slip_growth, LONG)
+    return np.minimum(rest, LONG), np.minimum(abs(dq) / law.slip_growth, LONG)
 
 
 def grow(law: Bonds, eps: float, v0: float, v1: float, dq: float, dt: float) -> float:
