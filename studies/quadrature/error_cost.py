@@ -134,7 +134,7 @@ def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
     with rc_context(STYLE):
         figure = Figure(figsize=(2.4 * len(amplitudes), 2.7))
         FigureCanvasSVG(figure)
-        axes = np.atleast_1d(figure.subplots(1, len(amplitudes), sharey=True))
+        axes = np.atleast_1d(figure.subplots(1, len(amplitudes), sharex=True, sharey=True))
         for ax, amplitude in zip(axes, amplitudes):
             for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"),
                                         ("exponential", "black", "v"),
@@ -144,9 +144,9 @@ def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
                           lw=0.8, label=engine)
             whole = next(r for r in rows if r.amplitude == amplitude and r.engine == "direct")
             ax.axvline(whole.micro, color=GREY, lw=0.6, ls=":")
-            ax.set(title=f"A = {amplitude:g} eps_0", xlabel="us per step")
-        axes[0].set_ylabel("error [mu_s N]")
-        axes[0].legend(frameon=False, fontsize=7)
+            ax.set(title=f"A = {amplitude:g} ε₀", xlabel="µs per step")
+        axes[0].set_ylabel("error [share of μ_s N]")
+        axes[-1].legend(frameon=False, fontsize=6, loc="lower right")
         figure.savefig(path, metadata={"Date": None})
     return path
 
