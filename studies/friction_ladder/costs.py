@@ -2,10 +2,10 @@
 
 Compiled (path_kernels.py: mean force and new memory of one point, nothing around it), over the constant length's 16 ns
 with the energy of its bonds: Coulomb 0.01, tanh 0.5, elastic-plastic 0.5, Bouc-Wen by one Runge-Kutta step 1.0 (n = 2)
-and 1.5 (n = 5), breakaway 1.3, stretch 2.1, LuGre as a limit of it 3 (its exponents are large), Iwan 0.9 (5 elements),
-1.2 (20), 1.8 (50) and 2.9 (100), report of constant length 50 (a list of strips, one per stroke), report with growth
-1500 to 1800 (a list of single bonds at five instants of a step). In NumPy a step costs 0.04 to 0.1 ms in every law with
-a memory, most of it calls: 0.5 (elastic-plastic) to 1.1 (LuGre) of the constant length, the sum over bonds 5.
+and 1.5 (n = 5), breakaway 1.3, stretch 2.2, LuGre as a limit of it 3.8 (its exponents are large), Iwan 0.9 (5
+elements), 1.3 (20), 1.8 (50) and 2.9 (100), report of constant length 38 (a list of strips, one per stroke), report
+with growth 460 (a merged list at three or more instants of a step). In NumPy a step costs 0.03 to 0.06 ms in every law
+with a memory, most of it calls: 0.5 (elastic-plastic) to 1.1 (LuGre) of the constant length, the sum over bonds 4.
 
 Run: python studies/friction_ladder/costs.py
 """

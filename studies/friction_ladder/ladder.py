@@ -51,7 +51,7 @@ Where is a rung enough?
   .002, 5 elements .014) and twice its first stiffness.
 - Bouc-Wen with n = 1, gamma = 0 IS the constant bond length (to round-off); with gamma = beta it unloads on a line and
   lies between Dahl and elastic-plastic.
-- Costs: costs.py. Nothing but the printed law costs more than 50 ns per step: the stretch twice the constant length.
+- Costs: costs.py. Nothing but the printed law costs more than 60 ns per step: the stretch twice the constant length.
 
 Run: python studies/friction_ladder/ladder.py
 """

@@ -3,12 +3,13 @@
 Little, and less than the steps of the path do. Cutting off old bonds loses less than the tail asked for (0.7 of it at
 A = 0.1, 0.1 of it at A = 50 and 1e-2). Merging to a width w loses less than 0.75 w^2 of the friction limit at every
 amplitude (w = 0.02: 2e-4 at A = 0.1, 1e-5 at A = 3, 4e-6 at A = 50) with at most 8/w + 300 strips however long the run;
-keeping every bond takes 10,000 strips and six times the time at A = 0.1, two to five times elsewhere, in two to five
-cycles and ever more after. Where strokes are long (A = 50) cutting off alone is as fast. The steps of the path matter
-more: 400 a cycle still miss the force at reversals of growing bonds by about 1e-2 (A <= 10), a thousand times what
-w = 0.02 costs at A = 3. Sums of J exponentials over place cost 3 to 7 us a step up to A = 10 and 26 at A = 50 (merging
-to 0.02: 4.5 to 10 and 21), whatever the error asked for: it falls geometrically with the nodes (6e-3, 2.5e-4, 1e-5 of
-the friction limit with 4, 6, 8) down to what cells of 0.05 lose, 6e-7 to 6e-6, so from A = 0.1 to 10 they beat merging.
+keeping every bond takes 10,000 strips and six times the time at A = 0.1 and 50, two to four times between, in two to
+five cycles and ever more after. Where strokes are long (A = 50) cutting off alone is as fast. The steps of the path
+matter more: 400 a cycle still miss the force at reversals of growing bonds by about 1e-2 (A <= 10), a thousand times
+what w = 0.02 costs at A = 3. Sums of J exponentials over place cost 1.2 to 2.6 us a step up to A = 3, 4 to 6 at 10 and
+18 to 34 at 50 (merging to 0.02: 3 to 10 and 19), whatever the error asked for: it falls geometrically with the nodes
+(6e-3, 2.5e-4, 1e-5 of the friction limit with 4, 6, 8) down to what cells of 0.05 lose, 6e-7 to 6e-6, so from A = 0.1
+to 10 they beat merging.
 
 Path: q = A sin t, printed law of order 1, growing bonds (a_s = 0.3 A omega^2, l_k = 0.05, eps_k = 0.5, all in bond
 lengths), 200 steps a cycle, as long as bonds live. Error: largest of the run against every bond kept, over mu_s N.

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import STRUCTURE
 from scipy.special import erfc
 from test_imports import BENCH, FROM_PYTHON, absent, loaded
 from test_run import PATCH, POINT
@@ -34,19 +35,7 @@ slip_activation = "1500 K"
 """
 SLIDE = '[slide]\nkind = "constant"\nspeed = "5 mm/s"\ndistance = "60 um"\n'
 TRIANGLE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\ncycles = 2\n'
-RIG = """[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 20
-"""
+RIG = STRUCTURE.replace("cycles = 30", "cycles = 20")
 SUBSTRATE = 'substrate = "Ti-8Al-1Mo-1V"'
 
 
