@@ -132,7 +132,7 @@ def follow_contact(path, dt, kind, c, work, goal, burnt, forces):
         if kind == POINTS:
             middle = grow(middle, v, v, abs(dq) / 2, dt / 2, c.growth)[0]
         if y.size == 1:
-            mean, count = scalar_force(dq, kind, c, middle, v, dt)[0], 1
+            mean, count = scalar_force(dq, kind, c, middle, dt)[0], 1
         else:
             mean, count = solve_modes(y, dq, 0.0, c, middle, goal, work)
         bad += count < 0

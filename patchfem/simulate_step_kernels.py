@@ -116,7 +116,7 @@ def point_mean(c, j, dq, eps):
 
 
 @njit(error_model="numpy", **LEAN)
-def scalar_force(dq, kind, c, eps, v0, dt):
+def scalar_force(dq, kind, c, eps, dt):
     """Path-mean friction force [N] and slope [N/m] for a rigid slide increment; `c` is the contact tuple."""
     if kind == JENKINS:
         return jenkins_mean(dq, c.stretch, c.stiffness, c.limit)
@@ -133,31 +133,31 @@ def scalar_force(dq, kind, c, eps, v0, dt):
 
 
 @njit(error_model="numpy", **LEAN)
-def solve_scalar(free, beta, guess, kind, c, eps, v0, dt, goal):
+def solve_scalar(free, beta, guess, kind, c, eps, dt, goal):
     """Slide increment with dq = free - beta F(dq). Returns (dq, F, iterations), iterations < 0 when it failed.
 
     Newton from the guess; where it wanders, Newton inside a bracket that is widened until it holds the root.
     """
     dq = guess
-    force, slope = scalar_force(dq, kind, c, eps, v0, dt)
+    force, slope = scalar_force(dq, kind, c, eps, dt)
     for count in range(1, 9):
         miss = dq - free + beta * force
         if abs(miss) <= goal * beta:
             return dq, force, count
         dq -= miss / (1 + beta * max(slope, 0.0))
-        force, slope = scalar_force(dq, kind, c, eps, v0, dt)
+        force, slope = scalar_force(dq, kind, c, eps, dt)
     low, high = free - beta * c.force[2], free + beta * c.force[2]
     for _ in range(60):
-        if low - free + beta * scalar_force(low, kind, c, eps, v0, dt)[0] <= 0:
+        if low - free + beta * scalar_force(low, kind, c, eps, dt)[0] <= 0:
             break
         low -= beta * c.force[2]
     for _ in range(60):
-        if high - free + beta * scalar_force(high, kind, c, eps, v0, dt)[0] >= 0:
+        if high - free + beta * scalar_force(high, kind, c, eps, dt)[0] >= 0:
             break
         high += beta * c.force[2]
     dq = safe_point(low, high, dq)
     for count in range(9, 300):
-        force, slope = scalar_force(dq, kind, c, eps, v0, dt)
+        force, slope = scalar_force(dq, kind, c, eps, dt)
         miss = dq - free + beta * force
         if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.force[2]):
             return dq, force, count
@@ -299,7 +299,7 @@ def contact_step(free, beta, v0, dt, kind, c, work, goal):
     for i in range(y.size):
         y[i] = 2 * last[0, i] - last[1, i]
     if y.size == 1:
-        dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, v0, dt, goal)
+        dq, force, count = solve_scalar(free, beta, y[0], kind, c, middle, dt, goal)
         y[0] = dq
         return dq, force, count, middle
     force, count = solve_modes(y, free, beta, c, middle, goal, work)

@@ -33,11 +33,6 @@ class Choice:
     width: float = 0.0
     ripe: float = 0.0
 
-    @property
-    def reach(self) -> bool:
-        """Whether a cut-off bounds the list."""
-        return self.tail > 0
-
     def said(self) -> str:
         """One line for a plan."""
         parts = [f"{self.engine}: about {self.strips:.0f} strips of bonds, {1e6 * self.seconds:.2g} us per step"]

@@ -225,13 +225,3 @@ def place_mean(dq, cells, strips, num, v0, dt):
         out += _panel(low, high, dq, cells, strips, num, v0, dt)
         low, high = high, 2 * high
     return out
-
-
-@njit(error_model="numpy", **LEAN)
-def place_slope(dq, cells, strips, num, v0, dt):
-    """(weight at the end of the increment, its derivative by the increment [1/m]) by a central difference."""
-    step = 1e-5 * num[NOW + 4]
-    force = place_force(dq, cells, strips, num, v0, dt)
-    ahead = place_force(dq + step, cells, strips, num, v0, dt)
-    behind = place_force(dq - step, cells, strips, num, v0, dt)
-    return force, (ahead - behind) / (2 * step)
