@@ -10,7 +10,7 @@ Read the package in the order of the physics; each stage imports `core` and itse
 6. `contact`     elasticity condensed to the interface, unilateral contact, partial slip
 7. `friction`    local laws and the nonlocal quadrature over the path
 8. `structure`   the modes of the rig
-9. `dynamics`    exact events and the march in time
+9. `dynamics`    drives, exact events, the march in time
 10. `response`    measures of a run and their errors
 11. `identify`   values of a scene from measurements, with intervals
 12. `export`     summary, netCDF, VTK, report

@@ -116,7 +116,15 @@ class Pressure:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ModalBasis:
-    """n modes of equal modal mass. omega [rad/s], zeta [1], slide/base/output [1]: all (n,); mass [kg]."""
+    """n coordinates of equal mass: z_i'' + (D z')_i + omega_i^2 z_i = -base_i a(t) - (slide_i F + ...)/mass.
+
+    omega [rad/s], zeta [1], slide/base/output [1]: (n,); mass [kg]. base is the share of the drive: of the base's
+    acceleration a(t), or of a force over the mass, a(t) = F/mass, with its sign turned. damping: (n, n) D [1/s] where
+    it couples the coordinates, None: D = diag(2 zeta omega). faces: (i, n) slide of every interface, None: the one
+    interface `slide`. normal (away from contact, 1), pitch [rad/m], lateral, yaw [rad/m]: (n,) motion of the patch per
+    coordinate, None where no mode has any. shapes: (p, n) the scene's own modes or masses per coordinate, `names` are
+    theirs; None: they are the coordinates.
+    """
 
     names: tuple
     omega: np.ndarray
@@ -125,19 +133,69 @@ class ModalBasis:
     base: np.ndarray
     output: np.ndarray
     mass: float
+    damping: np.ndarray | None = None
+    faces: np.ndarray | None = None
+    normal: np.ndarray | None = None
+    pitch: np.ndarray | None = None
+    lateral: np.ndarray | None = None
+    yaw: np.ndarray | None = None
+    shapes: np.ndarray | None = None
+
+    @property
+    def interfaces(self) -> np.ndarray:
+        """Slide of every interface per coordinate (i, n)."""
+        return self.slide[None, :] if self.faces is None else self.faces
+
+    @property
+    def dampers(self) -> np.ndarray:
+        """D (n, n) [1/s], coupled or not."""
+        return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Start:
+    """Coordinates z (n,) [m] and their rates v (n,) [m/s] at t = 0."""
+
+    z: np.ndarray
+    v: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Segment:
+    """From `start` [s] on: constant + amplitude sin(omega (t - start) + phase) [m s-2], until the next one."""
+
+    start: float
+    constant: float = 0.0
+    amplitude: float = 0.0
+    omega: float = 0.0
+    phase: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BaseSine:
-    """Base acceleration +a sin(omega t) from t = 0; a [m s-2], omega [rad/s]."""
+    """Drive +a sin(omega t) from t = 0; a [m s-2], omega [rad/s]. moving: it is the base that accelerates; False: a
+    force over the modal mass, the frame is at rest.
+
+    Every drive has period [s], moving, segments (closed form, () where there is none) and values(t).
+    """
 
     acceleration: float
     omega: float
+    moving: bool = True
 
     @property
     def period(self) -> float:
         """Drive period [s]."""
         return 2 * np.pi / self.omega
+
+    @property
+    def segments(self) -> tuple:
+        """The one Segment."""
+        return (Segment(0.0, 0.0, self.acceleration, self.omega),)
+
+    def values(self, t):
+        """Drive [m s-2] at times t (k,) >= 0 [s]."""
+        return self.acceleration * np.sin(self.omega * np.asarray(t, float))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

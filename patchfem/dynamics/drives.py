@@ -1,0 +1,121 @@
+"""Drives beyond the plain sine: steps, levels and releases in closed form, sweeps, recorded signals.
+
+Every drive has `period` [s] of what counts as its cycle, `moving` (the base accelerates; False: a force over the modal
+mass), `segments` (core.Segment, () where no closed form exists) and `values(t)` [m s-2].
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import PatchfemError, Segment
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Piecewise:
+    """A drive of segments, the first from t = 0; period [s]: what counts as a cycle."""
+
+    segments: tuple
+    period: float
+    moving: bool = True
+
+    def values(self, t):
+        """Drive [m s-2] at times t (k,) >= 0 [s]; at the border of two segments the later one."""
+        t = np.asarray(t, float)
+        which = np.searchsorted([s.start for s in self.segments], t, side="right") - 1
+        out = np.zeros(t.shape)
+        for k, s in enumerate(self.segments):
+            mine = which == k
+            out[mine] = s.constant + s.amplitude * np.sin(s.omega * (t[mine] - s.start) + s.phase)
+        return out
+
+
+def step(size: float, period: float, moving: bool = True) -> Piecewise:
+    """A constant `size` [m s-2] from t = 0."""
+    return Piecewise((Segment(0.0, size),), period, moving)
+
+
+def release(period: float) -> Piecewise:
+    """No drive at all: free motion from what the start gives."""
+    return Piecewise((Segment(0.0),), period, False)
+
+
+def levels(accelerations, omega: float, cycles: float, moving: bool = True) -> Piecewise:
+    """A sine whose amplitude [m s-2] changes every `cycles` cycles, its phase going on (as the report tests)."""
+    period = 2 * np.pi / omega
+    parts = [Segment(k * cycles * period, 0.0, float(a), omega, 2 * np.pi * (k * cycles % 1.0))
+             for k, a in enumerate(accelerations)]
+    return Piecewise(tuple(parts), period, moving)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sweep:
+    """A sine whose frequency runs from `low` to `high` [Hz] (either way) in `duration` [s] and stays there.
+
+    acceleration [m s-2], or, with `displacement` [m], X omega(t)^2. logarithmic: a constant factor per time instead of
+    constant Hz/s. The phase is the integral of the frequency: sin(2 pi int f dt).
+    """
+
+    low: float
+    high: float
+    duration: float
+    acceleration: float = 0.0
+    displacement: float | None = None
+    logarithmic: bool = False
+    moving: bool = True
+
+    @property
+    def segments(self) -> tuple:
+        """None: the response to a chirp has no elementary form."""
+        return ()
+
+    @property
+    def period(self) -> float:
+        """Of the frequency at the end [s]."""
+        return 1 / self.high
+
+    def frequency(self, t):
+        """Instantaneous frequency [Hz] at t (k,) [s]."""
+        part = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
+        return self.low * (self.high / self.low)**part if self.logarithmic else self.low + (self.high - self.low) * part
+
+    def phase(self, t):
+        """2 pi int_0^t f dt [rad]."""
+        t = np.asarray(t, float)
+        inside = np.minimum(t, self.duration)
+        if self.logarithmic and self.high != self.low:
+            rate = np.log(self.high / self.low) / self.duration
+            turns = self.low * np.expm1(rate * inside) / rate
+        else:
+            turns = inside * (self.low + (self.high - self.low) * inside / (2 * self.duration))
+        return 2 * np.pi * (turns + (t - inside) * self.high)
+
+    def values(self, t):
+        """Drive [m s-2] at times t (k,) >= 0 [s]."""
+        size = self.acceleration
+        if self.displacement is not None:
+            size = self.displacement * (2 * np.pi * self.frequency(t))**2
+        return size * np.sin(self.phase(t))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Recorded:
+    """A signal read off a table: time (k,) [s] rising from 0, value (k,) [m s-2], straight between, 0 after its end."""
+
+    time: np.ndarray
+    value: np.ndarray
+    period: float
+    moving: bool = True
+
+    def __post_init__(self):
+        if len(self.time) < 2 or self.time[0] != 0 or not np.all(np.diff(self.time) > 0):
+            raise PatchfemError("drive.file: at least two rows with times that rise from 0 s are wanted")
+
+    @property
+    def segments(self) -> tuple:
+        """None: a recorded signal is marched."""
+        return ()
+
+    def values(self, t):
+        """Drive [m s-2] at times t (k,) >= 0 [s]."""
+        return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
