@@ -8,6 +8,7 @@ import os
 import platform
 import sys
 import tempfile
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
@@ -46,9 +47,10 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="patchfem"))
 
 
-def load_kernels(say=None):
-    """The compiled hub `simulate_kernels`, its code cached on disk; `say` is told when it has to compile first."""
-    if "patchfem.simulate_kernels" not in sys.modules:
+def load(module: str, say=None):
+    """A module of compiled code of the package, such as "dynamics.event_kernels", its code cached on disk; `say` is
+    told when nothing is there yet and it has to compile first."""
+    if f"patchfem.{module}" not in sys.modules:
         folder = cache_folder()
         os.environ["NUMBA_CACHE_DIR"] = str(folder)
         if say is not None and not any(folder.rglob("*.nbi")):
@@ -56,6 +58,9 @@ def load_kernels(say=None):
         import numba
 
         numba.config.CACHE_DIR = str(folder)
-    from . import simulate_kernels
+    return import_module(f"patchfem.{module}")
 
-    return simulate_kernels
+
+def load_kernels(say=None):
+    """The compiled hub `simulate_kernels`."""
+    return load("simulate_kernels", say)
