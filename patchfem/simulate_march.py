@@ -61,7 +61,7 @@ def jenkins_model(stiffness, yield_slide) -> ContactModel:
     """Parallel Jenkins elements (t,) [N/m], [m]."""
     limit = float(np.dot(stiffness, yield_slide))
     fields = {"force": [limit, limit, limit], "stretch": np.zeros(len(stiffness)), "stiffness": stiffness,
-              "limit": yield_slide}
+              "limit": yield_slide, "now": np.zeros(3)}
     return ContactModel(1, limit, fields)
 
 
