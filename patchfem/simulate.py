@@ -262,6 +262,11 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
                                         estimate)
         extra |= {"steps_per_cycle": settings.steps, "iterations": raw.book["iterations"]}
+    if raw.levels:
+        from . import simulate_levels as levels
+
+        lowest = levels.onset(scene, raw.levels, raw.slips, scene.accuracy.tolerance)
+        found, extra = found | levels.measures(raw.levels, lowest), extra | {"levels": raw.levels}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
     outcome, found = rig.settle(raw, _without_errors(found, estimated), scene.accuracy.tolerance)
     fields = {}
@@ -313,6 +318,10 @@ def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, sa
         step = step_error(raw.values, half.values, quarter.values, settings.steps)
         found = with_errors(raw.values, step, *rest, least=1e-9)
         main = found["relative_displacement_amplitude"]
+        if raw.levels:
+            from .simulate_levels import with_errors as level_errors
+
+            raw = replace(raw, levels=level_errors(raw.levels, half.levels, quarter.levels, settings.steps))
         met = main.error <= tolerance * abs(main.value) + main.floor
         again = settings.steps * 2
         if met or "steps_per_cycle" in settings.pinned or again > rig.MOST_STEPS or again * settings.cycles > 1e7 \

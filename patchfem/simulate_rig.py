@@ -45,7 +45,7 @@ class Settings:
 @dataclass(frozen=True, eq=False, slots=True)
 class Raw:
     """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
-    error) or (None, None), snapshots."""
+    error) or (None, None), snapshots; levels: of a run in levels, slips: as `simulate_levels.onset` asks."""
 
     values: dict
     response: Response
@@ -59,6 +59,8 @@ class Raw:
     model: object = None
     prepare: dict | None = None
     message: str = ""
+    levels: tuple = ()
+    slips: object = None
 
 
 def modes_of(scene) -> ModalBasis:
@@ -262,9 +264,11 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
 
 def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
     """One march at settings.steps per cycle."""
+    from . import simulate_levels
     from . import simulate_march as hub
+    from .simulate_march import Mark
 
-    travel = scene.structure.travel or np.inf
+    travel, marks = scene.structure.travel or np.inf, simulate_levels.ends(scene)
     begin = perf_counter()
     model = with_springs(scene, contact_model(scene, settings, patch, drive), modes, drive)
     reduced = perf_counter() - begin
@@ -272,38 +276,53 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
-                     progress, start_of(scene, modes))
+                     progress, start_of(scene, modes), marks)
     seconds = perf_counter() - begin
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
-    stuck = False
+    held, rubbing = 0.0, None
     if scene.friction is None:
         values.pop("friction_force_peak")
     else:
-        values |= _rubbing(scene, settings, modes, drive, patch, done)
         length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
-        held = 1e-3 * length if model.kind else 1e-300
-        stuck = scene.friction.law != "tanh" and values["slip_amplitude"] < held  # a law of the speed never holds
+        held = 1e-3 * length if model.kind else 1e-15 * simulate_drive.peak_speed(drive) * drive.period
+        held *= scene.friction.law != "tanh"  # a law of the speed never holds
+
+        def rubbing(part):
+            return _rubbing(scene, settings, modes, drive, patch, part)
+
+        whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
+        values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
+    stuck = values.get("slip_amplitude", np.inf) < held
+    levels, slips = (), None
+    if marks:
+        levels = simulate_levels.rows(scene, done.marks, drive, held, rubbing)
+
+        def slips(number, level):
+            other = simulate_levels.drive_with(drive, number + 1, level)
+            run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
+                modes, other, model, settings.steps, travel, start_of(scene, modes))
+            return run.slip_amplitude(round(marks[0]), settings.window) >= held
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
                steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,
-               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message)
+               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message, levels, slips)
 
 
-def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, done) -> dict:
-    """Measures of the interface of a march."""
-    w, omega = done.window, simulate_drive.omega_of(drive)
-    values = slip_measures(w, drive, settings.steps) | _ledger(done.response.extra["ledger"])
+def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -> dict:
+    """Measures of the interface in a Mark of a march."""
+    w, omega = part.window, simulate_drive.omega_of(drive)
+    values = slip_measures(w, drive, settings.steps)
     if not sinusoidal(drive):
         values.pop("slip_start_phase", None)
     values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
     weight = np.full(w.time.size, 1.0)
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
-    work = float(done.window_work) * drive.period / span if span > 0 else 0.0
+    work = part.work * drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
     if whole(span, drive):
-        values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, omega), work,
+        values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,
                                  modes.mass * modes.omega[0]**2)
     return values
 
