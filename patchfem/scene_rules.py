@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from patchfem.scene_built import NOT_YET_BUILT
 from patchfem.scene_friction import check_spread, remark_temperature
+from patchfem.scene_structure import check_structure, drives_mass
 from patchfem.scene_tables import Friction, Tables
 from patchfem.scene_types import keys
 
@@ -61,7 +62,7 @@ class Draft(Protocol):
 
 def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, _drive):
+    for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, _drive):
         rule(draft)
     kind = _kind(draft)
     for rule in (_method, _quadrature, _sliding, _run_length):
@@ -220,41 +221,6 @@ def _ageless(law: Friction) -> bool:
     return law.law in ageless or (law.law == "nonlocal" and law.rest_growth is None)
 
 
-def _structure(draft: Draft) -> None:
-    structure = draft.tables.structure
-    if structure is None:
-        return
-    forms = [key for key in ("mode", "masses", "file") if draft.given(f"structure.{key}")]
-    if len(forms) > 1:
-        draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
-    if not forms:
-        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted")
-    if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
-        draft.lacks("structure.moving_mass", "")
-    if "masses" not in forms:
-        for key in ("spring", "damper", "interface", "output_mass"):
-            if draft.given(f"structure.{key}"):
-                draft.lacks("structure.masses", f"structure.{key} needs them")
-    _modes(draft)
-
-
-def _modes(draft: Draft) -> None:
-    modes = draft.tables.structure.mode or ()
-    names: set[str] = set()
-    for index, mode in enumerate(modes):
-        if mode.name is not None and mode.name in names:
-            draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
-        names.add(mode.name)
-    bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
-             for index, mode in enumerate(modes)]  # fmt: skip
-    squares = [(base or 0.0) * (base or 0.0) for base in bases]
-    if sum(squares) > 1 + 1e-9:
-        at = f"structure.mode.{squares.index(max(squares))}"
-        key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
-        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is wanted (base is the share of "
-                       "the base motion; the first mode's is its slide unless given)")  # fmt: skip
-
-
 def _drive(draft: Draft) -> None:
     drive = draft.tables.drive
     if drive is None:
@@ -279,8 +245,12 @@ def _drive_level(draft: Draft, drive: Any) -> None:
             draft.lacks("drive.acceleration", "or drive.displacement instead")
     if drive.kind == "force" and levelled and not draft.given("drive.force"):
         draft.lacks("drive.force", "kind 'force' needs it")
-    if drive.kind == "free" and not displacement:
-        draft.lacks("drive.displacement", "kind 'free' needs it: released from there")
+    begins = draft.given("structure.start")
+    if drive.kind == "free" and not displacement and not begins:
+        draft.lacks("drive.displacement", "kind 'free' needs it: released from there; or [structure.start]")
+    if drive.kind == "free" and displacement and begins:
+        draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
+    drives_mass(draft)
     for key in drive_unused(drive):
         if draft.given(f"drive.{key}"):
             draft.remark(f"drive.{key} has no meaning for kind '{drive.kind}' and is not used")
@@ -330,6 +300,9 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
     if friction and "friction" not in has:
         others = ", ".join(f"[{name}]" for name in sorted(has))
         draft.lacks_table("friction", f"{others} without it are no kind of run")
+    if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
+        draft.lacks("structure.interface", "masses rub at interfaces between two of them: write "
+                                           "[[structure.interface]] with its law and load instead of [friction]")
     if friction and not pressed:
         draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
     if friction and not moves and "slide" not in has:

@@ -22,7 +22,7 @@ from .response.measures import (
     window_ends,
 )
 from .simulate_acting import acting
-from .structure.modes import basis
+from .simulate_structure import highest_frequency, mode_stiffness
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
@@ -70,7 +70,11 @@ def drive_of(scene) -> BaseSine:
 
 def modes_of(scene) -> ModalBasis:
     """Modes of [structure]."""
-    return basis(scene.structure.mode, scene.structure.moving_mass)
+    from .simulate_structure import modes_of, refuse_unbuilt
+
+    found = modes_of(scene)
+    refuse_unbuilt(scene, found)
+    return found
 
 
 def cycles_of(scene, drive: BaseSine) -> float:
@@ -107,7 +111,7 @@ def choose(scene, per_point: bool = False) -> Settings:
     drive = drive_of(scene)
     cycles = cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
-    fastest = max(m.frequency for m in scene.structure.mode) / scene.drive.frequency
+    fastest = highest_frequency(scene) / scene.drive.frequency
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * max(1.0, fastest)), 100, MOST_STEPS))
@@ -226,7 +230,7 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
         time, weight, slide, rate, force = done.loop
         work = float(weight @ (force * rate)) * drive.period / span
         q, part = (harmonic(time, weight, values_, drive.omega) for values_ in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2) if whole(span, drive) else {}
+        values |= interface_loop(slide, q, part, work, mode_stiffness(scene)) if whole(span, drive) else {}
     else:
         values.pop("friction_force_peak")
     stuck = f is not None and done.stick >= span * (1 - 1e-12)
@@ -262,7 +266,7 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), drive.omega)
     if whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, drive.omega), work,
-                                 modes.mass * modes.omega[0]**2)
+                                 mode_stiffness(scene))
     length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
     held = 1e-3 * length if model.kind else 1e-300
     stuck = scene.friction.law != "tanh" and values["slip_amplitude"] < held  # a law of the speed never holds
