@@ -54,6 +54,15 @@ def _unbonded(scene) -> ModalBasis:
     return basis_of_file(scene)
 
 
+def notes_of(scene) -> list:
+    """Sentences for the user on a structure.file that was read otherwise than as it stands; [] without a file."""
+    if scene.structure is None or scene.structure.file is None:
+        return []
+    from .simulate_structure_files import notes_of_file
+
+    return notes_of_file(scene)
+
+
 def pushed_mass(scene) -> int:
     """The mass that a force drives or a release moves, from 1: drive.mass, or else structure.output_mass."""
     return scene.drive.mass or scene.structure.output_mass or 1

@@ -7,7 +7,7 @@ import pytest
 from scene_texts import LINEAR, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
-from patchfem.scene import loads
+from patchfem.scene import SceneError, load, loads
 from patchfem.simulate import plan, run
 from patchfem.simulate_structure import (
     first_frequency,
@@ -94,7 +94,7 @@ coefficient = "{2 * 0.003 * w * 0.884!r} N s/m"
 
 def test_exact_bonded_spring_in_a_run():
     """f2 of the rig without friction: the stuck frequency is sqrt(K + ka); amplitude of the damped oscillator."""
-    text = STRUCTURE.replace("cycles = 30", "cycles = 3000") + '[structure.bonded]\nstiffness = "4e6 N/m"\n'
+    text = STRUCTURE.replace("cycles = 30", "cycles = 1500") + '[structure.bonded]\nstiffness = "4e6 N/m"\n'
     scene = loads(text)
     result = run(plan(scene))
     w0, w = 2 * np.pi * 143, 2 * np.pi * 143
@@ -210,3 +210,80 @@ def test_always_a_mass_that_nothing_holds_is_allowed():
     time = result.response.time
     want = base * (np.sin(2 * np.pi * 40 * time) - 2 * np.pi * 40 * time)
     np.testing.assert_allclose(result.response.output, want, atol=1e-9 * np.abs(want).max())
+
+
+FILE = """\
+[structure]
+file = "rig.npz"
+[drive]
+kind = "base"
+frequency = "40 Hz"
+acceleration = "2 m/s^2"
+cycles = 300
+"""
+POINT = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+
+
+def write_scene(folder, text):
+    (folder / "scene.toml").write_text(text, "utf-8")
+    return load(folder / "scene.toml")
+
+
+def test_exact_matrices_run_as_masses_do(tmp_path):
+    """M, K, C in a file and the same rig as masses: equal measures; interfaces between numbered coordinates."""
+    np.savez(tmp_path / "rig.npz", M=M, K=K, C=C, output=[0.0, 1.0])
+    ours = run(plan(write_scene(tmp_path, FILE)))
+    for name, measure in run(plan(loads(MASSES))).measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-9, abs=1e-12), name
+    scene = write_scene(tmp_path, RUB + FILE)
+    np.testing.assert_allclose(modes_of(scene).interfaces, modes_of(loads(RUB + MASSES)).interfaces, rtol=1e-9)
+    assert scene.kind == "rig"
+
+
+def test_exact_modes_of_a_file_run_as_written_ones(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "rig.mat", {"frequency": [143.0], "damping": [0.003], "slide": [1.0], "base": [1.0]})
+    text = STRUCTURE[STRUCTURE.index("[drive]"):]
+    scene = write_scene(tmp_path, '[structure]\nfile = "rig.mat"\nmoving_mass = "0.884 kg"\n' + POINT + text)
+    ours, want = run(plan(scene)), run(plan(loads(POINT + STRUCTURE)))
+    for name, measure in want.measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-9, abs=1e-12), name
+    assert ours.plan.groups == pytest.approx(want.plan.groups)
+
+
+def test_exact_responses_of_a_file_run_as_the_mode_behind_them(tmp_path):
+    """Accelerance of one mode (0.884 kg at node 7) written as dataset 58; what is lost is the file's digits."""
+    import pyuff
+
+    f = np.arange(100.0, 200.0, 0.25)
+    w, w0 = 2 * np.pi * f, 2 * np.pi * 143
+    data = -w**2 / 0.884 / (w0**2 - w**2 + 2j * 0.003 * w0 * w)
+    one = {"type": 58, "func_type": 4, "rsp_node": 7, "rsp_dir": 1, "ref_node": 7, "ref_dir": 1, "abscissa_spacing": 1,
+           "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "x": f,
+           "data": data, "ordinate_axis_units_lab": "m/s^2", "orddenom_axis_units_lab": "slug"}
+    pyuff.UFF(str(tmp_path / "rig.uff")).write_sets([one], mode="overwrite")
+    text = '[structure]\nfile = "rig.uff"\nmoving_mass = "0.884 kg"\nslide_at = "7:+x"\n' + POINT
+    ours = run(plan(write_scene(tmp_path, text + STRUCTURE[STRUCTURE.index("[drive]"):])))
+    for name, measure in run(plan(loads(POINT + STRUCTURE))).measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-5, abs=1e-12), name
+    assert any("'slug' is not known" in line for line in ours.warnings)
+
+
+def test_refuses_files_at_the_line_of_the_scene(tmp_path):
+    np.savez(tmp_path / "rig.npz", M=M, K=K)
+    with pytest.raises(PatchfemError) as caught:
+        plan(write_scene(tmp_path, FILE))
+    assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output")
+    np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
+    with pytest.raises(PatchfemError, match=r"structure\.file: lacks slide"):
+        modes_of(write_scene(tmp_path, POINT + FILE))
+    with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
+        write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
+    for text, says in ((FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
+                       (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
+                       (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "holds the array slide"),
+                       (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes")):
+        with pytest.raises(SceneError) as caught:
+            loads(text)
+        assert says in str(caught.value)
