@@ -239,9 +239,11 @@ def _without_errors(found: dict, estimate: bool) -> dict:
 def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from . import simulate_rig as rig
     from .response.errors import change, with_errors
+    from .simulate_structure import notes_of
 
     scene = what.scene
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
+    warnings = [*warnings, *notes_of(scene)]
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
     lumps = scene.friction is not None and scene.friction.law != "convolution"
     if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point:

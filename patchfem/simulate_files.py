@@ -121,8 +121,10 @@ def _histories(result: Result) -> tuple:
     if kind == "rig":
         out |= dict(zip(LEDGER, r.extra["ledger"])) if "ledger" in r.extra else {}
         out |= {"friction_force": r.force, "normal_load": np.full(r.time.size, result.measures["normal_load"].value)}
-    modes = [mode.name for mode in result.plan.scene.structure.mode]
-    return out, (modes, r.modal)
+    from .simulate_structure import modes_of, motions
+
+    modes = modes_of(result.plan.scene)
+    return out, (list(modes.names), motions(modes, r.modal))
 
 
 def _write_netcdf(result: Result, path: Path, text: str) -> None:

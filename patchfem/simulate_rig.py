@@ -23,7 +23,7 @@ from .response.measures import (
     window_ends,
 )
 from .simulate_acting import acting
-from .structure.modes import basis
+from .simulate_structure import highest_frequency, mode_stiffness
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
@@ -65,7 +65,11 @@ class Raw:
 
 def modes_of(scene) -> ModalBasis:
     """Modes of [structure]."""
-    return basis(scene.structure.mode, scene.structure.moving_mass)
+    from .simulate_structure import modes_of, refuse_unbuilt
+
+    found = modes_of(scene)
+    refuse_unbuilt(scene, found)
+    return found
 
 
 def drive_of(scene):
@@ -111,7 +115,7 @@ def choose(scene, per_point: bool = False) -> Settings:
         _refuse(scene, shear, side)
     cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
-    fastest = max(simulate_drive.fastest(drive), *(m.frequency * drive.period for m in scene.structure.mode))
+    fastest = max(simulate_drive.fastest(drive), highest_frequency(scene) * drive.period)
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
@@ -252,7 +256,7 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
         work = float(weight @ (force * rate)) * drive.period / span
         omega = simulate_drive.omega_of(drive)
         q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2) if whole(span, drive) else {}
+        values |= interface_loop(slide, q, part, work, mode_stiffness(scene)) if whole(span, drive) else {}
     else:
         values.pop("friction_force_peak")
     stuck = f is not None and done.stick >= span * (1 - 1e-12)
@@ -323,7 +327,7 @@ def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
     if whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,
-                                 modes.mass * modes.omega[0]**2)
+                                 mode_stiffness(scene))
     return values
 
 
