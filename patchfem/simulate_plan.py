@@ -184,8 +184,10 @@ def block_shear(contact) -> float:
 
 
 def _rig_cost(scene, per_point, unknowns) -> tuple:
+    from .simulate_interfaces import viewed
     from .simulate_rig import choose, drive_of, list_cost, quadrature_of
 
+    scene = viewed(scene)
     settings = choose(scene, per_point)
     drive = drive_of(scene)
     if settings.engine == "exact":

@@ -65,11 +65,9 @@ class Raw:
 
 def modes_of(scene) -> ModalBasis:
     """Modes of [structure]."""
-    from .simulate_structure import modes_of, refuse_unbuilt
+    from .simulate_structure import modes_of
 
-    found = modes_of(scene)
-    refuse_unbuilt(scene, found)
-    return found
+    return modes_of(scene)
 
 
 def drive_of(scene):
@@ -79,12 +77,23 @@ def drive_of(scene):
 
 def start_of(scene, modes: ModalBasis):
     """core.Start of a scene that does not begin at rest, else None."""
-    return None
+    from .simulate_structure import start_of
+
+    start = start_of(scene, modes)
+    return start if start.z.any() or start.v.any() else None
 
 
 def speed_of(scene, drive) -> float:
     """Size of the speeds to expect [m/s]: sets the default floor of the speed in the growth of bonds."""
     return simulate_drive.peak_speed(drive, start_of(scene, modes_of(scene)))
+
+
+def simple(scene) -> bool:
+    """Whether a structure is linear beside at most one interface."""
+    structure = scene.structure
+    bonded = structure.bonded
+    bent = structure.stiffening is not None or (bonded is not None and bonded.wavelength is not None)
+    return not bent and len(structure.interface) <= 1
 
 
 def law_of(scene, speed: float) -> Bonds:
@@ -109,7 +118,7 @@ def choose(scene, per_point: bool = False) -> Settings:
         raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
                             f"{f' with {shear}' if shear else ''}; use method = \"march\"")
     drive = drive_of(scene)
-    closed = closed and isinstance(drive, BaseSine) and scene.structure.stiffening is None
+    closed = closed and isinstance(drive, BaseSine) and simple(scene)
     engine = "exact" if closed and accuracy.method != "march" else "march"
     if engine == "march" and f is not None:
         _refuse(scene, shear, side)
@@ -204,24 +213,6 @@ def contact_model(scene, settings: Settings, patch, drive):
     return hub.points_model(law, [1.0], [load])
 
 
-def with_springs(scene, model, modes: ModalBasis, drive):
-    """The model beside the springs of [structure] that are not linear, or as it is where there are none."""
-    structure = scene.structure
-    interlocked = structure.bonded is not None and structure.bonded.wavelength is not None
-    if structure.stiffening is None and not interlocked:
-        return model
-    from . import simulate_slots as slots
-
-    rows, springs = [modes.slide], []
-    if interlocked:
-        springs.append(slots.interlock(0, structure.bonded.stiffness, structure.bonded.wavelength))
-    if structure.stiffening is not None:
-        springs.append(slots.cubic(len(rows), structure.stiffening.cubic))
-        rows.append(modes.output)
-    size = modes.mass * simulate_drive.omega_of(drive) * simulate_drive.peak_speed(drive, start_of(scene, modes))
-    return slots.SlotsModel(model if model.limit > 0 else None, tuple(springs), np.array(rows), size)
-
-
 def whole(span: float, drive) -> bool:
     """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
     return span > drive.period * (1 - 1e-6)
@@ -270,17 +261,18 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     """One march at settings.steps per cycle."""
     from . import simulate_levels
     from . import simulate_march as hub
+    from .simulate_interfaces import model_of
     from .simulate_march import Mark
 
-    travel, marks = scene.structure.travel or np.inf, simulate_levels.ends(scene)
+    travel, marks, start = scene.structure.travel or np.inf, simulate_levels.ends(scene), start_of(scene, modes)
     begin = perf_counter()
-    model = with_springs(scene, contact_model(scene, settings, patch, drive), modes, drive)
+    model = model_of(scene, settings, patch, modes, drive, start)
     reduced = perf_counter() - begin
     hub.warm_up(modes, drive, model, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
-                     progress, start_of(scene, modes), marks)
+                     progress, start, marks)
     seconds = perf_counter() - begin
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
@@ -305,7 +297,7 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         def slips(number, level):
             other = simulate_levels.drive_with(drive, number + 1, level)
             run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
-                modes, other, model, settings.steps, travel, start_of(scene, modes))
+                modes, other, model, settings.steps, travel, start)
             return run.slip_amplitude(round(marks[0]), settings.window) >= held
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),

@@ -163,13 +163,3 @@ def friction_limit(scene, load: float) -> float:
     if scene.structure is not None and scene.structure.interface:
         return float(sum(i.static * i.load for i in scene.structure.interface))
     return scene.friction.static * load
-
-
-def refuse_unbuilt(scene, found: ModalBasis) -> None:
-    """PatchfemError for what the engines of a run cannot do yet."""
-    if scene.structure.interface:
-        raise PatchfemError(f"{scene.where('structure.interface')}: runs with it are not yet built; use "
-                            "[[structure.mode]] with [friction] meanwhile")
-    if found.damping is not None:
-        raise PatchfemError(f"{scene.where('structure')}: dampers couple the modes here (or act on a rigid one): use "
-                            "damping in proportion to mass and stiffness; not yet built")

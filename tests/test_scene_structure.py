@@ -18,7 +18,6 @@ from patchfem.simulate_structure import (
     modes_of,
     motions,
     moving_mass,
-    refuse_unbuilt,
     start_of,
 )
 
@@ -194,13 +193,6 @@ def test_refuses_at_the_line_of_the_file():
 def test_refuses_what_does_not_go_together(text, key, says):
     message = only(text)
     assert f": {key}: " in message and says in message
-
-
-def test_refuses_runs_that_no_engine_does_yet():
-    for text, says in ((RUB + MASSES, "structure.interface"), (MASSES.replace('"10 N s/m"', '"99 N s/m"'), "dampers")):
-        scene = loads(text)
-        with pytest.raises(PatchfemError, match=says):
-            refuse_unbuilt(scene, modes_of(scene))
 
 
 def test_always_a_mass_that_nothing_holds_is_allowed():

@@ -1,0 +1,90 @@
+"""Several interfaces of one rig: each with its own law and load, and the springs that stand beside them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from . import simulate_drive
+from .core import ModalBasis, PatchfemError
+from .scene_tables import Normal
+
+ELEMENTS = ("coulomb", "tanh", "elastic-plastic", "nonlocal")
+
+
+def viewed(scene, number: int = 0):
+    """The scene as one interface sees it: the law and load of [[structure.interface]] `number` as [friction] and
+    [normal]; the scene itself where it names none."""
+    if scene.structure is None or not scene.structure.interface:
+        return scene
+    one = scene.structure.interface[number]
+    return replace(scene, friction=one, normal=Normal.model_construct(load=one.load, amplitude=None, frequency=None,
+                                                                      phase=None, width=None))
+
+
+def loads_of(scene) -> list:
+    """Normal load of every interface of a scene without [contact] [N]."""
+    if scene.structure.interface:
+        return [one.load for one in scene.structure.interface]
+    return [scene.normal.load] if scene.normal is not None else []
+
+
+def limits(scene, number: int, load: float) -> tuple:
+    """(static, kinetic) friction force [N] of a Coulomb interface."""
+    from .simulate_acting import acting
+
+    f = acting(viewed(scene, number)).friction
+    return f.static * load, (f.kinetic if f.kinetic is not None else f.static) * load
+
+
+def model_of(scene, settings, patch, modes: ModalBasis, drive, start):
+    """The model that a march takes: one contact, or slots where interfaces or springs stand beside it."""
+    from .simulate_rig import contact_model
+
+    structure, many = scene.structure, len(modes.interfaces) > 1
+    interlocked = structure.bonded is not None and structure.bonded.wavelength is not None
+    alone = None if many else contact_model(scene, settings, patch, drive)
+    if not many and structure.stiffening is None and not interlocked:
+        return alone
+    from . import simulate_slots as slots
+
+    rows, elements = [*modes.interfaces], []
+    if many:
+        elements += [_element(scene, k, drive, start) for k in range(len(structure.interface))]
+    if interlocked:
+        elements.append(slots.interlock(0, structure.bonded.stiffness, structure.bonded.wavelength))
+    if structure.stiffening is not None:
+        elements.append(slots.cubic(len(rows), structure.stiffening.cubic))
+        rows.append(modes.output)
+    size = modes.mass * simulate_drive.omega_of(drive) * simulate_drive.peak_speed(drive, start)
+    beside = alone if alone is not None and alone.limit > 0 else None
+    return slots.SlotsModel(beside, tuple(elements), np.array(rows), size)
+
+
+def _element(scene, number: int, drive, start):
+    from . import simulate_slots as slots
+    from .simulate_acting import acting
+    from .simulate_rig import law_of
+
+    seen = acting(viewed(scene, number))
+    f, load = seen.friction, seen.normal.load
+    if f.law == "coulomb":
+        return slots.coulomb(number, *limits(scene, number, load))
+    if f.law == "tanh":
+        return slots.rate(number, f.static * load, f.reference_speed)
+    if f.law == "elastic-plastic":
+        return slots.elastic_plastic(number, f.static * load, f.bond_length)
+    if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1:
+        return slots.bonds(number, law_of(seen, simulate_drive.peak_speed(drive, start)), load)
+    at = scene.where(f"structure.interface.{number}.law")
+    raise PatchfemError(f"{at}: '{f.law}' of reading '{f.reading}' and order {f.order:g} beside other interfaces: not "
+                        "yet built; use reading = \"stretch\" with order = 1")
+
+
+def other_windows(window) -> list:
+    """The histories of the interfaces after the first as windows of their own."""
+    extra = window.extra
+    if "slips" not in extra:
+        return []
+    names = ("slides", "slide_rates", "forces", "slips")
+    return [replace(window, slide=q, slide_rate=v, force=f, slip=s)
+            for q, v, f, s in list(zip(*(extra[name] for name in names)))[1:]]
