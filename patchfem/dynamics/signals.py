@@ -61,14 +61,6 @@ def polish(coefs, low: float, high: float) -> float:
     return x
 
 
-def leading(coefs, noise, orders: int = 8) -> tuple:
-    """(order, sign) of the first coefficient above its noise (TERMS,); (orders, 0) where there is none."""
-    for k in range(orders):
-        if abs(coefs[k]) > noise[k]:
-            return k, 1 if coefs[k] > 0 else -1
-    return orders, 0
-
-
 def derivative(coefs):
     """Derivative to u of polynomials (..., TERMS, n) along the axis before the last."""
     out = np.zeros_like(coefs)

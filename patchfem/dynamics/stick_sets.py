@@ -12,22 +12,24 @@ from math import inf
 import numpy as np
 
 from ..core import NotConverged
-from .signals import BERNSTEIN, EPS, ORDER, REACH, TERMS, leading
+from .signals import BERNSTEIN, EPS, ORDER, REACH, TERMS
 
 NOISE = 64 * EPS
 FEW = 4  # interfaces at rest up to which every choice is tried
 
 
 class StickSet:
-    """Series of a motion with the faces of `mask` stuck, as linear maps of (z, v, push, sine, cosine).
+    """Series of a motion with the faces of `mask` stuck, as linear maps of (v, pull, sine, cosine).
 
-    push (n,) [m/s2]: constant forces per mass, the drive's constant among them; sine, cosine [m/s2]: a sin and a cos of
-    the drive's phase at the piece's start. motion (TERMS, n, 3n + 2); watch (i, TERMS, 3n + 2): reaction [N] of a stuck
+    pull (n,) [m/s2] at the piece's start, friction of the slipping faces included: small accelerations keep their
+    digits, as they would not if every term were built from z. sine, cosine [m/s2]: a sin and a cos of the drive's
+    phase there. motion (TERMS, n, 2n + 2), its first term without z; watch (i, TERMS, 2n + 2): reaction [N] of a stuck
     face, slip rate [m/s] of another; hull: the same in Bernstein form. pinv (n, s), react (i, n): slides to
     coordinates, pull to reactions. tied (i,): faces that the stuck ones hold.
     """
 
-    __slots__ = ("flat", "frozen", "hull", "mask", "motion", "pinv", "react", "size", "stuck", "tied", "watch")
+    __slots__ = ("flat", "frozen", "hull", "mask", "motion", "pinv", "project", "react", "size", "stuck", "tied",
+                 "watch")
 
     def __init__(self, system, mask: tuple, omega: float, unit: float):
         faces, n, mass = system.faces, system.n, system.mass
@@ -39,32 +41,36 @@ class StickSet:
         self.frozen = bool(stuck) and np.abs(project).max() < 1e-9
         if self.frozen:
             project = np.zeros((n, n))
+        self.project = project
         self.tied = [bool(np.linalg.norm(f @ project) < 1e-9 * max(np.linalg.norm(f), 1e-300)) for f in faces]
         self.react = np.zeros((len(faces), n))
         if stuck:
             self.react[stuck] = mass * self.pinv.T
-        pull = np.zeros((TERMS, n, 3 * n + 2))
-        move = np.zeros((TERMS + 2, n, 3 * n + 2))
-        move[0, :, :n] = np.eye(n)
-        move[1, :, n:2 * n] = np.eye(n) * unit
-        drive = [(-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)]
-        turn = 1.0
-        for k in range(TERMS):
-            pull[k] = -system.square[:, None] * move[k] - system.dampers @ move[k + 1] * ((k + 1) / unit)
-            pull[k, :, 3 * n:] += turn * np.outer(system.base, drive[k % 4])
-            if k == 0:
-                pull[k, :, 2 * n:3 * n] += np.eye(n)
-            move[k + 2] = project @ pull[k] * (unit * unit / ((k + 1) * (k + 2)))
-            turn *= omega * unit / (k + 1)
+        move, pull = self._series(system, omega, unit)
         self.motion = move[:TERMS]
         rate = move[1:TERMS + 1] * ((ORDER + 1) / unit)[:, None, None]
-        self.watch = np.zeros((len(faces), TERMS, 3 * n + 2))
-        for c, held in enumerate(mask):
-            self.watch[c] = np.einsum("n,knj->kj", self.react[c], pull) if held else \
-                np.einsum("n,knj->kj", faces[c], rate)
+        self.watch = np.stack([np.einsum("n,knj->kj", self.react[c], pull) if held else
+                               np.einsum("n,knj->kj", faces[c], rate) for c, held in enumerate(mask)]) \
+            if mask else np.zeros((0, TERMS, 2 * n + 2))
         self.size = np.abs(self.watch)
         self.hull = np.einsum("bk,ckj->cbj", BERNSTEIN, self.watch)
-        self.flat = np.concatenate([self.motion.reshape(-1, 3 * n + 2), self.hull.reshape(-1, 3 * n + 2)])
+        self.flat = np.concatenate([self.motion.reshape(-1, 2 * n + 2), self.hull.reshape(-1, 2 * n + 2)])
+
+    def _series(self, system, omega: float, unit: float) -> tuple:
+        """(motion, pull): maps (TERMS + 2, n, 2n + 2) and (TERMS, n, 2n + 2)."""
+        n = system.n
+        pull = np.zeros((TERMS, n, 2 * n + 2))
+        move = np.zeros((TERMS + 2, n, 2 * n + 2))
+        move[1, :, :n] = np.eye(n) * unit
+        drive, turn = [(-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)], omega * unit
+        pull[0, :, n:2 * n] = np.eye(n)
+        for k in range(TERMS):
+            if k:
+                pull[k] = -system.square[:, None] * move[k] - system.dampers @ move[k + 1] * ((k + 1) / unit)
+                pull[k, :, 2 * n:] += turn * np.outer(system.base, drive[k % 4])
+                turn *= omega * unit / (k + 1)
+            move[k + 2] = self.project @ pull[k] * (unit * unit / ((k + 1) * (k + 2)))
+        return move, pull
 
 
 class System:
@@ -79,7 +85,8 @@ class System:
         self.faces, self.static, self.kinetic = faces, static, kinetic
         damper = float(np.linalg.norm(self.dampers, 2)) if self.n else 0.0
         self.fastest = float(damper + np.sqrt(damper**2 + 4 * self.square.max())) / 2
-        self._sets = {}
+        self._sets, self._push = {}, -faces.T / self.mass
+        self.large = np.abs(self._push), np.abs(self.dampers), np.abs(self.base)
 
     def unit(self, omega: float, period: float) -> float:
         """Length of a piece [s] under a drive of angular frequency omega."""
@@ -94,12 +101,37 @@ class System:
 
     def push(self, signs, forces):
         """Constant friction of the slipping faces (n,) [m/s2]."""
-        return -(self.faces.T @ (np.asarray(signs) * forces)) / self.mass
+        return self._push @ (np.asarray(signs) * forces)
+
+
+class Entry:
+    """What a choice is made from: vector (2n + 2,) = (v, pull without friction, sine, cosine), size (2n + 2,) the
+    magnitudes it was added from, which set its round-off."""
+
+    __slots__ = ("size", "vector")
+
+    def __init__(self, system, z, v, constant, sine, cosine):
+        n, (_, dampers, base), speed = system.n, system.large, np.abs(v)
+        self.vector, self.size = np.empty(2 * n + 2), np.empty(2 * n + 2)
+        self.vector[:n], self.size[:n] = v, speed
+        self.vector[n:2 * n] = -system.square * z - system.dampers @ v - system.base * (constant + sine)
+        self.size[n:2 * n] = system.square * np.abs(z) + dampers @ speed + base * (abs(constant) + abs(sine))
+        self.vector[2 * n:], self.size[2 * n:] = (sine, cosine), (abs(sine), abs(cosine))
+
+    def under(self, system, signs, forces) -> tuple:
+        """The same with the friction of the slipping faces."""
+        if not any(signs):
+            return self.vector, self.size
+        n, vector, size = system.n, self.vector.copy(), self.size.copy()
+        given = np.asarray(signs) * forces
+        vector[n:2 * n] += system.push(signs, forces)
+        size[n:2 * n] += system.large[0] @ np.abs(given)
+        return vector, size
 
 
 class Choice:
-    """What the faces do after an event: signs of slip (0: stuck), forces [N] of those that do not stick, and the order
-    up to which each watched signal is zero at the start."""
+    """What the faces do after an event: signs of slip (0: stuck), held (slipping by name only: at its limit, but held
+    by others), forces [N] of those that do not stick, orders up to which a watched signal is zero at the start."""
 
     __slots__ = ("forces", "held", "orders", "signs")
 
@@ -107,16 +139,15 @@ class Choice:
         self.signs, self.held, self.forces, self.orders = signs, held, forces, orders
 
 
-def settle(system: System, entry, signs, resting, omega: float, unit: float) -> Choice:
+def settle(system: System, entry: Entry, signs, resting, omega: float, unit: float) -> Choice:
     """State of the faces just after an event.
 
-    entry (3n + 2,): (z, v, constant drive, sine, cosine) with v = 0 at the faces `resting`; signs: the first guess, for
-    the others their slip. A choice holds when every stuck face is below its limit, or at it and going back, and every
-    slipping face starts to move its own way, told by the first derivative that is not zero. NotConverged where no
-    choice does.
+    The faces `resting` have v = 0; signs: the first guess, for the others their slip. A choice holds when every stuck
+    face is below its limit, or at it and going back, and every slipping face starts to move its own way, told by the
+    first derivative that is not zero. NotConverged where no choice does.
     """
     best = (inf, None)
-    for guess in _guesses(system, entry, tuple(signs), tuple(resting), omega, unit):
+    for guess in _guesses(system, entry, tuple(signs), tuple(resting)):
         miss, choice = _judge(system, entry, guess, resting, omega, unit)
         if miss == 0.0:
             return choice
@@ -127,12 +158,12 @@ def settle(system: System, entry, signs, resting, omega: float, unit: float) -> 
                        "friction.kinetic below static and coupled interfaces there may be none: raise kinetic")
 
 
-def _guesses(system, entry, signs, resting, omega, unit):
+def _guesses(system, entry, signs, resting):
     yield signs
     if len(resting) <= FEW:
         choices = sorted(product((0, 1, -1), repeat=len(resting)), key=lambda c: sum(map(abs, c)))
     else:
-        choices = _by_descent(system, entry, signs, resting, omega, unit)
+        choices = _by_descent(system, entry, signs, resting)
     for choice in choices:
         guess = list(signs)
         for c, s in zip(resting, choice):
@@ -143,49 +174,49 @@ def _guesses(system, entry, signs, resting, omega, unit):
 
 def _judge(system, entry, signs, resting, omega, unit) -> tuple:
     """(relative violation, Choice) of one guess; 0.0: it holds."""
-    n = system.n
     flow = system.stick_set(tuple(s == 0 for s in signs), omega, unit)
     held = tuple(bool(s) and c in resting and flow.tied[c] for c, s in enumerate(signs))
     forces = np.where(held, system.static, system.kinetic)
-    full = entry.copy()
-    full[2 * n:3 * n] += system.push(signs, forces)
-    weight = np.abs(entry)
-    weight[2 * n:3 * n] += np.abs(system.faces.T) @ (np.abs(signs) * forces) / system.mass
+    full, weight = entry.under(system, signs, forces)
     orders, worst = {}, 0.0
     for c in resting:
         if held[c]:
             continue
-        coefs, noise = flow.watch[c] @ full, NOISE * (flow.size[c] @ weight)
         if signs[c]:
-            coefs[0] = 0.0
-            order, sign = leading(signs[c] * coefs, noise)
-            if sign <= 0:
-                size = noise / NOISE
-                worst = max(worst, abs(coefs[order]) / size[order] if sign else 1.0)
+            order, lead, size = _leading(flow, c, full, weight, 0.0, signs[c], 1)
             orders[c, signs[c]] = order
+            if lead <= 0:
+                worst = max(worst, -lead / size if lead else 1.0)
             continue
         for side in (1, -1):
-            margin = -side * coefs
-            margin[0] += system.static[c]
-            noise[0] += NOISE * system.static[c]
-            order, sign = leading(margin, noise)
-            if sign < 0:
-                worst = max(worst, abs(margin[order]) / max(noise[order] / NOISE, 1e-300))
-            if order and sign > 0:
+            order, lead, size = _leading(flow, c, full, weight, system.static[c], -side, 0)
+            if lead < 0:
+                worst = max(worst, -lead / size)
+            elif order and lead > 0:
                 orders[c, side] = order
     return worst, Choice(signs, held, forces, orders)
 
 
-def _by_descent(system, entry, signs, resting, omega, unit):
+def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int, last: int = 8) -> tuple:
+    """(order, value, size) of the first coefficient of constant + sign * watched signal, from `order` on, that is
+    above its round-off; (last, 0, 0) where there is none."""
+    while order < last:
+        value, size = sign * float(flow.watch[c, order] @ full), float(flow.size[c, order] @ weight)
+        if order == 0:
+            value, size = value + constant, size + abs(constant)
+        if abs(value) > NOISE * size:
+            return order, value, size
+        order += 1
+    return last, 0.0, 0.0
+
+
+def _by_descent(system, entry, signs, resting):
     """Choices for many faces at rest: forces that minimise the square of the accelerations within the static limits,
     face by face; then both choices for every face left at its limit without acceleration."""
-    n, rest = system.n, list(resting)
+    rest = list(resting)
     faces = system.faces[rest]
     moving = [0 if c in resting else s for c, s in enumerate(signs)]
-    full = entry.copy()
-    full[2 * n:3 * n] += system.push(moving, system.kinetic)
-    free = system.stick_set((False,) * len(signs), omega, unit)
-    pull = 2 / unit**2 * (free.motion[2] @ full)
+    pull = entry.under(system, moving, system.kinetic)[0][system.n:2 * system.n]
     gram, want = faces @ faces.T / system.mass, faces @ pull
     fixed = {}
     for _ in range(4 * len(rest)):
