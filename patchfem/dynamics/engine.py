@@ -23,7 +23,8 @@ class Piece:
 
     drive: (constant, amplitude, omega), theta its phase at the start; signs (i,) of slip, 0 stuck (at `held` [m]);
     forces (i,) [N] of the faces that do not stick; push (n,) [m/s2] as in StickSet; flow: the StickSet; first: an
-    event stands at its start.
+    event stands at its start; ends: the event at its end, (face, sign of the slip that a release starts, 0: a stop), or
+    None.
     """
 
     time: float
@@ -39,6 +40,7 @@ class Piece:
     push: np.ndarray
     flow: StickSet
     first: bool
+    ends: tuple | None
 
 
 class Engine:
@@ -194,7 +196,7 @@ class Engine:
         coefs[0] = self.z
         piece = Piece(clock.time, clock.cycle, clock.theta, span, self.unit, coefs,
                       (clock.constant, clock.amplitude, clock.omega), self.signs, self.held.copy(),
-                      np.asarray(self.choice.signs) * self.choice.forces, self.push, flow, first)
+                      np.asarray(self.choice.signs) * self.choice.forces, self.push, flow, first, event)
         self.orders = {}
         return piece, event
 
