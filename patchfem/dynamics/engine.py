@@ -13,7 +13,7 @@ import numpy as np
 from ..core import ModalBasis, NotConverged, PatchfemError, Start
 from .clock import TURN, Clock
 from .event_list import BORDER, Recorder, kind_of
-from .signals import EPS, ORDER, TERMS, first_root
+from .signals import EPS, ONE, ORDER, TERMS, first_root
 from .stick_sets import NOISE, Entry, StickSet, System, settle
 
 
@@ -78,7 +78,8 @@ class Engine:
         while not clock.over:
             piece, event = self._piece(first)
             yield piece
-            self.z, self.v, first = self._state(piece), self._rate(piece), True
+            self._advance(piece)
+            first = True
             if event:
                 clock.offset += piece.span
                 self._event(event, piece)
@@ -99,6 +100,8 @@ class Engine:
 
     def _resting(self, piece) -> list:
         """Faces without slip velocity after a piece: the stuck ones and those whose velocity is round-off."""
+        if len(self.signs) == 1 and self.signs[0] == 0:
+            return [0]
         speed = self.faces @ self.v
         u = piece.span / piece.unit
         size = np.abs(self.faces) @ ((ORDER[1:] * u**ORDER[:-1]) @ np.abs(piece.coefs[1:])) / piece.unit
@@ -140,7 +143,7 @@ class Engine:
         face, sign = event
         guess = list(self.choice.signs)
         guess[face] = sign
-        resting = self._resting(piece)
+        resting = self._resting(piece) if len(guess) > 1 else [0]
         if face not in resting:
             resting = sorted([*resting, face])
         self.idle += 1
@@ -221,7 +224,7 @@ class Engine:
 
     def _root(self, c: int, sign: int, coefs, span: float) -> tuple:
         """(time in the piece, sign guessed after it) of the first event of a face; (inf, 0) if there is none."""
-        shrink = (span / self.unit)**ORDER
+        shrink = ONE if span == self.unit else (span / self.unit)**ORDER
         if sign:
             found = self._first(coefs * (sign * shrink), self.orders.get((c, sign), 0), 0.0)
             return (found * span, 0) if found < inf else (inf, 0)
@@ -245,11 +248,11 @@ class Engine:
                 coefs[0] = max(coefs[0], 0.0)
         return first_root(coefs, noise)
 
-    def _state(self, piece):
-        return piece.coefs[0] if piece.flow.frozen else (piece.span / piece.unit)**ORDER @ piece.coefs
-
-    def _rate(self, piece):
+    def _advance(self, piece) -> None:
+        """Coordinates and rates at the end of a piece."""
         if piece.flow.frozen:
-            return np.zeros(self.n)
-        u = piece.span / piece.unit
-        return (ORDER[1:] * u**ORDER[:-1]) @ piece.coefs[1:] / piece.unit
+            self.z, self.v = piece.coefs[0], np.zeros(self.n)
+            return
+        power = ONE if piece.span == piece.unit else (piece.span / piece.unit)**ORDER
+        self.z = power @ piece.coefs
+        self.v = (power[:-1] * ORDER[1:]) @ piece.coefs[1:] / piece.unit

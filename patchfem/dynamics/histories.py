@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import ceil, comb
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..core import ModalBasis, Outcome, Response, Start
 from . import batches
@@ -112,6 +111,8 @@ class _Book:
         inside = np.sort(where[(order == k) & (np.abs(value) <= self.travel) & (where < beyond)])
         at = beyond
         if inside.size:
+            from scipy.optimize import brentq
+
             one = series[k:k + 1]
             at = brentq(lambda x: abs(batches.values_at(one, [0], np.array([x]))[0]) - self.travel, inside[-1], beyond,
                         xtol=1e-15)

@@ -13,6 +13,7 @@ import numpy as np
 TERMS = 27
 REACH = 2.0  # longest piece times the fastest rate
 ORDER = np.arange(TERMS)
+ONE = np.ones(TERMS)
 BERNSTEIN = np.array([[comb(j, k) / comb(TERMS - 1, k) for k in range(TERMS)] for j in range(TERMS)])
 _LEFT = np.array([[comb(j, k) / 2.0**j for k in range(TERMS)] for j in range(TERMS)])
 _RIGHT = _LEFT[::-1, ::-1].copy()
@@ -30,17 +31,21 @@ def first_root(coefs, noise: float = 0.0) -> float:
         b, low, width = todo.pop()
         if b.min() >= -noise:
             continue
-        if b[0] > 0 and np.count_nonzero(np.diff(b < 0)) == 1:
-            return polish(coefs, low, low + width)
+        below = b < 0
+        if b[0] > 0 and np.count_nonzero(below[1:] != below[:-1]) == 1:
+            k = int(below.argmax())
+            guess = (k - 1 + float(b[k - 1] / (b[k - 1] - b[k]))) / (TERMS - 1)
+            return polish(coefs, low, low + width, low + width * guess)
         if width <= _SMALLEST:
             return low
         todo += [(_RIGHT @ b, low + width / 2, width / 2), (_LEFT @ b, low, width / 2)]
     return inf
 
 
-def polish(coefs, low: float, high: float) -> float:
-    """The one root in [low, high] of a polynomial that falls there from above zero to below, by guarded Newton."""
-    falling, x = coefs.tolist()[::-1], 0.5 * (low + high)
+def polish(coefs, low: float, high: float, x: float) -> float:
+    """The one root in [low, high] of a polynomial that falls there from above zero to below, by guarded Newton from x.
+    """
+    falling = coefs.tolist()[::-1]
     for _ in range(100):
         value = slope = 0.0
         for c in falling:
