@@ -124,7 +124,6 @@ def energies(batch: Batch, modes: ModalBasis, live) -> np.ndarray:
     power = -modes.mass * a * (v @ modes.base)
     loss = modes.mass * np.einsum("kjn,nm,kjm->kj", v, np.asarray(modes.dampers, float), v)
     rate = np.einsum("kjn,fn->kjf", v, np.asarray(modes.interfaces, float)[live])
-    rate *= (batch.signs != 0)[:, None, :]
     rub = np.einsum("kjf,kf->kj", rate, batch.forces)
     return np.array([np.sum(weight * x) for x in (power, loss, np.abs(power), rub)])
 

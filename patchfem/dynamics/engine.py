@@ -1,8 +1,8 @@
 """Runs from event to event: pieces of motion as series, the event that ends each, the state of stick and slip after it.
 
 The first root of a slip velocity or of a margin to sliding is isolated by Bernstein coefficients, which prove the rest
-of the piece free of roots, so no event can be missed. A stuck interface keeps its slide to the last bit; one that has
-just been released at its kinetic limit has no acceleration, to the last bit too.
+of the piece free of roots, so no event can be missed. A stuck interface keeps its slide to the last bit; of one just
+released the terms that are zero there (velocity; acceleration too, at the kinetic limit) are left out of the search.
 """
 
 from dataclasses import dataclass
@@ -152,23 +152,12 @@ class Engine:
         self._enter(tuple(guess), resting)
 
     def _fill(self):
-        """(v, pull, sine, cosine) here; faces just released at their kinetic limit have no acceleration."""
+        """(v, pull, sine, cosine) here."""
         n, system, entry = self.n, self.system, self.entry
         sine, cosine = self._sine()
         pull = self.push - system.square * self.z - system.dampers @ self.v - system.base * sine
-        if self.orders:
-            rows = [c for (c, side), order in self.orders.items() if order >= 2 and self.choice.signs[c]]
-            if rows:
-                pull -= self._lift(rows, pull)
         entry[:n], entry[n:2 * n], entry[2 * n], entry[2 * n + 1] = self.v, pull, sine, cosine
         return entry
-
-    def _lift(self, rows, pull):
-        """The part of the pull that accelerates some faces, the stuck ones held."""
-        faces = self.faces[rows] @ self.flow.project
-        if len(rows) == 1:
-            return faces[0] * (float(faces[0] @ pull) / float(faces[0] @ faces[0]))
-        return np.linalg.pinv(faces, rcond=1e-10) @ (faces @ pull)
 
     def _piece(self, first: bool) -> tuple:
         """(Piece, event): event is (face, sign of its slip after it as first guess) or None."""

@@ -7,7 +7,6 @@ overload while the others hold it carries its limit and leaves the rest to them.
 """
 
 from itertools import product
-from math import inf
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ..core import NotConverged
 from .signals import BERNSTEIN, EPS, ORDER, REACH, TERMS
 
 NOISE = 64 * EPS
-FEW = 4  # interfaces at rest up to which every choice is tried
+FEW, MANY = 4, 8  # interfaces at rest up to which every choice is tried at once, at last
 
 
 class StickSet:
@@ -146,14 +145,11 @@ def settle(system: System, entry: Entry, signs, resting, omega: float, unit: flo
     face is below its limit, or at it and going back, and every slipping face starts to move its own way, told by the
     first derivative that is not zero. NotConverged where no choice does.
     """
-    best = (inf, None)
-    for guess in _guesses(system, entry, tuple(signs), tuple(resting)):
-        miss, choice = _judge(system, entry, guess, resting, omega, unit)
-        if miss == 0.0:
-            return choice
-        best = min(best, (miss, choice), key=lambda pair: pair[0])
-    if best[1] is not None and best[0] < 1e-9:
-        return best[1]
+    for noise in (NOISE, 1e4 * NOISE):  # the second time for sets of badly conditioned faces
+        for guess in _guesses(system, entry, tuple(signs), tuple(resting)):
+            choice = _judge(system, entry, guess, resting, omega, unit, noise)
+            if choice is not None:
+                return choice
     raise NotConverged("dynamics: no state of stick and slip satisfies the law of friction after an event; with "
                        "friction.kinetic below static and coupled interfaces there may be none: raise kinetic")
 
@@ -163,7 +159,7 @@ def _guesses(system, entry, signs, resting):
     if len(resting) <= FEW:
         choices = sorted(product((0, 1, -1), repeat=len(resting)), key=lambda c: sum(map(abs, c)))
     else:
-        choices = _by_descent(system, entry, signs, resting)
+        choices = _by_squares(system, entry, signs, resting)
     for choice in choices:
         guess = list(signs)
         for c, s in zip(resting, choice):
@@ -172,82 +168,81 @@ def _guesses(system, entry, signs, resting):
             yield tuple(guess)
 
 
-def _judge(system, entry, signs, resting, omega, unit) -> tuple:
-    """(relative violation, Choice) of one guess; 0.0: it holds."""
+def _judge(system, entry, signs, resting, omega, unit, noise) -> Choice | None:
+    """The Choice of one guess, None where the law does not hold in it."""
     flow = system.stick_set(tuple(s == 0 for s in signs), omega, unit)
     held = tuple(bool(s) and c in resting and flow.tied[c] for c, s in enumerate(signs))
     forces = np.where(held, system.static, system.kinetic)
     full, weight = entry.under(system, signs, forces)
-    orders, worst = {}, 0.0
+    orders = {}
     for c in resting:
         if held[c]:
             continue
         if signs[c]:
-            order, lead, size = _leading(flow, c, full, weight, 0.0, signs[c], 1)
-            orders[c, signs[c]] = order
+            order, lead = _leading(flow, c, full, weight, 0.0, signs[c], 1, noise)
             if lead <= 0:
-                worst = max(worst, -lead / size if lead else 1.0)
+                return None
+            orders[c, signs[c]] = order
             continue
         for side in (1, -1):
-            order, lead, size = _leading(flow, c, full, weight, system.static[c], -side, 0)
+            order, lead = _leading(flow, c, full, weight, system.static[c], -side, 0, noise)
             if lead < 0:
-                worst = max(worst, -lead / size)
-            elif order and lead > 0:
+                return None
+            if order and lead > 0:
                 orders[c, side] = order
-    return worst, Choice(signs, held, forces, orders)
+    return Choice(signs, held, forces, orders)
 
 
-def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int, last: int = 8) -> tuple:
-    """(order, value, size) of the first coefficient of constant + sign * watched signal, from `order` on, that is
-    above its round-off; (last, 0, 0) where there is none."""
+def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int, noise: float, last: int = 8) -> tuple:
+    """(order, value) of the first coefficient of constant + sign * watched signal, from `order` on, that is above its
+    round-off; (last, 0) where there is none."""
     while order < last:
         value, size = sign * float(flow.watch[c, order] @ full), float(flow.size[c, order] @ weight)
         if order == 0:
             value, size = value + constant, size + abs(constant)
-        if abs(value) > NOISE * size:
-            return order, value, size
+        if abs(value) > noise * size:
+            return order, value
         order += 1
-    return last, 0.0, 0.0
+    return last, 0.0
 
 
-def _by_descent(system, entry, signs, resting):
-    """Choices for many faces at rest: forces that minimise the square of the accelerations within the static limits,
-    face by face; then both choices for every face left at its limit without acceleration."""
+def _by_squares(system, entry, signs, resting):
+    """Choices for many faces at rest: forces that minimise the square of the accelerations, then their own, within the
+    static limits; the faces at a limit in every combination; at last, for not too many, everything."""
     rest = list(resting)
-    faces = system.faces[rest]
+    faces, limit = system.faces[rest], system.static[rest]
     moving = [0 if c in resting else s for c, s in enumerate(signs)]
     pull = entry.under(system, moving, system.kinetic)[0][system.n:2 * system.n]
-    gram, want = faces @ faces.T / system.mass, faces @ pull
-    fixed = {}
+    large, fixed = np.abs(faces) @ np.abs(pull) + np.abs(faces @ faces.T) @ limit / system.mass, {}
     for _ in range(4 * len(rest)):
-        force = _box(gram, want, system.static[rest], {k: s * system.kinetic[rest[k]] for k, s in fixed.items()})
-        left = want - gram @ force
-        tiny = 1e-10 * (np.abs(want) + np.abs(gram) @ system.static[rest])
-        new = {k: int(np.sign(left[k])) for k in range(len(rest)) if k not in fixed and abs(left[k]) > tiny[k]}
-        lost = [k for k, s in fixed.items() if s * left[k] < -tiny[k]]
+        force = _forces(faces, system.mass, pull, limit, {k: s * system.kinetic[rest[k]] for k, s in fixed.items()})
+        left = faces @ (pull - faces.T @ force / system.mass)
+        new = {k: int(np.sign(left[k])) for k in range(len(rest)) if k not in fixed and abs(left[k]) > 1e-7 * large[k]}
+        lost = [k for k, s in fixed.items() if s * left[k] < -1e-7 * large[k]]
         if not new and not lost:
             break
         fixed = {k: s for k, s in fixed.items() if k not in lost} | new
-    edge = [k for k in range(len(rest)) if k not in fixed
-            and abs(force[k]) > system.static[rest[k]] * (1 - 1e-9)]
-    for choice in sorted(product((0, 1), repeat=min(len(edge), 10)), key=sum):
+    edge = [k for k in range(len(rest)) if k not in fixed and abs(force[k]) > limit[k] * (1 - 1e-6)]
+    for choice in sorted(product((1, 0), repeat=min(len(edge), 10)), key=sum, reverse=True):
         slips = fixed | {k: int(np.sign(force[k])) for k, yes in zip(edge, choice) if yes}
         yield tuple(slips.get(k, 0) for k in range(len(rest)))
+    if len(rest) <= MANY:
+        yield from sorted(product((0, 1, -1), repeat=len(rest)), key=lambda c: sum(map(abs, c)))
 
 
-def _box(gram, want, limit, fixed):
-    """Forces within +-limit that minimise F gram F/2 - want F, `fixed` ones given: coordinate descent."""
-    force = np.zeros(len(want))
+def _forces(faces, mass: float, pull, limit, fixed):
+    """Forces within +-limit that minimise |pull - faces' force/mass|, of those the smallest; `fixed` ones given."""
+    from scipy.optimize import lsq_linear
+
+    force = np.zeros(len(limit))
     for k, f in fixed.items():
         force[k] = f
-    free = [k for k in range(len(want)) if k not in fixed]
-    for _ in range(20_000):
-        change = 0.0
-        for k in free:
-            new = force[k] + (want[k] - gram[k] @ force) / gram[k, k]
-            new = min(max(new, -limit[k]), limit[k])
-            change = max(change, abs(new - force[k]) / max(limit[k], 1e-300))
-            force[k] = new
-        if change < 1e-14:
-            break
+    free = [k for k in range(len(limit)) if k not in fixed]
+    if free:
+        rows = faces[free].T / mass
+        small = 1e-6 * max(np.abs(rows).max(), 1e-300)
+        want = np.concatenate([pull - faces.T @ force / mass, np.zeros(len(free))])
+        found = lsq_linear(np.concatenate([rows, small * np.eye(len(free))]), want, (-limit[free], limit[free]),
+                           method="bvls", tol=1e-14)
+        force[free] = found.x
     return force
