@@ -117,7 +117,7 @@ def at(batch: Batch, owner, tau, times, modes: ModalBasis, drive, live) -> Respo
 
 def energies(batch: Batch, modes: ModalBasis, live) -> np.ndarray:
     """Work of the drive, viscous loss, integral of |power of the drive|, work of friction [J] over all pieces."""
-    _, v = _nodes(batch)
+    v = _rates(batch, powers(batch.share[:, None] * NODES))
     weight = batch.span[:, None] * WEIGHTS
     every = np.arange(len(batch))
     a = batch.acceleration(every, batch.span[:, None] * NODES)
@@ -131,9 +131,12 @@ def energies(batch: Batch, modes: ModalBasis, live) -> np.ndarray:
 def _nodes(batch: Batch) -> tuple:
     """Coordinates and rates (k, 12, n) at the Gauss points of the pieces."""
     power = powers(batch.share[:, None] * NODES)
-    z = power @ batch.coefs
-    v = (power[:, :, :-1] * ORDER[1:]) @ batch.coefs[:, 1:] / batch.unit[:, None, None]
-    return z, v
+    return power @ batch.coefs, _rates(batch, power)
+
+
+def _rates(batch: Batch, power):
+    """Rates (k, j, n) where the powers of u are `power` (k, j, TERMS)."""
+    return power[:, :, :-1] @ (batch.coefs[:, 1:] * ORDER[1:, None] / batch.unit[:, None, None])
 
 
 def loop_of(batch: Batch, modes: ModalBasis, live) -> tuple:

@@ -120,8 +120,9 @@ class Engine:
         self.choice = settle(system, entry, guess, resting, clock.omega, self.unit)
         signs = tuple(0 if h else s for s, h in zip(self.choice.signs, self.choice.held))
         self.flow = system.stick_set(tuple(s == 0 for s in self.choice.signs), clock.omega, self.unit)
+        self.given = np.asarray(self.choice.signs) * self.choice.forces
         self.push = system.push(self.choice.signs, self.choice.forces) - system.base * clock.constant
-        slide = self.faces @ self.z
+        slide, self.held = self.faces @ self.z, self.held.copy()
         for c, (old, new) in enumerate(zip(before, signs)):
             what = kind_of(old, new)
             if old or new:
@@ -187,8 +188,8 @@ class Engine:
                         span, event = when, (c, sign)
         coefs[0] = self.z
         piece = Piece(clock.time, clock.cycle, clock.theta, span, self.unit, coefs,
-                      (clock.constant, clock.amplitude, clock.omega), self.signs, self.held.copy(),
-                      np.asarray(self.choice.signs) * self.choice.forces, self.push, flow, first, event)
+                      (clock.constant, clock.amplitude, clock.omega), self.signs, self.held, self.given,
+                      self.push, flow, first, event)
         self.orders = {}
         return piece, event
 

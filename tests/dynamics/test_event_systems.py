@@ -480,3 +480,28 @@ def test_exact_combined_signal_is_the_slide():
     phase = next(p for p in run(modes, BaseSine(1.0, 1.0), 0.3, 0.3, 10.0) if p.direction)
     t = np.linspace(0, phase.span, 5)
     np.testing.assert_allclose(combine(phase.modal, modes.slide).many(t), slides(modes, phase, t)[0], atol=1e-15)
+
+
+def test_exact_coordinates_stay_on_the_stuck_slide():
+    """The coordinates move on while the interface sticks; their slide stays where it stopped, over 300 cycles."""
+    h = sqrt(0.5)
+    modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
+    drive = drives.levels([4.0, 0.3], 1.14, 3)
+    engine = Engine(modes, drive, 1.5, 1.5, 300)
+    last = [p for p in engine.pieces() if p.cycle >= 20]
+    assert all(p.signs == (0,) for p in last) and abs(last[0].held[0]) > 0.1
+    size = max(np.abs(p.coefs[0]).max() for p in last)
+    assert max(abs(float(modes.interfaces[0] @ p.coefs[0]) - p.held[0]) for p in last) < 4e-16 * size
+
+
+def test_exact_interface_without_friction_among_others():
+    """Interface 0 has no friction: the run is that of the other one alone."""
+    modes = basis_of([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
+    alone = basis_of([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
+    drive = BaseSine(1.0, 1.2)
+    two, one = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5), simulate(alone, drive, 0.4, 0.4, 20, 5)
+    np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-13)
+    np.testing.assert_allclose(two.log.time, one.log.time, rtol=1e-14)
+    assert set(two.log.interface) == {1} and two.stick == 0 and not two.window.force.any()
+    np.testing.assert_array_equal(two.window.extra["forces"][:, 1], one.window.force)
+    assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-13)
