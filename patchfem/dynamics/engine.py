@@ -63,7 +63,6 @@ class Engine:
         self.n = n
         self.z, self.v = (np.zeros(n), np.zeros(n)) if start is None else (np.array(start.z, float),
                                                                            np.array(start.v, float))
-        self.entry = np.zeros(2 * n + 2)
         self.held = self.faces @ self.z
         speed = self.faces @ self.v
         tiny = NOISE * (np.abs(self.faces) @ np.abs(self.v))
@@ -120,8 +119,7 @@ class Engine:
         self.choice = settle(system, entry, guess, resting, clock.omega, self.unit)
         signs = tuple(0 if h else s for s, h in zip(self.choice.signs, self.choice.held))
         self.flow = system.stick_set(tuple(s == 0 for s in self.choice.signs), clock.omega, self.unit)
-        self.given = np.asarray(self.choice.signs) * self.choice.forces
-        self.push = system.push(self.choice.signs, self.choice.forces) - system.base * clock.constant
+        self.push = system.push(self.choice.given) - system.base * clock.constant
         slide, self.held = self.faces @ self.z, self.held.copy()
         for c, (old, new) in enumerate(zip(before, signs)):
             what = kind_of(old, new)
@@ -154,11 +152,8 @@ class Engine:
 
     def _fill(self):
         """(v, pull, sine, cosine) here."""
-        n, system, entry = self.n, self.system, self.entry
-        sine, cosine = self._sine()
-        pull = self.push - system.square * self.z - system.dampers @ self.v - system.base * sine
-        entry[:n], entry[n:2 * n], entry[2 * n], entry[2 * n + 1] = self.v, pull, sine, cosine
-        return entry
+        return self.system.rows @ np.concatenate((self.z, self.v, (self.clock.constant, *self._sine()),
+                                                  self.choice.given))
 
     def _piece(self, first: bool) -> tuple:
         """(Piece, event): event is (face, sign of its slip after it as first guess) or None."""
@@ -188,7 +183,7 @@ class Engine:
                         span, event = when, (c, sign)
         coefs[0] = self.z
         piece = Piece(clock.time, clock.cycle, clock.theta, span, self.unit, coefs,
-                      (clock.constant, clock.amplitude, clock.omega), self.signs, self.held, self.given,
+                      (clock.constant, clock.amplitude, clock.omega), self.signs, self.held, self.choice.given,
                       self.push, flow, first, event)
         self.orders = {}
         return piece, event

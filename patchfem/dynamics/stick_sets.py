@@ -84,8 +84,13 @@ class System:
         self.faces, self.static, self.kinetic = faces, static, kinetic
         damper = float(np.linalg.norm(self.dampers, 2)) if self.n else 0.0
         self.fastest = float(damper + np.sqrt(damper**2 + 4 * self.square.max())) / 2
-        self._sets, self._push = {}, -faces.T / self.mass
-        self.large = np.abs(self._push), np.abs(self.dampers), np.abs(self.base)
+        n, self._sets, self._push = self.n, {}, -faces.T / self.mass
+        self.given = slice(2 * n + 3, 2 * n + 3 + len(faces))
+        self.rows = np.zeros((2 * n + 2, self.given.stop))
+        self.rows[:n, n:2 * n] = np.eye(n)
+        pull = np.concatenate([-np.diag(self.square), -self.dampers, np.outer(-self.base, [1, 1, 0]), self._push], 1)
+        self.rows[n:2 * n], self.rows[2 * n, 2 * n + 1], self.rows[2 * n + 1, 2 * n + 2] = pull, 1, 1
+        self.sizes = np.abs(self.rows)
 
     def unit(self, omega: float, period: float) -> float:
         """Length of a piece [s] under a drive of angular frequency omega."""
@@ -98,9 +103,9 @@ class System:
             self._sets[key] = StickSet(self, mask, omega, unit)
         return self._sets[key]
 
-    def push(self, signs, forces):
-        """Constant friction of the slipping faces (n,) [m/s2]."""
-        return self._push @ (np.asarray(signs) * forces)
+    def push(self, given):
+        """Constant friction of the slipping faces (n,) [m/s2]; given (i,) [N], 0 for the others."""
+        return self._push @ given
 
 
 class Entry:
@@ -110,32 +115,25 @@ class Entry:
     __slots__ = ("size", "vector")
 
     def __init__(self, system, z, v, constant, sine, cosine):
-        n, (_, dampers, base), speed = system.n, system.large, np.abs(v)
-        self.vector, self.size = np.empty(2 * n + 2), np.empty(2 * n + 2)
-        self.vector[:n], self.size[:n] = v, speed
-        self.vector[n:2 * n] = -system.square * z - system.dampers @ v - system.base * (constant + sine)
-        self.size[n:2 * n] = system.square * np.abs(z) + dampers @ speed + base * (abs(constant) + abs(sine))
-        self.vector[2 * n:], self.size[2 * n:] = (sine, cosine), (abs(sine), abs(cosine))
+        state = np.concatenate((z, v, (constant, sine, cosine)))
+        end = state.size
+        self.vector, self.size = system.rows[:, :end] @ state, system.sizes[:, :end] @ np.abs(state)
 
-    def under(self, system, signs, forces) -> tuple:
-        """The same with the friction of the slipping faces."""
-        if not any(signs):
-            return self.vector, self.size
-        n, vector, size = system.n, self.vector.copy(), self.size.copy()
-        given = np.asarray(signs) * forces
-        vector[n:2 * n] += system.push(signs, forces)
-        size[n:2 * n] += system.large[0] @ np.abs(given)
-        return vector, size
+    def under(self, system, given) -> tuple:
+        """The same with the friction `given` (i,) [N] of the slipping faces."""
+        column = system.given
+        return self.vector + system.rows[:, column] @ given, self.size + system.sizes[:, column] @ np.abs(given)
 
 
 class Choice:
     """What the faces do after an event: signs of slip (0: stuck), held (slipping by name only: at its limit, but held
-    by others), forces [N] of those that do not stick, orders up to which a watched signal is zero at the start."""
+    by others), given (i,) friction [N] of those that do not stick, orders up to which a watched signal is zero at the
+    start."""
 
-    __slots__ = ("forces", "held", "orders", "signs")
+    __slots__ = ("given", "held", "orders", "signs")
 
-    def __init__(self, signs, held, forces, orders):
-        self.signs, self.held, self.forces, self.orders = signs, held, forces, orders
+    def __init__(self, signs, held, given, orders):
+        self.signs, self.held, self.given, self.orders = signs, held, given, orders
 
 
 def settle(system: System, entry: Entry, signs, resting, omega: float, unit: float) -> Choice:
@@ -170,11 +168,10 @@ def _guesses(system, entry, signs, resting):
 
 def _judge(system, entry, signs, resting, omega, unit, noise) -> Choice | None:
     """The Choice of one guess, None where the law does not hold in it."""
-    flow = system.stick_set(tuple(s == 0 for s in signs), omega, unit)
-    held = tuple(bool(s) and c in resting and flow.tied[c] for c, s in enumerate(signs))
-    forces = np.where(held, system.static, system.kinetic)
-    full, weight = entry.under(system, signs, forces)
-    orders = {}
+    flow = system.stick_set(tuple([s == 0 for s in signs]), omega, unit)
+    held = tuple([s != 0 and flow.tied[c] and c in resting for c, s in enumerate(signs)])
+    given, orders = signs * (np.where(held, system.static, system.kinetic) if any(held) else system.kinetic), {}
+    full, weight = entry.under(system, given)
     for c in resting:
         if held[c]:
             continue
@@ -190,7 +187,7 @@ def _judge(system, entry, signs, resting, omega, unit, noise) -> Choice | None:
                 return None
             if order and lead > 0:
                 orders[c, side] = order
-    return Choice(signs, held, forces, orders)
+    return Choice(signs, held, given, orders)
 
 
 def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int, noise: float, last: int = 8) -> tuple:
@@ -212,7 +209,7 @@ def _by_squares(system, entry, signs, resting):
     rest = list(resting)
     faces, limit = system.faces[rest], system.static[rest]
     moving = [0 if c in resting else s for c, s in enumerate(signs)]
-    pull = entry.under(system, moving, system.kinetic)[0][system.n:2 * system.n]
+    pull = entry.under(system, moving * system.kinetic)[0][system.n:2 * system.n]
     large, fixed = np.abs(faces) @ np.abs(pull) + np.abs(faces @ faces.T) @ limit / system.mass, {}
     for _ in range(4 * len(rest)):
         force = _forces(faces, system.mass, pull, limit, {k: s * system.kinetic[rest[k]] for k, s in fixed.items()})

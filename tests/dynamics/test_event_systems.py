@@ -224,7 +224,7 @@ def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
         assert ratio < 1  # with static above kinetic friction there may be no such state
         return
     flow = system.stick_set(tuple(s == 0 for s in choice.signs), 1.0, 0.3)
-    full, _ = entry.under(system, choice.signs, choice.forces)
+    full, _ = entry.under(system, choice.given)
     accel = rows @ (flow.motion[2] @ full) * 2 / 0.09
     for c, sign in enumerate(choice.signs):
         if sign:
