@@ -11,7 +11,7 @@ from math import cos
 
 import numpy as np
 
-from ..core import ModalBasis, NotConverged, Start, frozen_array
+from ..core import ModalBasis, NotConverged, PatchfemError, Start, frozen_array
 from .batches import gather, turning_points, values_at
 from .engine import Engine
 from .signals import ORDER
@@ -130,8 +130,10 @@ def steady(modes: ModalBasis, drive, static, kinetic, start: Start | None = None
     """Periodic response to a sine from rest or `start`, after `cycles` of a run that bring it near.
 
     drive: one Segment of a sine; static, kinetic [N]: one or (i,). Newton's method on the period map; where it leads
-    away, more cycles are run. NotConverged where neither settles.
+    away, more cycles are run. NotConverged where neither settles, PatchfemError for a drive that does not repeat.
     """
+    if len(drive.segments) != 1:
+        raise PatchfemError("drive: a periodic response needs one sine that goes on; march this one")
     n = modes.omega.size
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
     state, used = _after(modes, drive, static, kinetic, begin, cycles), 0

@@ -7,7 +7,8 @@ import pytest
 from test_event_systems import basis_of, random_basis
 
 from patchfem import closed_forms
-from patchfem.core import BaseSine, Start
+from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.dynamics import drives
 from patchfem.dynamics.histories import simulate
 from patchfem.dynamics.steady_events import period_map, steady
 
@@ -55,6 +56,15 @@ def test_table_check_8_knee(hertz, knee):
     assert regimes == ["2 stops", "sliding"]
 
 
+@pytest.mark.parametrize("side", [1e-3, 1e-4])
+def test_exact_both_sides_of_pi_over_four(side):
+    over, under = pi / 4 + side, pi / 4 - side
+    found = steady(basis_of(1.0), BaseSine(1.0, 1.0), over, over)
+    assert found.regime == "2 stops"
+    assert found.amplitude == pytest.approx(closed_forms.two_stop_amplitude(over), rel=1e-14 / side)
+    assert steady(basis_of(1.0), BaseSine(1.0, 1.0), under, under).regime == "unbounded"
+
+
 @pytest.mark.parametrize("d", [0.78, 0.6])
 def test_exact_unbounded_below_pi_over_four(d):
     assert steady(basis_of(1.0), BaseSine(1.0, 1.0), d, d).regime == "unbounded"
@@ -82,13 +92,32 @@ def test_exact_forty_steady_points_against_runs():
     compare_with_runs([(r, a) for r in np.linspace(0.3, 2.2, 10) for a in (1.1, 1.26, 1.6, 4.0)], 0.03, 400)
 
 
-def test_exact_many_stops_below_resonance():
+@pytest.mark.parametrize("level, ratio, wanted", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
+def test_exact_many_stops_below_resonance(level, ratio, wanted):
     """A slow drive: several stops per cycle, as the run counts them."""
-    modes, drive = basis_of(1.0, 0.0005), BaseSine(3.0, 0.11)
+    modes, drive = basis_of(1.0, 0.0005), BaseSine(level, ratio)
     found = steady(modes, drive, 1.0, 1.0)
     done = simulate(modes, drive, 1.0, 1.0, 80, 10)
     stops = np.count_nonzero((done.log.what == 0) & (done.log.time > 70 * drive.period)) / 10
-    assert found.stops == (stops,) and stops >= 4 and found.regime == f"{found.stops[0]} stops"
+    assert found.stops == (stops,) == (wanted,) and found.regime == f"{wanted} stops"
+    low, high = done.amplitudes[-1]
+    assert found.amplitude == pytest.approx((high - low) / 2, rel=1e-10)
+
+
+def test_exact_two_motions_at_one_level():
+    """Kinetic below static friction: at rest it stays, kicked it goes on sliding."""
+    modes, drive = basis_of(1.0, 0.05), BaseSine(0.9, 1.0)
+    rest = steady(modes, drive, 1.0, 0.3)
+    moving = steady(modes, drive, 1.0, 0.3, Start(np.zeros(1), np.array([8.0])))
+    assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
+    wanted = 0.9 * closed_forms.sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
+    assert moving.amplitude == pytest.approx(wanted, rel=1e-11)
+    assert np.abs(moving.multipliers).max() < 1
+
+
+def test_refuses_drives_that_do_not_repeat():
+    with pytest.raises(PatchfemError, match="one sine that goes on"):
+        steady(basis_of(1.0), drives.levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
 
 
 def two_faces(seed=2, ratio=1.0):
