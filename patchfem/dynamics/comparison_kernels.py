@@ -227,8 +227,15 @@ def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_
     accel, new, scratch, half = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     speed, travel = np.empty(m), np.empty(m)
     stops = 0
+    accelerate(z[0], v[0], omega, dampers, faces, base, mass, drive[0], now, accel)
     for c in range(m):
         stuck[c] = laws[c, 0] == COULOMB and abs(dot(faces[c], v[0])) < laws[c, 3]
+        direction[c] = np.sign(dot(faces[c], v[0]))
+        hold = now[c] + dot(faces[c], accel) * mass / crossed[c, c]
+        if stuck[c] and by_force and abs(hold) > laws[c, 1]:
+            stuck[c], direction[c] = False, np.sign(hold)
+            force[c, 0] = laws[c, 2] * direction[c]
+    now[:] = force[:, 0]
     accelerate(z[0], v[0], omega, dampers, faces, base, mass, drive[0], now, accel)
     scratch[:] = v[0]
     arrest(stuck, faces, mass, crossed, scratch, accel, now)
@@ -244,7 +251,7 @@ def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_
             w = dot(faces[c], new)
             speed[c], travel[c] = dot(faces[c], half) + h / 2 * w, h * dot(faces[c], v[k]) \
                 + h * h / 4 * (dot(faces[c], accel) + w)
-            if not stuck[c]:
+            if not stuck[c] and k > 0:
                 direction[c] = np.sign(dot(faces[c], v[k]))
             now[c] = force[c, k]
         iterations[k + 1] = settle(laws, stuck, direction, speed, travel, soft_speed, soft_travel, force[:, k], now)

@@ -2,8 +2,9 @@
 
 A stuck interface is released when it needs more than its static friction. If it has not passed the stick speed v_th
 one step later it is stuck again: release takes 2 m v_th/h more than the kinetic friction, so that below a certain step
-nothing ever moves (by_force: a stop also asks whether the static friction suffices, which cures that). Every stop takes
-away a speed of up to v_th at once.
+nothing ever moves (by_force: a stop also asks whether the static friction suffices, which cures that; v_th of limit h/m
+then makes stick-slip of second order). Every stop takes away a speed of up to v_th at once. The sign of the sliding
+friction is that of the speed at the start of the step, so a reversal without stick is of first order.
 """
 
 import numpy as np
