@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError, Start
 
-MOST_STEPS = 20_000_000
+MOST_NUMBERS = 2e8  # kept by a run: 1.6 GB
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,21 +64,28 @@ def grid(modes: ModalBasis, drive, laws: np.ndarray, duration: float, steps_per_
          start: Start | None) -> Grid:
     """Equal steps of drive.period/steps_per_cycle over `duration` [s], the forces of the start in place.
 
-    PatchfemError for fewer than 4 steps per cycle, no step at all, too many, or a start of another size.
+    PatchfemError for fewer than 4 steps per cycle, no step at all, more than memory holds, a start that does not fit or
+    an interface that slides in no mode.
     """
+    n, i = modes.omega.size, len(laws)
     if steps_per_cycle < 4:
         raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are wanted")
     h = drive.period / steps_per_cycle
-    steps = round(duration / h) if np.isfinite(duration / h) else 0
-    if not 1 <= steps <= MOST_STEPS:
-        raise PatchfemError(f"a run of {duration:g} s in steps of {h:g} s takes {duration / h:.3g} of them; "
-                            f"1 to {MOST_STEPS} are possible: change drive.cycles or accuracy.steps_per_cycle")
-    n, i = modes.omega.size, len(laws)
+    most = MOST_NUMBERS / (2 * n + 2 * i + 3)
+    if not 0.5 < duration / h <= most:
+        raise PatchfemError(f"a run of {duration:g} s in steps of {h:g} s takes {duration / h:.3g} of them; 1 to "
+                            f"{most:.3g} are possible: change drive.cycles or accuracy.steps_per_cycle")
+    idle = np.flatnonzero(~np.any(modes.interfaces, axis=1))
+    if idle.size:
+        raise PatchfemError(f"interface {idle[0] + 1} slides in no mode: give it a mode with slide, or leave it out")
+    steps = round(duration / h)
     time = np.arange(steps + 1) * h
     z, v = np.zeros((steps + 1, n)), np.zeros((steps + 1, n))
     if start is not None:
         if np.shape(start.z) != (n,) or np.shape(start.v) != (n,):
             raise PatchfemError(f"a start needs {n} coordinates and {n} rates, one of each per mode")
+        if not np.all(np.isfinite([start.z, start.v])):
+            raise PatchfemError("a start needs finite coordinates and rates")
         z[0], v[0] = start.z, start.v
     values = np.ascontiguousarray(drive.values(time), float)
     found = Grid(h, time, values, z, v, np.zeros((i, steps + 1)), np.zeros((i, steps + 1)),

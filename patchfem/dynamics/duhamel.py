@@ -46,9 +46,9 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     """
     if convergence not in CRITERIA:
         raise PatchfemError(f"accuracy.convergence: '{convergence}' is none of {', '.join(CRITERIA)}")
-    if not tolerance > 0 or not 0 < relax <= 1 or most < 2:
+    if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
         raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: wanted "
-                            "are a tolerance > 0, 0 < relax <= 1 and at least 2 iterations")
+                            "are a finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations")
     from .comparison_kernels import duhamel_loop  # after compiled.load, which says where it is kept
 
     law = rows(laws, len(modes.interfaces))

@@ -155,9 +155,14 @@ def advancer(tolerance: float, size: float):
     return advance
 
 
+def counted(one: Problem, tolerance: float, longest: float) -> tuple:
+    """(slide, events) of scipy's DOP853 from event to event, no step longer than so many cycles."""
+    return follow(PROBLEMS[KIND[one.name]](**one.numbers), advancer(tolerance, one.size), one.times, longest)
+
+
 def dop853(one: Problem, tolerance: float) -> np.ndarray:
     """scipy's DOP853 from event to event."""
-    return follow(PROBLEMS[KIND[one.name]](**one.numbers), advancer(tolerance, one.size), one.times, one.longest)[0]
+    return counted(one, tolerance, one.longest)[0]
 
 
 KIND = {"decay": "block", "block": "block", "two": "two", "patch": "patch"}  # as `switched` names them

@@ -144,15 +144,19 @@ def test_exact_ledger_of_a_free_slide():
     (euler, {"steps_per_cycle": 2}, "steps_per_cycle"),
     (euler, {"duration": 1e12}, "drive.cycles"),
     (euler, {"start": Start(np.zeros(2), np.zeros(2))}, "1 coordinates"),
+    (euler, {"duration": np.nan}, "drive.cycles"),
+    (duhamel, {"tolerance": np.inf}, "convergence_tolerance"),
+    (newmark, {"start": Start(np.array([np.nan]), np.zeros(1))}, "finite"),
+    (duhamel, {"modes": basis([1.0], [0.0], [[0.0]], [1.0])}, "interface 1 slides in no mode"),
     (euler, {"laws": ()}, "0 friction laws for 1"),
     (newmark, {"laws": (Coulomb(1.0, 2.0),)}, "friction.kinetic"),
     (newmark, {"laws": (Tanh(1.0, 0.0),)}, "above zero"),
     (newmark, {"laws": (ElasticPlastic(-1.0, 1.0),)}, "above zero"),
 ])  # fmt: skip
 def test_refuses_what_cannot_be(method, values, word):
-    call = {"laws": (Coulomb(1.0, 1.0),), "duration": 10.0} | values
+    call = {"modes": PLAIN, "drive": UNIT, "laws": (Coulomb(1.0, 1.0),), "duration": 10.0} | values
     with pytest.raises(PatchfemError, match=word):
-        method.run(PLAIN, UNIT, **call)
+        method.run(**call)
 
 
 def said(found) -> str:
@@ -188,3 +192,14 @@ def test_exact_stick_speed_is_static_friction_that_grows(by_force, release_at):
     assert newmark.added_static(modes, modes.slide, 0.01, 0.01) == pytest.approx(2.0)
     found = newmark.run(modes, drive, (Coulomb(1.0, 1.0),), 4.0, 400, 0.01, by_force)
     assert found.time[np.argmax(found.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
+
+
+@pytest.mark.parametrize("by_force, order", [(True, 2), (False, 1)])
+def test_order_of_the_first_slide(by_force, order):
+    """Let go at 11.5 F/k: 1 + 10.5 cos t until t = pi. By speed alone the first step begins without acceleration."""
+    start, errors = Start(np.array([11.5]), np.zeros(1)), []
+    for steps in (200, 400):
+        found = newmark.run(PLAIN, release(2 * np.pi), (Coulomb(1.0, 1.0),), 3.0, steps, 1e-3, by_force, start)
+        assert found.force[0, 1] == -1.0
+        errors.append(np.abs(found.z[:, 0] - 1 - 10.5 * np.cos(found.time)).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
