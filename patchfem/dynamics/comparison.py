@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..core import ModalBasis, PatchfemError, Start
+from ..core import ModalBasis, PatchfemError, Response, Start
 
 MOST_NUMBERS = 2e8  # kept by a run: 1.6 GB
 
@@ -39,6 +39,16 @@ class Comparison:
         """Modal accelerations (k, n) [m s-2] from the equation of motion, relative to the base."""
         return -np.outer(self.drive, modes.base) - self.v @ modes.dampers.T - self.z * modes.omega**2 \
             - self.force.T @ modes.interfaces / modes.mass
+
+    def response(self, modes: ModalBasis, moving: bool = True) -> Response:
+        """Histories of every step, slide and force of the first interface; moving: the drive is that of the base.
+        `extra`: "forces" (i, k) [N], "residual" (i, k) [N], "iterations" (k,)."""
+        face = modes.interfaces[0]
+        accel = self.accelerations(modes) @ modes.output + (self.drive if moving else 0.0)
+        slide = self.z @ face
+        return Response(self.time, self.z, self.v, slide, self.v @ face, self.z @ modes.output, self.v @ modes.output,
+                        accel, self.drive, self.force[0], slide,
+                        {"forces": self.force, "residual": self.residual, "iterations": self.iterations})
 
     @property
     def worst(self) -> float:

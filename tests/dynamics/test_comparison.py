@@ -203,3 +203,18 @@ def test_order_of_the_first_slide(by_force, order):
         assert found.force[0, 1] == -1.0
         errors.append(np.abs(found.z[:, 0] - 1 - 10.5 * np.cos(found.time)).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+def test_exact_response_of_a_run():
+    """Histories as every engine hands them out: the absolute acceleration balances spring, damper and friction."""
+    found = newmark.run(COUPLED, DRIVE, (Coulomb(0.6, 0.5, 0.03), Tanh(0.4, 0.1)), 2 * DRIVE.period, 400)
+    out = found.response(COUPLED)
+    k = 300
+    own = -COUPLED.omega**2 * found.z[k] - COUPLED.damping @ found.v[k] \
+        - COUPLED.faces.T @ found.force[:, k] / COUPLED.mass - COUPLED.base * found.drive[k]
+    assert out.acceleration[k] == pytest.approx(own @ COUPLED.output + found.drive[k], abs=1e-12)
+    assert found.response(COUPLED, False).acceleration[k] == pytest.approx(own @ COUPLED.output, abs=1e-12)
+    assert out.slide == pytest.approx(COUPLED.faces[0] @ found.z.T)
+    middle = (out.slide[k + 1] - out.slide[k - 1]) / (found.time[k + 1] - found.time[k - 1])
+    assert middle == pytest.approx(out.slide_rate[k], abs=2e-3) and np.array_equal(out.force, found.force[0])
+    assert np.array_equal(out.extra["forces"], found.force) and not found.z.flags.writeable
