@@ -218,3 +218,16 @@ def test_exact_response_of_a_run():
     middle = (out.slide[k + 1] - out.slide[k - 1]) / (found.time[k + 1] - found.time[k - 1])
     assert middle == pytest.approx(out.slide_rate[k], abs=2e-3) and np.array_equal(out.force, found.force[0])
     assert np.array_equal(out.extra["forces"], found.force) and not found.z.flags.writeable
+
+
+def test_exact_forces_of_a_start():
+    """One interface slides and the other is held: the held one is given no acceleration, up to its limit."""
+    laws, v = rows((Coulomb(9.0, 9.0, 0.1), Tanh(0.3, 0.1)), 2), np.array([0.4, 0.7, 0.0])
+    z = np.array([0.2, -0.3, 0.1])
+    assert COUPLED.faces @ v == pytest.approx([0.0, 0.5])
+    force = first_forces(COUPLED, laws, 0.7, z, v)
+    accel = -COUPLED.base * 0.7 - COUPLED.omega**2 * z - COUPLED.damping @ v - COUPLED.faces.T @ force / COUPLED.mass
+    assert force[1] == pytest.approx(0.3 * np.tanh(5.0)) and COUPLED.faces[0] @ accel == pytest.approx(0.0, abs=1e-13)
+    laws[0, 1:3] = 0.01
+    assert first_forces(COUPLED, laws, 0.7, z, v)[0] == pytest.approx(0.01 * np.sign(force[0]))
+    assert first_forces(COUPLED, laws, 0.7, z, -v)[1] == pytest.approx(-0.3 * np.tanh(5.0))

@@ -137,3 +137,33 @@ def test_exact_two_masses(ratio, x1, x2):
     top = np.abs(found.z[-4001:]).max(axis=0)
     assert top == pytest.approx([x1, x2], rel=1e-3)
     assert found.ledger["error"] == pytest.approx(0.0, abs=2e-3 * found.ledger["work_in"])
+
+
+def two_masses(ratio):
+    """(modes, drive, run until it repeats) of (2.6, 2.7)."""
+    modes = basis([1.0, 1.0], [0.02, 0.02], [[-1.0, 1.0]], [0.0, -1.0])
+    drive = sine(ratio)
+    return modes, drive, newmark.run(modes, drive, (Tanh(0.1, 0.01),), np.ceil(500 / drive.period) * drive.period, 2000)
+
+
+def test_exact_two_masses_ring_slowly_driven():
+    """Fig 10: 14 turning points of x1 per cycle, its swings fall by exp(-pi zeta) each."""
+    _, drive, found = two_masses(0.1)
+    x = found.z[-2002:, 0]
+    turn = np.flatnonzero(np.diff(x)[1:] * np.diff(x)[:-1] < 0) + 1
+    assert turn.size == 14
+    high = np.roll(x[turn], -int(np.argmax(x[turn])))[:6]
+    assert high == pytest.approx([0.128, 0.0737, 0.1246, 0.0769, 0.1217, 0.0796], abs=1e-4)
+    assert np.abs(high - 0.1)[3:5] / np.abs(high - 0.1)[2:4] == pytest.approx(np.exp(-0.02 * np.pi), abs=3e-3)
+    slip = np.abs(found.v[-2000:] @ [-1.0, 1.0])
+    assert np.mean(slip > 0.01) == pytest.approx(0.787, abs=0.003)
+    assert drive.period == pytest.approx(62.832, abs=1e-3)
+
+
+def test_exact_two_masses_driven_fast():
+    """Omega = 5: the fundamental of x1 is (4 F0/pi)/(Omega^2 - 1)."""
+    _, drive, found = two_masses(5.0)
+    last = slice(-2000, None)
+    part = 2 * np.mean(found.z[last, 0] * np.exp(-1j * 2 * np.pi / drive.period * found.time[last]))
+    assert abs(part) == pytest.approx(0.4 / np.pi / 24, rel=0.01)
+    assert np.abs(found.z[last, 1]).max() == pytest.approx(0.0402, rel=0.01)
