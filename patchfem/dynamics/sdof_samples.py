@@ -1,0 +1,195 @@
+"""Samples, extremes and quadratures of many slips and sticks of one mode at once, from the rows of its events."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import ModalBasis, Response
+from .events import PANEL, WEIGHT
+from .sdof_kernels import REACH, TERMS, oscillator
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scene:
+    """One mode as the event engine has it: w, decay, friction (static, kinetic) over the mass, segments (s, 6), drive
+    force over the mass; slide and output per coordinate, mass, and what the drive's acceleration is."""
+
+    modes: ModalBasis
+    w: float
+    decay: float
+    friction: tuple
+    segments: np.ndarray
+    slide: float
+    output: float
+    drive: object
+
+    @property
+    def fastest(self) -> float:
+        """Largest angular frequency [rad/s]."""
+        return max(self.w, float(self.segments[:, 4].max()))
+
+
+def basis(u, mode, om) -> tuple:
+    """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `sdof_kernels.motion` in arrays."""
+    beta, alpha, decay, own, kind, _, _ = mode
+    co, so = np.cos(om * u), np.sin(om * u)
+    wave = co + 1j * so
+    if kind == 0:
+        own_wave = np.exp(complex(-decay, own) * u)
+        h = own_wave.imag / own
+        h1 = own_wave.real - decay * h
+        second = (wave - own_wave.conj()) / complex(decay, om + own)
+        gap = complex(decay, om - own)
+        if abs(gap) < own:
+            x = gap * u
+            near = np.abs(x) < REACH
+            first = np.empty_like(wave)
+            first[~near] = (wave[~near] - own_wave[~near]) / gap
+            x, part = x[near], np.ones(int(near.sum()), complex)
+            for k in range(13, 1, -1):
+                part = 1 + x * part / k
+            first[near] = u[near] * own_wave[near] * part
+            e = (first - second) / (2j * own)
+        else:
+            e = -(h - second) / gap
+    else:
+        fast = -(decay + own)
+        slow = beta / fast if kind == 1 and fast else fast
+        q = np.exp(fast * u)
+        h = -np.exp(slow * u) * np.expm1(-2 * own * u) / (2 * own) if kind == 1 else u * q
+        h1 = (0.5 * (np.exp(slow * u) + q) - decay * h if 2 * own < decay else
+              (slow * np.exp(slow * u) - fast * q) / (2 * own)) if kind == 1 else q - decay * h
+        e = (h - (wave - q) / complex(-fast, om)) / complex(slow, -om)
+    return h, h1, _step(u, mode, h, h1), e.real, e.imag
+
+
+def _step(u, mode, h, h1):
+    beta, alpha, decay, own, kind, _, _ = mode
+    fast = decay + own if kind else np.sqrt(beta)
+    short = fast * u < REACH
+    low = np.zeros_like(u)
+    high = out = u * u / 2
+    for k in range(1, TERMS if short.any() else 0):
+        low, high = high, -(alpha * u * (k + 1) * high + beta * u * u * low) / ((k + 1) * (k + 2))
+        out = out + high
+    if kind == 0:
+        return np.where(short, out, (1 - h1 - alpha * h) / beta)
+    if fast == 0:
+        return out
+    slow = -beta / fast
+    return np.where(short, out, ((np.expm1(slow * u) / slow if slow else u) - h) / fast)
+
+
+def _series(u, v0, g0, bc, bs, mode, om) -> tuple:
+    beta, alpha = mode[0], mode[1]
+    low, high = np.zeros_like(u), v0 * u
+    shift, speed = high, v0.copy()
+    drive, power, push, sine, cosine = g0, np.ones_like(u), g0, bc, -bs
+    for k in range(TERMS):
+        new = (push * u * u - alpha * u * (k + 1) * high - beta * u * u * low) / ((k + 1) * (k + 2))
+        low, high = high, new
+        shift = shift + new
+        speed = speed + (k + 2) * np.divide(new, u, out=np.zeros_like(u), where=u > 0)
+        power = power * om * u / (k + 1)
+        push = power * sine
+        drive = drive + push
+        sine, cosine = cosine, -sine
+    return shift, speed, drive - alpha * speed - beta * shift
+
+
+def _one(u, rows, scene, om) -> np.ndarray:
+    mode = oscillator(scene.w, scene.decay, om)
+    v0, g0, bc, bs = rows[:, 5], rows[:, 6], rows[:, 7], rows[:, 8]
+    out, short = np.empty((3, u.size)), u * mode[6] < REACH
+    if short.any():
+        out[:, short] = _series(u[short], v0[short], g0[short], bc[short], bs[short], mode, om)
+    far = ~short
+    if far.any():
+        v0, g0, bc, bs = v0[far], g0[far], bc[far], bs[far]
+        h, h1, one, c, s = basis(u[far], mode, om)
+        out[0, far] = v0 * h + g0 * one + bc * s - bs * (one - c)
+        out[1, far] = v0 * h1 + g0 * h + om * (bc * c - bs * s)
+        out[2, far] = g0 * h1 - v0 * (mode[1] * h1 + mode[0] * h) + om * (bc * (h - om * s) - bs * om * c)
+    return out
+
+
+def states(u, rows, scene: Scene) -> tuple:
+    """(z, v, z'') at times u (k,) after the starts of phases given by rows (k, 10)."""
+    z, v, gain = rows[:, 4].copy(), np.zeros(u.size), np.zeros(u.size)
+    moving = rows[:, 3] != 0
+    for om in np.unique(scene.segments[:, 4]):
+        mine = np.flatnonzero(moving & (scene.segments[rows[:, 9].astype(int), 4] == om))
+        if mine.size:
+            way = rows[mine, 3]
+            shift, speed, more = _one(u[mine], rows[mine], scene, om)
+            z[mine] += way * shift
+            v[mine], gain[mine] = way * speed, way * more
+    return z, v, gain
+
+
+def pull(u, rows, scene: Scene) -> tuple:
+    """(drive force over the mass, its rate) at times u (k,) after the starts of phases."""
+    s = scene.segments[rows[:, 9].astype(int)]
+    angle = rows[:, 1] + s[:, 4] * u
+    return s[:, 2] + s[:, 3] * np.sin(angle), s[:, 3] * s[:, 4] * np.cos(angle)
+
+
+def force(u, rows, scene: Scene):
+    """Friction force [N]: kinetic in slip, what holds the interface in stick."""
+    if scene.slide == 0 or scene.friction[0] == 0:
+        return np.zeros(u.size)
+    held = pull(u, rows, scene)[0] - scene.w**2 * rows[:, 4]
+    return np.where(rows[:, 3] == 0, held, rows[:, 3] * scene.friction[1]) * scene.modes.mass / scene.slide
+
+
+def response(time, z, v, gain, pushed, drive_force, scene: Scene) -> Response:
+    """The histories of a run from z, v, z'' (k,), friction `pushed` [N] and the drive's force over the mass."""
+    base = drive_force if scene.drive is None else scene.drive.values(time)
+    moving = base if getattr(scene.drive, "moving", True) else 0.0
+    slide = scene.slide * z
+    return Response(time, z[:, None], v[:, None], slide, scene.slide * v, scene.output * z, scene.output * v,
+                    scene.output * gain + moving, base, pushed, slide)
+
+
+def panels(low, high, fastest: float) -> tuple:
+    """(number of the interval, time, weight) of 12 Gauss points per panel of 1.5 rad over intervals [low, high] (k,)."""
+    count = np.maximum(1, np.ceil((high - low) * fastest / 1.5).astype(int))
+    owner = np.repeat(np.arange(count.size), count)
+    inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
+    half = 0.5 * ((high - low) / count)[owner]
+    at = low[owner] + 2 * half * inside
+    tau = at[:, None] + half[:, None] * (1 + PANEL)
+    return np.repeat(owner, PANEL.size), tau.ravel(), (half[:, None] * WEIGHT).ravel()
+
+
+def peak_acceleration(low, high, rows, scene: Scene) -> float:
+    """Largest |absolute acceleration| of the output over intervals [low, high] (k,) of phases, both ends included."""
+    count = np.maximum(5, np.ceil((high - low) * scene.fastest * 8).astype(int) + 1)
+    owner = np.repeat(np.arange(count.size), count)
+    inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
+    tau = low[owner] + (high - low)[owner] * inside / (count[owner] - 1)
+    value, rate, _ = _output_acceleration(tau, rows[owner], scene)
+    top = float(np.abs(value).max())
+    turn = np.flatnonzero((owner[:-1] == owner[1:]) & (rate[:-1] * rate[1:] < 0)
+                          & (np.maximum(np.abs(value[:-1]), np.abs(value[1:])) >= 0.9 * top))
+    if not turn.size:
+        return top
+    a, b = tau[turn], tau[turn + 1]
+    t, mine = a - rate[turn] * (b - a) / (rate[turn + 1] - rate[turn]), rows[owner[turn]]
+    for _ in range(6):
+        _, slope, bend = _output_acceleration(t, mine, scene)
+        t = np.clip(t - np.divide(slope, bend, out=np.zeros_like(t), where=bend != 0), a, b)
+    return max(top, float(np.abs(_output_acceleration(t, mine, scene)[0]).max()))
+
+
+def _output_acceleration(u, rows, scene: Scene) -> tuple:
+    _, v, gain = states(u, rows, scene)
+    drive, rate = pull(u, rows, scene)
+    alpha, beta, om = 2 * scene.decay, scene.w**2, scene.segments[rows[:, 9].astype(int), 4]
+    second = -om * om * (drive - scene.segments[rows[:, 9].astype(int), 2])
+    slips = rows[:, 3] != 0
+    jerk = np.where(slips, rate - alpha * gain - beta * v, 0.0)
+    snap = np.where(slips, second - alpha * jerk - beta * gain, 0.0)
+    share = -1 / scene.modes.base[0] if getattr(scene.drive, "moving", True) and scene.modes.base[0] else 0.0
+    return (scene.output * gain + share * drive, scene.output * jerk + share * rate,
+            scene.output * snap + share * second)
