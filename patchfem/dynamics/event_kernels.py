@@ -8,8 +8,9 @@ from numba import njit
 from . import sdof_kernels as plain
 from .kernels import LEAN
 
-INNER = ("oscillator", "series", "step_answer", "motion", "first_leap", "_free", "leap", "bend", "over_bend", "stop",
-         "need_slopes", "release", "crossing", "_turn", "closed_books", "book_slip", "note", "note_slip", "_keep", "begin", "enter")
+INNER = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_bend",
+         "stop", "need_slopes", "release", "crossing", "_turn", "closed_books", "book_slip", "note", "note_stick",
+         "note_slip", "_keep", "begin", "enter")
 
 
 def compiled_copy(module, inner, outer, scope=None):
@@ -24,17 +25,17 @@ def compiled_copy(module, inner, outer, scope=None):
     return scope
 
 
-_SCOPE = compiled_copy(plain, INNER, ("march",))
-motion, stop, release, begin, oscillator = (_SCOPE[name] for name in ("motion", "stop", "release", "begin",
+SCOPE = compiled_copy(plain, INNER, ("march",))
+motion, stop, release, begin, oscillator = (SCOPE[name] for name in ("motion", "stop", "release", "begin",
                                                                      "oscillator"))
-march, enter = _SCOPE["march"], _SCOPE["enter"]
+march, enter = SCOPE["march"], SCOPE["enter"]
 
 
 @njit(error_model="numpy", cache=True)
 def batch(table, cycles, last, amplitude, books, ends):
-    """Runs under one sine each, from rest or not. table (n, 9): w, decay, static, kinetic (over the mass), B, om, push, z,
-    v at t = 0. amplitude (n, 2): least and largest z of the `last` cycles; books (n, 6) as in `march`; ends (n, 2): z
-    and v at the end. Returns the worst code of `march`."""
+    """Runs under one sine each, from rest or not. table (n, 9): w, decay, static, kinetic (over the mass), B, om, push,
+    and z, v at t = 0. amplitude (n, 2): least and largest z of the `last` cycles; books (n, 6) as in `march`; ends
+    (n, 2): z and v at the end. Returns the worst code of `march`."""
     worst, none = 1, np.empty((0, 10))
     state, segments = np.empty(9), np.empty((1, 6))
     extremes = np.empty((int(cycles), 2))
@@ -46,7 +47,8 @@ def batch(table, cycles, last, amplitude, books, ends):
         extremes[:, 0], extremes[:, 1] = np.inf, -np.inf
         books[n] = 0.0
         enter(state, segments, 0, 0.0, 0.0, z, v, 1.0, static, kinetic, w * w)
-        code, _ = march((w, decay), (static, kinetic), segments, (per, np.inf, 1.0, 1.0), state, none, extremes, books[n])
+        code, _ = march((w, decay), (static, kinetic), segments, (per, np.inf, 1.0, 1.0), state, none, extremes,
+                        books[n])
         amplitude[n, 0] = np.min(extremes[-last:, 0])
         amplitude[n, 1] = np.max(extremes[-last:, 1])
         ends[n, 0], ends[n, 1] = state[3], state[4]

@@ -1,6 +1,5 @@
-"""One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in segments.
-
-Short scenes run as plain Python (no compiled code is loaded), long ones compiled: about 60 and 2 microseconds per cycle.
+"""One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in
+segments. Short scenes run as plain Python (no compiled code is loaded), long ones compiled.
 """
 
 from itertools import pairwise
@@ -11,7 +10,7 @@ import numpy as np
 from ..core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start
 from . import sdof_kernels
 from .histories import SAMPLES, EventRun
-from .sdof_samples import Scene, force, panels, peak_acceleration, pull, response, states
+from .sdof_samples import Scene, force, panels, peak_acceleration, response, states
 
 COMPILED_FROM = 8000  # cycles: loading numba and the cached code costs about 0.7 s, plain Python 90 us per cycle
 CHUNK = 4096  # events held at once beside those of the window
@@ -39,7 +38,8 @@ def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: 
         if end <= part.start:
             continue
         if part.amplitude == 0 or part.omega == 0:
-            table.append((part.start, end, -base * (part.constant + part.amplitude * np.sin(part.phase)), 0.0, clock, 0.0))
+            held = part.constant + part.amplitude * np.sin(part.phase)
+            table.append((part.start, end, -base * held, 0.0, clock, 0.0))
         else:
             table.append((part.start, end, -base * part.constant, -base * part.amplitude, part.omega,
                           part.phase % (2 * pi)))
@@ -102,7 +102,7 @@ class _Run:
     def take(self, rows) -> None:
         """Sum what a chunk of phases adds."""
         scene, beta = self.scene, self.scene.w**2
-        z, v, _ = states(0.5 * rows[:, 2], rows, scene)
+        z, v, _ = states(0.5 * rows[:, 2], rows, np.arange(len(rows)), scene)
         self.peak = max(self.peak, float((v * v + beta * z * z).max()),
                         float((rows[:, 5]**2 + beta * rows[:, 4]**2).max()))
         self._add_phasors(rows)
@@ -121,7 +121,7 @@ class _Run:
             return
         time = number * per
         owner = np.maximum(np.searchsorted(rows[:, 0], time + 1e-9 * per, side="right") - 1, 0)
-        z, _, _ = states(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows[owner], self.scene)
+        z, _, _ = states(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.scene)
         turn = np.exp(-2j * pi * np.arange(64) / 64)[number % 64] * (self.scene.output / 32)
         np.add.at(self.phasors, np.minimum(number // 64, len(self.phasors) - 1), z * turn)
 
@@ -134,15 +134,16 @@ class _Run:
         rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > first)]
         low, high = np.maximum(rows[:, 0], first) - rows[:, 0], np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0]
         owner, tau, weight = panels(low, high, scene.fastest)
-        z, v, _ = states(tau, rows[owner], scene)
-        loop = (rows[owner, 0] + tau, weight, scene.slide * z, scene.slide * v, force(tau, rows[owner], scene))
+        z, v, _ = states(tau, rows, owner, scene)
+        loop = (rows[owner, 0] + tau, weight, scene.slide * z, scene.slide * v, force(tau, rows, owner, scene))
         stored = 0.5 * mass * (self.state[4]**2 + scene.w**2 * self.state[3]**2)
         book = dict(zip(("work_in", "viscous", "power", "friction"), (mass * self.book[:4]).tolist()))
         book |= {"stored": float(stored), "peak_stored": max(0.5 * mass * self.peak, float(stored))}
         seen = np.isfinite(self.extremes[:, 0])
         amplitudes = np.sort(scene.output * self.extremes[seen], axis=1)
-        return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome,
-                        1 if scene.friction[0] == 0 else int(self.book[4]), loop, float((high - low)[rows[:, 3] == 0].sum()),
+        count = 1 if scene.friction[0] == 0 else int(self.book[4])
+        stuck = float((high - low)[rows[:, 3] == 0].sum())
+        return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
                         self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period)
 
     def _starts(self, first: float):
@@ -155,19 +156,20 @@ class _Run:
         rows, scene = self.recent, self.scene
         grid = np.linspace(first, end, max(2, round((end - first) / self.period * SAMPLES) + 1))
         events = rows[(rows[:, 0] > first) & (rows[:, 0] < end), 0] if scene.friction[0] > 0 else np.empty(0)
-        time = np.unique(np.concatenate([grid, events, np.nextafter(events, -np.inf)]))
+        time = np.sort(np.concatenate([grid, events, np.nextafter(events, -np.inf)]))
+        time = time[np.concatenate([[True], np.diff(time) > 0])]
         owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)
-        tau, mine = np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows[owner]
-        return response(time, *states(tau, mine, scene), force(tau, mine, scene), pull(tau, mine, scene)[0], scene)
+        tau = np.clip(time - rows[owner, 0], 0.0, rows[owner, 2])
+        return response(time, *states(tau, rows, owner, scene), force(tau, rows, owner, scene), scene)
 
     def _with_corners(self, wide: Response, first: float) -> Response:
         rows = np.concatenate(self.corners)[:CORNERS]
         rows = rows[rows[:, 0] < first]
         if not len(rows):
             return wide
-        tau = np.zeros(len(rows))
-        early = response(rows[:, 0].copy(), *states(tau, rows, self.scene), force(tau, rows, self.scene),
-                         pull(tau, rows, self.scene)[0], self.scene)
+        tau, owner = np.zeros(len(rows)), np.arange(len(rows))
+        early = response(rows[:, 0].copy(), *states(tau, rows, owner, self.scene),
+                         force(tau, rows, owner, self.scene), self.scene)
         names = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
                  "base_acceleration", "force", "slip")
         return Response(*(np.concatenate([getattr(early, k), getattr(wide, k)]) for k in names))

@@ -2,10 +2,10 @@
 short scene and compiled (`event_kernels`) for long ones.
 
 Between events z'' + alpha z' + beta z = g0 + bc sin(om u) - bs (1 - cos(om u)), u from the start of the phase. Its
-solution is written in divided differences of exp at the two free rates and i om, so that resonance, no damping, critical
-damping and a rigid mode are no special cases, and by its power series for short times, so that nothing cancels at a
-grazing onset. The end of a slip is found by steps that a bound on the fourth derivative of the speed proves free of
-roots.
+solution is written in divided differences of exp at the two free rates and i om, so that resonance, no damping,
+critical damping and a rigid mode are no special cases, and by its power series for short times, so that nothing cancels
+at a grazing onset. The end of a slip is found by steps that a bound on the fourth derivative of the speed proves free
+of roots.
 
 `o` below: (beta, alpha, decay, own, kind, om, top) of `oscillator`.
 """
@@ -23,8 +23,8 @@ FULL, DONE, TRAVEL, LOST, PILED = 0, 1, 2, 3, 4
 
 
 def oscillator(w, decay, om):
-    """(beta, alpha, decay, own, kind, om, top) of a natural frequency w and decay = xi w, or half a rigid mode's damping
-    [1/s]; kind 0 below critical damping, 1 above, 2 at it."""
+    """(beta, alpha, decay, own, kind, om, top) of a natural frequency w and decay = xi w, or half a rigid mode's
+    damping [1/s]; kind 0 below critical damping, 1 above, 2 at it."""
     if decay == w:
         return w * w, 2 * decay, decay, 0.0, 2.0, om, max(w, om)
     own = sqrt(abs((w - decay) * (w + decay)))
@@ -73,10 +73,14 @@ def step_answer(u, o, h, h1):
 
 def motion(u, v0, g0, bc, bs, o):
     """(shift, speed, acceleration) at u after the start of a phase with speed v0."""
+    return moved(u, cos(o[5] * u), sin(o[5] * u), v0, g0, bc, bs, o)
+
+
+def moved(u, co, so, v0, g0, bc, bs, o):
+    """The same with the cosine and sine of om u at hand."""
     beta, alpha, decay, own, kind, om, top = o
     if u * top < REACH:
         return series(u, v0, g0, bc, bs, o)
-    co, so = cos(om * u), sin(om * u)
     if kind == 0.0:
         e = exp(-decay * u)
         ec, es = e * cos(own * u), e * sin(own * u)
@@ -137,37 +141,41 @@ def first_leap(a, j, k, m, h):
 
 def leap(v, a, j, k, m, h):
     """Largest time up to h up to which v + a u + j u^2/2 + k u^3/6 - m u^4/24 is sure to stay positive, v > 0."""
-    if v + h * (min(a, 0.0) + h / 2 * (min(j, 0.0) + h / 3 * (min(k, 0.0) - m * h / 4))) > 0.0:
+    low = -0.25 * m * h + (k if k < 0.0 else 0.0)
+    low = low * h / 3 + (j if j < 0.0 else 0.0)
+    if v + h * (low * h / 2 + (a if a < 0.0 else 0.0)) > 0.0:
         return h
     s, value, slope, window = 0.0, v, a, h
     for _ in range(60):
-        end = min(s + window, h)
+        end = s + window if s + window < h else h
         x = _free(value, slope, j, k, m, s, end)
         if x < 0.25 * (end - s):
             end = s + 2 * x
-            x = min(_free(value, slope, j, k, m, s, end), end - s)
+            x = _free(value, slope, j, k, m, s, end)
         window = 2 * (end - s)
         s += x
         if s >= h:
             return h
         value = v + s * (a + s / 2 * (j + s / 3 * (k - m * s / 4)))
         slope = a + s * (j + s / 2 * (k - m * s / 3))
-        if value <= 1e-9 * v or x <= 1e-3 * s:
+        if value <= 0.01 * m * s * s * s * s or value <= 1e-9 * v or x <= 1e-3 * s:
             return s
     return s
 
 
 def _free(value, slope, j, k, m, s, end):
     """Time without a root from s on, at most end - s, from the least curvature on [s, end]."""
-    curve = min(j + s * (k - m * s / 2), j + end * (k - m * end / 2))
     if value <= 0.0:
         return 0.0
+    curve, other = j + s * (k - m * s / 2), j + end * (k - m * end / 2)
+    if other < curve:
+        curve = other
     inside = slope * slope - 2 * curve * value
     if curve >= 0.0 and (slope >= 0.0 or inside <= 0.0):
         return end - s
     root = sqrt(inside)
     x = 2 * value / (root - slope) if slope < 0.0 else (slope + root) / -curve
-    return min(x, end - s)
+    return x if x < end - s else end - s
 
 
 def bend(v, a, size, h, o):
@@ -199,10 +207,10 @@ def stop(v0, g0, bc, bs, o, limit):
     """First time in (0, limit] at which the speed, positive just after 0, is back at zero; -1 if none, -2 if lost."""
     beta, alpha, om = o[0], o[1], o[5]
     size = hypot(bc, bs)
-    scale = max(sqrt(beta), 2 * alpha if o[4] != 1.0 else -0.0)
+    free = alpha if o[4] != 1.0 else 0.0
+    stride = 1.1 / (free + sqrt(free * free + 1.1 * beta)) if beta + free > 0.0 else inf
     if size > 0.0:
-        scale = max(scale, om)
-    stride = 0.7 / scale if scale > 0.0 else inf
+        stride = min(stride, 1.0 / om)
     u, v, a, co, so, peak = 0.0, v0, g0 - alpha * v0, 1.0, 0.0, 0.0
     for _ in range(200000):
         j = om * (bc * co - bs * so) - alpha * a - beta * v
@@ -224,8 +232,8 @@ def stop(v0, g0, bc, bs, o, limit):
         if u + s == u:
             return u
         u += s
-        _, v, a = motion(u, v0, g0, bc, bs, o)
         co, so = cos(om * u), sin(om * u)
+        _, v, a = moved(u, co, so, v0, g0, bc, bs, o)
     return -2.0
 
 
@@ -337,34 +345,46 @@ def _turn(theta, push, b):
     return best
 
 
-def note(extremes, first, last, low, high):
-    """Widen the extremes of the cycles first..last to hold low and high."""
-    last = min(last, extremes.shape[0] - 1)
-    for k in range(max(min(first, last), 0), last + 1):
-        extremes[k, 0] = min(extremes[k, 0], low)
-        extremes[k, 1] = max(extremes[k, 1], high)
+def note(extremes, k, low, high):
+    """Widen the extremes of cycle k to hold low and high."""
+    if 0 <= k < extremes.shape[0]:
+        if low < extremes[k, 0]:
+            extremes[k, 0] = low
+        if high > extremes[k, 1]:
+            extremes[k, 1] = high
+
+
+def note_stick(extremes, position, cycles, z):
+    """Extremes of a stick of some cycles that starts at a position [cycles]."""
+    first = int(position + 1e-12)
+    last = max(first, int(position + cycles - 1e-12))
+    for k in range(first, min(last, extremes.shape[0] - 1) + 1):
+        note(extremes, k, z, z)
 
 
 def note_slip(extremes, position, per, z, direction, v0, g0, bc, bs, span, shift, o):
     """Extremes of z per cycle over a slip; position [cycles] of its start, per [s] of a cycle."""
-    first, last = int(position + 1e-12), int(position + span / per - 1e-12)
-    z0 = z
+    first, last, z0 = int(position + 1e-12), int(position + span / per - 1e-12), z
     for k in range(first, last):
         z1 = z + direction * motion((k + 1 - position) * per, v0, g0, bc, bs, o)[0]
-        note(extremes, k, k, min(z0, z1), max(z0, z1))
+        note(extremes, k, min(z0, z1), max(z0, z1))
         z0 = z1
     z1 = z + direction * shift
-    note(extremes, max(first, last), max(first, last), min(z0, z1), max(z0, z1))
+    if direction > 0.0:
+        note(extremes, max(first, last), z0, z1)
+    else:
+        note(extremes, max(first, last), z1, z0)
 
 
 def march(mode, friction, segments, clock, state, rows, extremes, book):
     """Run from event to event until the end, or until `rows` are full. Returns (code, rows used).
 
-    mode: (w, decay); friction: (static, kinetic) over the mass; segments (s, 6): start, end, push, B, om, phase, drive
-    force over the mass push + B sin(om (t - start) + phase). clock: (cycle's length, largest |z|, 1: write over the
-    rows from the first on when they are full, 0: without work in, viscous loss and |power in|). state (9): segment, turns, phase, z, v, direction, g0, bc, bs at the
-    next phase; code 0 full, 1 done, 2 beyond the travel, 3 an event was lost, 4 events pile up. rows (r, 10), extremes
-    (c, 2) of z per cycle, book (6) over the mass: work in, viscous loss, |power in|, friction work, events, idle.
+    mode: (w, decay); friction: (static, kinetic) over the mass. segments (s, 6): start, end, push, B, om, phase of the
+    drive's force over the mass, push + B sin(om (t - start) + phase). clock: (cycle's length, largest |z|, 1: write
+    over the rows from the first on when they are full, 0: without work in, viscous loss and |power in|). state (9):
+    segment, turns, phase, z, v, direction, g0, bc, bs at the next phase. Codes: 0 full, 1 done, 2 beyond the largest
+    |z|, 3 an event was lost, 4 events pile up. rows (r, 10), extremes (c, 2) of z per cycle, book (6) over the mass:
+    work in, viscous loss, |power in|, friction work; events; phases of no length in a row.
     """
     static, kinetic = friction[0], friction[1]
     per, far, ring = clock[0], clock[1], clock[2]
@@ -413,7 +433,7 @@ def march(mode, friction, segments, clock, state, rows, extremes, book):
                 row[5], row[6], row[7], row[8], row[9] = v, g0, bc, bs, s
             if extremes.shape[0]:
                 if direction == 0.0:
-                    note(extremes, int(time / per + 1e-12), int((time + span) / per - 1e-12), z, z)
+                    note_stick(extremes, time / per, span / per, z)
                 else:
                     note_slip(extremes, time / per, per, z, direction, v, g0, bc, bs, span, shift, o)
             count += 1

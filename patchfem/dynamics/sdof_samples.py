@@ -31,9 +31,8 @@ class Scene:
 
 def basis(u, mode, om) -> tuple:
     """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `sdof_kernels.motion` in arrays."""
-    beta, alpha, decay, own, kind, _, _ = mode
-    co, so = np.cos(om * u), np.sin(om * u)
-    wave = co + 1j * so
+    beta, _, decay, own, kind, _, _ = mode
+    wave = np.exp(1j * om * u)
     if kind == 0:
         own_wave = np.exp(complex(-decay, own) * u)
         h = own_wave.imag / own
@@ -97,15 +96,14 @@ def _series(u, v0, g0, bc, bs, mode, om) -> tuple:
     return shift, speed, drive - alpha * speed - beta * shift
 
 
-def _one(u, rows, scene, om) -> np.ndarray:
+def _one(u, rows, owner, scene, om) -> np.ndarray:
     mode = oscillator(scene.w, scene.decay, om)
-    v0, g0, bc, bs = rows[:, 5], rows[:, 6], rows[:, 7], rows[:, 8]
     out, short = np.empty((3, u.size)), u * mode[6] < REACH
     if short.any():
-        out[:, short] = _series(u[short], v0[short], g0[short], bc[short], bs[short], mode, om)
+        out[:, short] = _series(u[short], *(rows[owner[short], k] for k in (5, 6, 7, 8)), mode, om)
     far = ~short
     if far.any():
-        v0, g0, bc, bs = v0[far], g0[far], bc[far], bs[far]
+        v0, g0, bc, bs = (rows[owner[far], k] for k in (5, 6, 7, 8))
         h, h1, one, c, s = basis(u[far], mode, om)
         out[0, far] = v0 * h + g0 * one + bc * s - bs * (one - c)
         out[1, far] = v0 * h1 + g0 * h + om * (bc * c - bs * s)
@@ -113,38 +111,38 @@ def _one(u, rows, scene, om) -> np.ndarray:
     return out
 
 
-def states(u, rows, scene: Scene) -> tuple:
-    """(z, v, z'') at times u (k,) after the starts of phases given by rows (k, 10)."""
-    z, v, gain = rows[:, 4].copy(), np.zeros(u.size), np.zeros(u.size)
-    moving = rows[:, 3] != 0
-    for om in np.unique(scene.segments[:, 4]):
-        mine = np.flatnonzero(moving & (scene.segments[rows[:, 9].astype(int), 4] == om))
+def states(u, rows, owner, scene: Scene) -> tuple:
+    """(z, v, z'') at times u (k,) after the starts of the phases rows[owner], rows (p, 10), owner (k,)."""
+    z, v, gain = rows[owner, 4], np.zeros(u.size), np.zeros(u.size)
+    way, segment = rows[owner, 3], rows[owner, 9]
+    for om in {float(om) for om in scene.segments[:, 4]}:
+        mine = np.flatnonzero((way != 0) & (scene.segments[:, 4] == om)[segment.astype(int)])
         if mine.size:
-            way = rows[mine, 3]
-            shift, speed, more = _one(u[mine], rows[mine], scene, om)
-            z[mine] += way * shift
-            v[mine], gain[mine] = way * speed, way * more
+            shift, speed, more = _one(u[mine], rows, owner[mine], scene, om)
+            z[mine] += way[mine] * shift
+            v[mine], gain[mine] = way[mine] * speed, way[mine] * more
     return z, v, gain
 
 
-def pull(u, rows, scene: Scene) -> tuple:
-    """(drive force over the mass, its rate) at times u (k,) after the starts of phases."""
-    s = scene.segments[rows[:, 9].astype(int)]
-    angle = rows[:, 1] + s[:, 4] * u
-    return s[:, 2] + s[:, 3] * np.sin(angle), s[:, 3] * s[:, 4] * np.cos(angle)
+def pull(u, rows, owner, scene: Scene) -> tuple:
+    """(drive force over the mass, its first and second derivative) at times u (k,) after the starts of phases."""
+    _, _, push, b, om, _ = scene.segments[rows[owner, 9].astype(int)].T
+    angle = rows[owner, 1] + om * u
+    wave = b * np.sin(angle)
+    return push + wave, b * om * np.cos(angle), -om * om * wave
 
 
-def force(u, rows, scene: Scene):
+def force(u, rows, owner, scene: Scene):
     """Friction force [N]: kinetic in slip, what holds the interface in stick."""
     if scene.slide == 0 or scene.friction[0] == 0:
         return np.zeros(u.size)
-    held = pull(u, rows, scene)[0] - scene.w**2 * rows[:, 4]
-    return np.where(rows[:, 3] == 0, held, rows[:, 3] * scene.friction[1]) * scene.modes.mass / scene.slide
+    held, way = pull(u, rows, owner, scene)[0] - scene.w**2 * rows[owner, 4], rows[owner, 3]
+    return np.where(way == 0, held, way * scene.friction[1]) * (scene.modes.mass / scene.slide)
 
 
-def response(time, z, v, gain, pushed, drive_force, scene: Scene) -> Response:
-    """The histories of a run from z, v, z'' (k,), friction `pushed` [N] and the drive's force over the mass."""
-    base = drive_force if scene.drive is None else scene.drive.values(time)
+def response(time, z, v, gain, pushed, scene: Scene) -> Response:
+    """The histories of a run from z, v, z'' (k,) and the friction force `pushed` [N]."""
+    base = scene.drive.values(time)
     moving = base if getattr(scene.drive, "moving", True) else 0.0
     slide = scene.slide * z
     return Response(time, z[:, None], v[:, None], slide, scene.slide * v, scene.output * z, scene.output * v,
@@ -152,7 +150,7 @@ def response(time, z, v, gain, pushed, drive_force, scene: Scene) -> Response:
 
 
 def panels(low, high, fastest: float) -> tuple:
-    """(number of the interval, time, weight) of 12 Gauss points per panel of 1.5 rad over intervals [low, high] (k,)."""
+    """(number of the interval, time, weight) of 12 Gauss points per panel of 1.5 rad, intervals [low, high] (k,)."""
     count = np.maximum(1, np.ceil((high - low) * fastest / 1.5).astype(int))
     owner = np.repeat(np.arange(count.size), count)
     inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
@@ -168,26 +166,24 @@ def peak_acceleration(low, high, rows, scene: Scene) -> float:
     owner = np.repeat(np.arange(count.size), count)
     inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
     tau = low[owner] + (high - low)[owner] * inside / (count[owner] - 1)
-    value, rate, _ = _output_acceleration(tau, rows[owner], scene)
+    value, rate, _ = _output_acceleration(tau, rows, owner, scene)
     top = float(np.abs(value).max())
     turn = np.flatnonzero((owner[:-1] == owner[1:]) & (rate[:-1] * rate[1:] < 0)
                           & (np.maximum(np.abs(value[:-1]), np.abs(value[1:])) >= 0.9 * top))
     if not turn.size:
         return top
     a, b = tau[turn], tau[turn + 1]
-    t, mine = a - rate[turn] * (b - a) / (rate[turn + 1] - rate[turn]), rows[owner[turn]]
+    t, mine = a - rate[turn] * (b - a) / (rate[turn + 1] - rate[turn]), owner[turn]
     for _ in range(6):
-        _, slope, bend = _output_acceleration(t, mine, scene)
+        _, slope, bend = _output_acceleration(t, rows, mine, scene)
         t = np.clip(t - np.divide(slope, bend, out=np.zeros_like(t), where=bend != 0), a, b)
-    return max(top, float(np.abs(_output_acceleration(t, mine, scene)[0]).max()))
+    return max(top, float(np.abs(_output_acceleration(t, rows, mine, scene)[0]).max()))
 
 
-def _output_acceleration(u, rows, scene: Scene) -> tuple:
-    _, v, gain = states(u, rows, scene)
-    drive, rate = pull(u, rows, scene)
-    alpha, beta, om = 2 * scene.decay, scene.w**2, scene.segments[rows[:, 9].astype(int), 4]
-    second = -om * om * (drive - scene.segments[rows[:, 9].astype(int), 2])
-    slips = rows[:, 3] != 0
+def _output_acceleration(u, rows, owner, scene: Scene) -> tuple:
+    _, v, gain = states(u, rows, owner, scene)
+    drive, rate, second = pull(u, rows, owner, scene)
+    alpha, beta, slips = 2 * scene.decay, scene.w**2, rows[owner, 3] != 0
     jerk = np.where(slips, rate - alpha * gain - beta * v, 0.0)
     snap = np.where(slips, second - alpha * jerk - beta * gain, 0.0)
     share = -1 / scene.modes.base[0] if getattr(scene.drive, "moving", True) and scene.modes.base[0] else 0.0
