@@ -13,9 +13,10 @@ INNER = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap",
          "note_slip", "_keep", "begin", "enter")
 
 
-def compiled_copy(module, inner, outer, scope=None):
-    """Names of a module with its functions `inner` and `outer` compiled in that order; the module stays as it is."""
-    scope = dict(vars(module)) if scope is None else scope | vars(module)
+def compiled_copy(module, inner, outer, known=None):
+    """Names of a module with its functions `inner` and `outer` compiled in that order, which call each other and those
+    that are `known` by name; the module stays as it is."""
+    scope = dict(vars(module)) | (known or {})
     for name in (*inner, *outer):
         source = vars(module)[name]
         copy = FunctionType(source.__code__, scope, name, source.__defaults__)
@@ -26,8 +27,7 @@ def compiled_copy(module, inner, outer, scope=None):
 
 
 SCOPE = compiled_copy(plain, INNER, ("march",))
-motion, stop, release, begin, oscillator = (SCOPE[name] for name in ("motion", "stop", "release", "begin",
-                                                                     "oscillator"))
+COMPILED = {name: SCOPE[name] for name in INNER}
 march, enter = SCOPE["march"], SCOPE["enter"]
 
 
