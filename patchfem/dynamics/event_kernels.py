@@ -1,16 +1,18 @@
-"""Compiled events of one mode with one Coulomb interface: the arithmetic of `sdof_kernels`, and runs in batches."""
+"""Compiled events of one mode with one Coulomb interface: the arithmetic of `slip_kernels` and
+`sdof_kernels`, and runs in batches."""
 
 from types import FunctionType
 
 import numpy as np
 from numba import njit
 
-from . import sdof_kernels as plain
+from . import sdof_kernels, slip_kernels
 from .kernels import LEAN
 
-INNER = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_bend",
-         "stop", "need_slopes", "release", "crossing", "_turn", "closed_books", "book_slip", "note", "note_stick",
-         "note_slip", "_keep", "begin", "enter")
+SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_bend",
+        "stop")
+INNER = ("need_slopes", "release", "crossing", "_turn", "closed_books", "book_slip", "note", "note_stick", "note_slip",
+         "_keep", "begin")
 
 
 def compiled_copy(module, inner, outer, known=None):
@@ -26,9 +28,10 @@ def compiled_copy(module, inner, outer, known=None):
     return scope
 
 
-SCOPE = compiled_copy(plain, INNER, ("march",))
-COMPILED = {name: SCOPE[name] for name in INNER}
-march, enter = SCOPE["march"], SCOPE["enter"]
+_SLIP = compiled_copy(slip_kernels, SLIP, ())
+_EVENTS = compiled_copy(sdof_kernels, INNER, ("enter", "march"), {name: _SLIP[name] for name in SLIP})
+COMPILED = {name: _SLIP[name] for name in SLIP} | {name: _EVENTS[name] for name in INNER}
+march, enter = _EVENTS["march"], _EVENTS["enter"]
 
 
 @njit(error_model="numpy", cache=True)

@@ -1,6 +1,6 @@
 """One mode with one elastic-plastic (Jenkins) spring under a sine: exact map over half a period, and its fixed point.
 
-Elastic stretches and slips are both linear, so each is one closed form of `sdof_kernels`; the force is continuous, so
+Elastic stretches and slips are both linear, so each is one closed form of `slip_kernels`; the force is continuous, so
 the tangent jumps only in the spring's own share, which a yield forgets.
 """
 
@@ -9,7 +9,7 @@ from math import cos, inf, pi, sin
 import numpy as np
 
 from .orbit_kernels import impulse, sliding_guess
-from .sdof_kernels import first_leap, leap, motion, oscillator, stop
+from .slip_kernels import first_leap, leap, motion, oscillator, stop
 
 
 class Jenkins:

@@ -8,7 +8,8 @@ Non-Smooth Mechanical Systems, ch. 7).
 
 from math import atan2, inf, pi, sqrt
 
-from .sdof_kernels import REACH, TURN, begin, motion, oscillator, release, series, step_answer, stop
+from .sdof_kernels import TURN, begin, release
+from .slip_kernels import REACH, motion, oscillator, series, step_answer, stop
 
 OUT = 24  # of `flow`: z, v, direction, tangent (6), stuck angle, stops, slips, highest z (4), lowest z (4), releases
 STUCK, STOPS, SLIDING, UNBOUNDED, UNSETTLED = 0, 1, 2, 3, 4

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import ModalBasis, Response
 from .events import PANEL, WEIGHT
-from .sdof_kernels import REACH, TERMS, oscillator
+from .slip_kernels import REACH, TERMS, oscillator
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -30,7 +30,7 @@ class Scene:
 
 
 def basis(u, mode, om) -> tuple:
-    """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `sdof_kernels.motion` in arrays."""
+    """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `slip_kernels.motion` in arrays."""
     beta, _, decay, own, kind, _, _ = mode
     wave = np.exp(1j * om * u)
     if kind == 0:
