@@ -6,7 +6,7 @@ jumps a shift of the event's time becomes a shift of the speed (Leine, Nijmeijer
 Non-Smooth Mechanical Systems, ch. 7).
 """
 
-from math import atan2, inf, pi, sqrt
+from math import atan2, inf, nan, pi, sqrt
 
 from .sdof_kernels import TURN, begin, release
 from .slip_kernels import REACH, motion, oscillator, series, step_answer, stop
@@ -168,6 +168,21 @@ def settle(theta, z, v, halves, b, static, kinetic, o, out, phases):
     return (theta + ahead) % TURN, out[0], out[1], alive
 
 
+def recurrence(theta, z, v, b, static, kinetic, o, out, phases):
+    """After how many periods, at most 64, a state comes back to 1e-6 of the motion's size; 0 if after none, or if it
+    comes back turned over after half a period."""
+    now, speed, top = z, v, 0.0
+    for k in range(129):
+        if not flow(theta, now, speed, pi, b, static, kinetic, o, out, phases):
+            return 0
+        now, speed, theta = out[0], out[1], theta + pi
+        top = max(top, abs(now), abs(speed) / o[5], out[12], -out[16])
+        way = -1.0 if k == 0 else 1.0
+        if (k == 0 or k % 2 == 1) and max(abs(now - way * z), abs(speed - way * v) / o[5]) <= 1e-6 * top:
+            return (k + 1) // 2
+    return 0
+
+
 def point(w, decay, static, kinetic, b, om, z, v, patience, out, phases, found):
     """Steady motion under the force b sin(om t) over the mass, from the state (z, v) at phase 0.
 
@@ -198,13 +213,14 @@ def point(w, decay, static, kinetic, b, om, z, v, patience, out, phases, found):
         if not ok:
             break
         done += (halves + 1) // 2
-        for periods in range(9 if kinetic < static and done > 100 else 1):
-            sign = -1.0 if periods == 0 else 1.0
-            z1, v1, miss = newton(theta, z, v, pi if periods == 0 else TURN * periods, sign, b, static, kinetic, o, out,
-                                  phases, 10)
-            if miss <= 1e-12 and report(max(periods, 1), sign, out, phases, found, miss):
-                return
+        periods = 0 if kinetic == static or done <= 100 else recurrence(theta, z, v, b, static, kinetic, o, out, phases)
+        sign, angle = (-1.0, pi) if periods == 0 else (1.0, TURN * periods)
+        z1, v1, miss = newton(theta, z, v, angle, sign, b, static, kinetic, o, out, phases, 10)
+        near = kinetic == static or max(abs(z1 - z), abs(v1 - v) / om) <= 0.02 * max(out[12], -out[16])
+        if near and miss <= 1e-12 and report(max(periods, 1), sign, out, phases, found, miss):
+            return
         halves = 2 * max(4, done)
+    found[2] = nan
     found[0] = UNSETTLED
 
 

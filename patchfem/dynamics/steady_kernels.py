@@ -6,7 +6,7 @@ from numba import njit
 from . import orbit_kernels as plain
 from .event_kernels import COMPILED, compiled_copy
 
-INNER = ("impulse", "flow", "newton", "sliding_guess", "settle", "report")
+INNER = ("impulse", "flow", "newton", "sliding_guess", "settle", "report", "recurrence")
 SCOPE = compiled_copy(plain, INNER, ("point",), COMPILED)
 point = SCOPE["point"]
 
