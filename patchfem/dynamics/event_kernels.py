@@ -11,8 +11,8 @@ from .kernels import LEAN
 
 SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_bend",
         "stop")
-INNER = ("need_slopes", "release", "crossing", "_turn", "closed_books", "book_slip", "note", "note_stick", "note_slip",
-         "_keep", "begin")
+INNER = ("need_slopes", "release", "crossing", "_turn", "closed_books", "add", "book_slip", "note", "note_stick",
+         "note_slip", "_keep", "begin")
 
 
 def compiled_copy(module, inner, outer, known=None):
@@ -37,7 +37,7 @@ march, enter = _EVENTS["march"], _EVENTS["enter"]
 @njit(error_model="numpy", cache=True)
 def batch(table, cycles, last, amplitude, books, ends):
     """Runs under one sine each, from rest or not. table (n, 9): w, decay, static, kinetic (over the mass), B, om, push,
-    and z, v at t = 0. amplitude (n, 2): least and largest z of the `last` cycles; books (n, 6) as in `march`; ends
+    and z, v at t = 0. amplitude (n, 2): least and largest z of the `last` cycles; books (n, 10) as in `march`; ends
     (n, 2): z and v at the end. Returns the worst code of `march`."""
     worst, none = 1, np.empty((0, 10))
     state, segments = np.empty(9), np.empty((1, 6))

@@ -50,6 +50,7 @@ def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: 
 def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, window: int = 10,
              travel: float = inf, progress=None, start: Start | None = None, compiled: bool = False) -> EventRun:
     """Run `cycles` drive periods with friction forces [N] from rest or `start`; keeps the last `window` cycles whole.
+    The ledger's `stored` is what has been added since the start.
 
     compiled: by `event_kernels`, which must have been loaded through `patchfem.compiled`. The outcome is set only where
     the output passes `travel` [m]; the run ends there. PatchfemError as `scene_of`; NotConverged where an event could
@@ -68,6 +69,31 @@ def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: fl
     return run.collect()
 
 
+def events(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, start: Start | None = None,
+           compiled: bool = False, most: int = 100_000) -> np.ndarray:
+    """The first `most` events of a run: (k, 5) time [s], drive phase [rad], z [m], z' [m/s] and what begins there,
+    +-1 a slip, 0 a stick; the first row is the start. Errors as `simulate`."""
+    scene = scene_of(modes, drive, static, kinetic, cycles * drive.period)
+    engine = sdof_kernels
+    if compiled:
+        from . import event_kernels as engine
+    z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
+    rows, state, book = np.zeros((most, sdof_kernels.ROW)), np.zeros(9), np.zeros(10)
+    engine.enter(state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
+    code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, (drive.period, inf, 0.0, 0.0),
+                              state, rows, np.empty((0, 2)), book)
+    _check(code, rows[max(used - 1, 0), 0])
+    rows = rows[:used]
+    return np.column_stack([rows[:, :2], rows[:, 4], rows[:, 3] * rows[:, 5], rows[:, 3]])
+
+
+def _check(code: int, time: float) -> None:
+    if code == sdof_kernels.LOST:
+        raise NotConverged(f"dynamics: an event could not be located near t = {time:.9g} s")
+    if code == sdof_kernels.PILED:
+        raise NotConverged(f"dynamics: events pile up at t = {time:.9g} s")
+
+
 class _Run:
     """Events as they come, a chunk at a time: what is summed is summed, the rest is forgotten before the window."""
 
@@ -76,21 +102,19 @@ class _Run:
         number = int(np.ceil(cycles - 1e-9))
         self.extremes = np.tile([inf, -inf], (number, 1))
         self.phasors = np.zeros(number, complex)
-        self.book, self.peak, self.end = np.zeros(6), 0.0, self.duration
+        self.book, self.peak, self.begun, self.end = np.zeros(10), 0.0, 0.0, self.duration
         self.recent, self.corners, self.outcome, self.kept = np.empty((0, sdof_kernels.ROW)), [], None, 0
 
     def go(self, engine, z: float, v: float, far: float, progress) -> None:
         """All events from state (z, v)."""
         scene, rows, code = self.scene, np.zeros((CHUNK, sdof_kernels.ROW)), sdof_kernels.FULL
         self.state, clock = np.zeros(9), (self.period, far, 0.0, 1.0)
+        self.begun = 0.5 * scene.modes.mass * (v * v + scene.w**2 * z * z)
         engine.enter(self.state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
         while code == sdof_kernels.FULL:
             code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, clock, self.state, rows,
                                       self.extremes, self.book)
-            if code in (sdof_kernels.LOST, sdof_kernels.PILED):
-                at = f"t = {rows[max(used - 1, 0), 0]:.9g} s"
-                raise NotConverged(f"dynamics: an event could not be located near {at}" if code == sdof_kernels.LOST
-                                   else f"dynamics: events pile up at {at}")
+            _check(code, rows[max(used - 1, 0), 0])
             if used:
                 self.take(rows[:used].copy())
                 if progress is not None and code == sdof_kernels.FULL:
@@ -138,7 +162,7 @@ class _Run:
         loop = (rows[owner, 0] + tau, weight, scene.slide * z, scene.slide * v, force(tau, rows, owner, scene))
         stored = 0.5 * mass * (self.state[4]**2 + scene.w**2 * self.state[3]**2)
         book = dict(zip(("work_in", "viscous", "power", "friction"), (mass * self.book[:4]).tolist()))
-        book |= {"stored": float(stored), "peak_stored": max(0.5 * mass * self.peak, float(stored))}
+        book |= {"stored": float(stored) - self.begun, "peak_stored": max(0.5 * mass * self.peak, float(stored))}
         seen = np.isfinite(self.extremes[:, 0])
         amplitudes = np.sort(scene.output * self.extremes[seen], axis=1)
         count = 1 if scene.friction[0] == 0 else int(self.book[4])

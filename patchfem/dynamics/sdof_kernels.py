@@ -77,6 +77,14 @@ def closed_books(span, v0, a0, p0, q0, v1, a1, p1, q1, o):
     return work, loss / beta
 
 
+def add(book, k, value):
+    """Add to book[k]; book[6 + k] keeps what rounding drops (Kahan), so that a sum of millions keeps its digits."""
+    rest = value - book[6 + k]
+    total = book[k] + rest
+    book[6 + k] = (total - book[k]) - rest
+    book[k] = total
+
+
 def book_slip(span, direction, theta, push, b, v0, g0, bc, bs, shift, v1, a1, o, book):
     """Add a slip's work in, viscous loss and |power in|, all over the mass, to book[0:3]; v1, a1: at its end.
     push + b sin: force of the drive over the mass. By parts; by Gauss panels without spring or damping to divide by."""
@@ -107,9 +115,9 @@ def book_slip(span, direction, theta, push, b, v0, g0, bc, bs, shift, v1, a1, o,
                 v = motion(u, v0, g0, bc, bs, o)[1]
                 work += half * w * (direction * push + bs * cos(om * u) + bc * sin(om * u)) * v
                 loss += half * w * v * v * alpha
-        book[0] += work
-        book[1] += loss
-        book[2] += abs(work)
+        add(book, 0, work)
+        add(book, 1, loss)
+        add(book, 2, abs(work))
         at = end
 
 
@@ -163,8 +171,8 @@ def march(mode, friction, segments, clock, state, rows, extremes, book):
     drive's force over the mass, push + B sin(om (t - start) + phase). clock: (cycle's length, largest |z|, 1: write
     over the rows from the first on when they are full, 0: without work in, viscous loss and |power in|). state (9):
     segment, turns, phase, z, v, direction, g0, bc, bs at the next phase. Codes: 0 full, 1 done, 2 beyond the largest
-    |z|, 3 an event was lost, 4 events pile up. rows (r, 10), extremes (c, 2) of z per cycle, book (6) over the mass:
-    work in, viscous loss, |power in|, friction work; events; phases of no length in a row.
+    |z|, 3 an event was lost, 4 events pile up. rows (r, 10), extremes (c, 2) of z per cycle, book (10) over the mass:
+    work in, viscous loss, |power in|, friction work; events; phases of no length in a row; rounding of the first four.
     """
     static, kinetic = friction[0], friction[1]
     per, far, ring = clock[0], clock[1], clock[2]
@@ -204,7 +212,7 @@ def march(mode, friction, segments, clock, state, rows, extremes, book):
                 if abs(z + direction * shift) > far:
                     span, code = crossing(z, far, direction, v, g0, bc, bs, span, o), TRAVEL
                     shift, speed, gain = motion(span, v, g0, bc, bs, o)
-                book[3] += kinetic * shift
+                add(book, 3, kinetic * shift)
                 if clock[3] != 0.0:
                     book_slip(span, direction, theta, push, b, v, g0, bc, bs, shift, speed, gain, o, book)
             if size:

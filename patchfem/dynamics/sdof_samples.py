@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import ModalBasis, Response
-from .events import PANEL, WEIGHT
 from .slip_kernels import REACH, TERMS, oscillator
+
+PANEL, WEIGHT = np.polynomial.legendre.leggauss(12)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
