@@ -123,6 +123,9 @@ def book_slip(span, direction, theta, push, b, v0, g0, bc, bs, shift, v1, a1, o,
 
 def _turn(theta, push, b):
     """Angle to the next zero of push + b sin, more than 1e-9 ahead."""
+    if push == 0.0:
+        ahead = pi - theta % pi
+        return ahead if ahead > 1e-9 else pi
     first = -atan2(push / b, sqrt(max(1.0 - (push / b)**2, 0.0)))
     best = TURN
     for zero in (first, pi - first):

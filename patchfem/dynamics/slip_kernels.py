@@ -112,7 +112,7 @@ def moved(u, co, so, v0, g0, bc, bs, o):
         yr, yi = (-(co - q) * fast + so * om) / size, (-so * fast - (co - q) * om) / size
         size = slow * slow + om * om
         c, s = ((h - yr) * slow + yi * om) / size, (-yi * slow + (h - yr) * om) / size
-    one = step_answer(u, o, h, h1)
+    one = (1.0 - h1 - alpha * h) / beta if kind == 0.0 and beta * u * u > 0.1 else step_answer(u, o, h, h1)
     return (v0 * h + g0 * one + bc * s - bs * (one - c),
             v0 * h1 + g0 * h + om * (bc * c - bs * s),
             g0 * h1 - v0 * (alpha * h1 + beta * h) + om * (bc * (h - om * s) - bs * om * c))
@@ -138,7 +138,7 @@ def leap(v, a, j, k, m, h):
     low = low * h / 3 + (j if j < 0.0 else 0.0)
     if v + h * (low * h / 2 + (a if a < 0.0 else 0.0)) > 0.0:
         return h
-    s, value, slope, window = 0.0, v, a, h
+    s, value, slope, window = 0.0, v, a, -v / a if a * h < -v else h
     for _ in range(60):
         end = s + window if s + window < h else h
         x = _free(value, slope, j, k, m, s, end)

@@ -25,8 +25,8 @@ class Steady:
     """A steady motion. stops: sticks per drive cycle; amplitude: half peak to peak of the output [m]; starts: drive
     phases [rad] at which slips begin out of a stick; stick_fraction of the time; multipliers: of a small disturbance
     (z, v) over the time after which the motion repeats, `periods` drive periods (0: lost in a stick); condition: change
-    of amplitude omega^2/a per change of friction over inertia force D; symmetric: the second half turns the first over;
-    residual of the periodicity over the amplitude."""
+    of amplitude omega^2/|base a| per change of D, static friction over the drive's force; symmetric: the second half
+    turns the first over; residual of the periodicity over the amplitude."""
 
     regime: Regime
     stops: float
@@ -70,7 +70,7 @@ def _row(modes: ModalBasis, drive, static: float, kinetic: float, start: Start |
 
 
 def _condition(row, found, output: float) -> float:
-    """d(amplitude omega^2/a) / d(static/|B|): free of units; with the drive's omega for a rigid mode."""
+    """d(amplitude omega^2/|B|) / d(static/|B|): free of units; with the drive's omega for a rigid mode."""
     return float(found[3] * output * (row[0] if row[0] > 0 else row[5])**2)
 
 
