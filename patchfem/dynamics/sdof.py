@@ -10,7 +10,7 @@ import numpy as np
 from ..core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start
 from . import sdof_kernels
 from .histories import SAMPLES, EventRun
-from .sdof_samples import Scene, force, panels, peak_acceleration, response, states
+from .sdof_samples import Scene, force, panels, peak_acceleration, position, response, states
 
 COMPILED_FROM = 8000  # cycles: loading numba and the cached code costs about 0.7 s, plain Python 90 us per cycle
 CHUNK = 4096  # events held at once beside those of the window
@@ -145,7 +145,7 @@ class _Run:
             return
         time = number * per
         owner = np.maximum(np.searchsorted(rows[:, 0], time + 1e-9 * per, side="right") - 1, 0)
-        z, _, _ = states(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.scene)
+        z = position(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.scene)
         turn = np.exp(-2j * pi * np.arange(64) / 64)[number % 64] * (self.scene.output / 32)
         np.add.at(self.phasors, np.minimum(number // 64, len(self.phasors) - 1), z * turn)
 

@@ -30,25 +30,42 @@ class Scene:
         return max(self.w, float(self.segments[:, 4].max()))
 
 
+def _turn(angle):
+    out = np.empty(angle.shape, complex)
+    out.real, out.imag = np.cos(angle), np.sin(angle)
+    return out
+
+
+def _growth(x):
+    """(exp(x) - 1)/x for complex |x| < 0.3."""
+    reach, last, size = float(np.abs(x).max(initial=0.0)), 1, 1.0
+    while size > 1e-17:
+        last += 1
+        size *= reach / last
+    out = np.ones(x.shape, complex)
+    for k in range(last, 1, -1):
+        out *= x / k
+        out += 1
+    return out
+
+
 def basis(u, mode, om) -> tuple:
     """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `slip_kernels.motion` in arrays."""
     beta, _, decay, own, kind, _, _ = mode
-    wave = np.exp(1j * om * u)
+    wave = _turn(om * u)
     if kind == 0:
-        own_wave = np.exp(complex(-decay, own) * u)
+        own_wave = np.exp(-decay * u) * _turn(own * u)
         h = own_wave.imag / own
         h1 = own_wave.real - decay * h
         second = (wave - own_wave.conj()) / complex(decay, om + own)
         gap = complex(decay, om - own)
         if abs(gap) < own:
-            x = gap * u
-            near = np.abs(x) < REACH
-            first = np.empty_like(wave)
-            first[~near] = (wave[~near] - own_wave[~near]) / gap
-            x, part = x[near], np.ones(int(near.sum()), complex)
-            for k in range(13, 1, -1):
-                part = 1 + x * part / k
-            first[near] = u[near] * own_wave[near] * part
+            near = abs(gap) * u < REACH
+            if near.all():
+                first = u * own_wave * _growth(gap * u)
+            else:
+                first = (wave - own_wave) / gap
+                first[near] = u[near] * own_wave[near] * _growth(gap * u[near])
             e = (first - second) / (2j * own)
         else:
             e = -(h - second) / gap
@@ -97,32 +114,42 @@ def _series(u, v0, g0, bc, bs, mode, om) -> tuple:
     return shift, speed, drive - alpha * speed - beta * shift
 
 
-def _one(u, rows, owner, scene, om) -> np.ndarray:
+def _one(u, rows, owner, scene, om, parts) -> np.ndarray:
     mode = oscillator(scene.w, scene.decay, om)
-    out, short = np.empty((3, u.size)), u * mode[6] < REACH
+    out, short = np.empty((parts, u.size)), u * mode[6] < REACH
     if short.any():
-        out[:, short] = _series(u[short], *(rows[owner[short], k] for k in (5, 6, 7, 8)), mode, om)
+        out[:, short] = _series(u[short], *(rows[owner[short], k] for k in (5, 6, 7, 8)), mode, om)[:parts]
     far = ~short
     if far.any():
         v0, g0, bc, bs = (rows[owner[far], k] for k in (5, 6, 7, 8))
         h, h1, one, c, s = basis(u[far], mode, om)
         out[0, far] = v0 * h + g0 * one + bc * s - bs * (one - c)
+        if parts == 1:
+            return out
         out[1, far] = v0 * h1 + g0 * h + om * (bc * c - bs * s)
         out[2, far] = g0 * h1 - v0 * (mode[1] * h1 + mode[0] * h) + om * (bc * (h - om * s) - bs * om * c)
     return out
 
 
+def position(u, rows, owner, scene: Scene):
+    """z alone, as `states`."""
+    return _states(u, rows, owner, scene, 1)[0]
+
+
 def states(u, rows, owner, scene: Scene) -> tuple:
     """(z, v, z'') at times u (k,) after the starts of the phases rows[owner], rows (p, 10), owner (k,)."""
-    z, v, gain = rows[owner, 4], np.zeros(u.size), np.zeros(u.size)
+    return _states(u, rows, owner, scene, 3)
+
+
+def _states(u, rows, owner, scene, parts):
+    out = np.zeros((parts, u.size))
+    out[0] = rows[owner, 4]
     way, segment = rows[owner, 3], rows[owner, 9]
     for om in {float(om) for om in scene.segments[:, 4]}:
         mine = np.flatnonzero((way != 0) & (scene.segments[:, 4] == om)[segment.astype(int)])
         if mine.size:
-            shift, speed, more = _one(u[mine], rows, owner[mine], scene, om)
-            z[mine] += way[mine] * shift
-            v[mine], gain[mine] = way[mine] * speed, way[mine] * more
-    return z, v, gain
+            out[:, mine] += way[mine] * _one(u[mine], rows, owner[mine], scene, om, parts)
+    return out
 
 
 def pull(u, rows, owner, scene: Scene) -> tuple:
