@@ -9,7 +9,7 @@ from numba import njit
 from . import sdof_kernels, slip_kernels
 from .kernels import LEAN
 
-SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_bend",
+SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_parts",
         "stop")
 INNER = ("need_slopes", "release", "crossing", "_turn", "closed_books", "add", "book_slip", "note", "note_stick",
          "note_slip", "_keep", "begin")

@@ -87,14 +87,18 @@ def add(book, k, value):
 
 def book_slip(span, direction, theta, push, b, v0, g0, bc, bs, shift, v1, a1, o, book):
     """Add a slip's work in, viscous loss and |power in|, all over the mass, to book[0:3]; v1, a1: at its end.
-    push + b sin: force of the drive over the mass. By parts; by Gauss panels without spring or damping to divide by."""
+    push + b sin: force of the drive over the mass. By parts, or by Gauss panels where too little would be left of what
+    is subtracted there."""
     beta, alpha, om = o[0], o[1], o[5]
-    closed = beta > 1e-3 * om * om and (beta - om * om)**2 + (alpha * om)**2 > 1e-6 * om**4
-    reach = 2.2 / (o[6] if o[4] != 1.0 else max(om, 4 * alpha))
+    closed = (beta > 1e-3 * om * om and (beta - om * om)**2 + (alpha * om)**2 > 1e-6 * om**4
+              and alpha * alpha < 16 * beta and span * o[6] > 0.7)
+    reach, fast = 2.2 / max(om, sqrt(beta)), o[2] + o[3] if o[4] == 1.0 else 0.0
     turns = abs(push) < abs(b)
     at, v, a, y, sine, cosine = 0.0, v0, g0 - alpha * v0, 0.0, bs, bc
     while at < span:
-        end = span if closed else min(span, at + reach)
+        end = span
+        if not closed:
+            end = min(span, at + (min(2.2 / fast, reach) if at * fast < 40.0 and fast > 0.0 else reach))
         if turns:
             end = min(end, at + _turn(theta + om * at, push, b) / om)
         if end <= at:

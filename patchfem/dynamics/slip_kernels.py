@@ -182,18 +182,16 @@ def bend(v, a, size, h, o):
     return om * om * om * size + alpha * third + beta * second
 
 
-def over_bend(v, a, co, so, bc, bs, size, o):
-    """The same from the three terms of an overdamped motion: it falls as the fast one dies."""
+def over_parts(v0, a0, size, bc, bs, o):
+    """Fourth derivatives of an overdamped speed at first: of its fast, its slow and its forced term."""
     beta, alpha, decay, own, om = o[0], o[1], o[2], o[3], o[5]
     fast = -(decay + own)
     slow = beta / fast
     x, y = beta - om * om, alpha * om
     weight = x * x + y * y
-    gr, gi = om * (bc * co - bs * so), om * (bc * so + bs * co)
-    vp, turned = (gr * x + gi * y) / weight, (gi * x - gr * y) / weight
-    va, aa = v - vp, a + om * turned
+    va, aa = v0 - om * (bc * x + bs * y) / weight, a0 + om * om * (bs * x - bc * y) / weight
     quick, late = (aa - slow * va) / (fast - slow), (aa - fast * va) / (slow - fast)
-    return abs(quick) * fast**4 + abs(late) * slow**4 + om**4 * size * om / sqrt(weight)
+    return abs(quick) * fast**4, abs(late) * slow**4, om**5 * size / sqrt(weight)
 
 
 def stop(v0, g0, bc, bs, o, limit):
@@ -204,6 +202,10 @@ def stop(v0, g0, bc, bs, o, limit):
     stride = 1.1 / (free + sqrt(free * free + 1.1 * beta)) if beta + free > 0.0 else inf
     if size > 0.0:
         stride = min(stride, 1.0 / om)
+    quick, rest = 0.0, 0.0
+    if o[4] == 1.0:
+        quick, late, forced = over_parts(v0, g0 - alpha * v0, size, bc, bs, o)
+        rest = late + forced
     u, v, a, co, so, peak = 0.0, v0, g0 - alpha * v0, 1.0, 0.0, 0.0
     for _ in range(200000):
         j = om * (bc * co - bs * so) - alpha * a - beta * v
@@ -218,7 +220,7 @@ def stop(v0, g0, bc, bs, o, limit):
         k = -om * om * (bc * so + bs * co) - alpha * j - beta * a
         m = bend(v, a, size, h, o)
         if o[4] == 1.0:
-            m = min(m, over_bend(v, a, co, so, bc, bs, size, o))
+            m = min(m, quick * exp(-(o[2] + o[3]) * u) + rest)
         s = leap(v, a, j, k, m, h) if v > 0.0 else first_leap(a, j, k, m, h)
         if s >= limit - u:
             return -1.0
