@@ -12,7 +12,7 @@ from . import sdof_kernels
 from .histories import SAMPLES, EventRun
 from .sdof_samples import Scene, force, panels, peak_acceleration, position, response, states
 
-COMPILED_FROM = 5000  # cycles: loading numba and the cached code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
+COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
 CORNERS = 400_000  # corners kept from before the window
 

@@ -16,6 +16,7 @@ from patchfem.compiled import load
 from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
 from patchfem.dynamics import histories, orbit_kernels, sdof_kernels, slip_kernels
 from patchfem.dynamics.drives import Piecewise, Recorded, levels, release
+from patchfem.dynamics.sdof import events as event_list
 from patchfem.dynamics.sdof import simulate
 from patchfem.response.measures import energy_balance
 
@@ -195,6 +196,64 @@ def test_exact_start_against_dop853(z, v):
     assert np.abs(times - t).min() < 1e-10
     k = int(np.argmin(np.abs(times - t)))
     assert run.response.slide[rows][k] == pytest.approx(done.y_events[0][0][0], abs=1e-11)
+
+
+def by_dop853(drive, zeta, static, kinetic, end):
+    """Times at which slips and sticks begin, what begins, and the states there, for a unit mode from rest."""
+    def need(t, y, part):
+        return -(part.constant + part.amplitude * np.sin(part.omega * (t - part.start) + part.phase)) - y[0] \
+            - 2 * zeta * y[1]
+
+    def up(t, y, way, part):
+        return static - need(t, y, part)
+
+    def down(t, y, way, part):
+        return static + need(t, y, part)
+
+    def speed(t, y, way, part):
+        return way * y[1]
+
+    for event in (up, down, speed):
+        event.terminal, event.direction = True, -1
+    t, y, way, out = 0.0, np.zeros(2), 0, []
+    for part, after in zip(drive.segments, [*(s.start for s in drive.segments[1:]), end]):
+        if y[1] == 0:
+            way = 0 if abs(need(t, y, part)) <= static else int(np.sign(need(t, y, part)))
+        while t < after:
+            out.append((t, way, *y))
+            done = solve_ivp(lambda t, y, way, part: [y[1], way and need(t, y, part) - way * kinetic], (t, after), y,
+                             "DOP853", args=(way, part), events=[speed] if way else [up, down], rtol=1e-12, atol=1e-14,
+                             max_step=0.1)
+            t, y = done.t[-1], done.y[:, -1].copy()
+            if done.status == 0:
+                t = after
+                break
+            if way:
+                y[1] = 0.0
+                way = 0 if abs(need(t, y, part)) <= static else int(np.sign(need(t, y, part)))
+            else:
+                way = int(np.sign(need(t, y, part)))
+    return np.array(out)
+
+
+@both
+@pytest.mark.parametrize("drive, zeta, static, kinetic", [
+    (levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6), (levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
+    (Piecewise((Segment(0.0, 0.2, 1.0, 0.7, 0.3), Segment(9.0, -0.1, 0.5, 1.1, 0.0), Segment(20.0, -0.7)), 2 * pi,
+               False), 0.05, 0.4, 0.4)])
+def test_exact_drives_in_segments_against_dop853(drive, zeta, static, kinetic, compiled):
+    cycles = 6 if drive.segments[-1].amplitude else 4.5
+    expected = by_dop853(drive, zeta, static, kinetic, cycles * drive.period)
+    found = event_list(modes_of(zeta=zeta), drive, static, kinetic, cycles, compiled=compiled)
+    assert len(found) == len(expected) > 6
+    np.testing.assert_array_equal(found[:, 4], expected[:, 1])
+    np.testing.assert_allclose(found[:, [0, 2, 3]], expected[:, [0, 2, 3]], rtol=0, atol=3e-11)
+    run = simulate(modes_of(zeta=zeta), drive, static, kinetic, cycles, 20, compiled=compiled)
+    assert energy_balance(run.ledger) < 1e-12
+    k = np.searchsorted(run.window.time, found[1:, 0])
+    np.testing.assert_allclose(run.window.slide[k], found[1:, 2], rtol=0, atol=1e-12)
+    top = np.abs(run.window.acceleration).max()
+    assert top * (1 - 1e-12) <= run.acceleration <= top * (1 + 1e-3)
 
 
 # long runs, extremes of the parameters
