@@ -1,0 +1,286 @@
+"""The page where modes, drive and laws meet in harmonic balance: one steady point, all points at a drive, a branch.
+
+`point` chooses its harmonics by an estimate of the error: the balance is solved for H harmonics, the higher ones follow
+from the force that those leave over (q_k = -G_k F_k, a contraction once the inertia of k > H outweighs the contact's
+stiffness), and what that changes below H tells what H had missed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .core import NotConverged, Response
+from .dynamics.continuation import follow
+from .dynamics.harmonic import Balance, newton, pack, solve_linear, unpack
+from .simulate_harmonic_contact import Group
+from .simulate_harmonic_laws import synthesis
+
+LADDER = (7, 15, 31, 63, 127, 255)  # harmonics that are tried
+WIDER = 4  # harmonics that follow, over those that are solved for
+SWEEPS = 40
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Periodic:
+    """A steady motion at omega [rad/s] under the drive amplitude level [m s-2].
+
+    coefficients (i, K + 1) complex: slides [m] of the rows of `group`, x = Re sum X_k exp(i k omega t); forces (i, K +
+    1) [N], modal (K + 1, n) [m]; harmonics H solved for (K >= H). residual: rms of the force that the motion does not
+    balance in time, on twice the samples, over the rms of the force; error: estimate for the motion, relative to it;
+    stable and multipliers None until asked for; unknowns: those of the balance, a start for a neighbour.
+    """
+
+    omega: float
+    level: float
+    coefficients: np.ndarray
+    forces: np.ndarray
+    modal: np.ndarray
+    harmonics: int
+    samples: int
+    residual: float
+    error: float
+    iterations: int
+    unknowns: np.ndarray
+    group: Group
+    stable: bool | None = None
+    multipliers: np.ndarray | None = None
+
+    def amplitude(self, row, samples: int = 4096) -> float:
+        """(max - min)/2 [m] of row @ coordinates, row (n,), between the samples by parabolas."""
+        y = synthesis(self.modal @ np.asarray(row, float), samples)
+        return (_top(y) + _top(-y)) / 2
+
+
+def _top(y) -> float:
+    k = int(np.argmax(y))
+    a, b, c = y[k - 1], y[k], y[(k + 1) % y.size]
+    bend = a - 2 * b + c
+    return float(b - (a - c)**2 / (8 * bend)) if bend < 0 else float(b)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Branch:
+    """Points in the order of the curve; parameter: "omega" or "level"; folds and crossings: its values there; ended as
+    in dynamics.continuation.Path."""
+
+    points: tuple
+    parameter: str
+    folds: tuple
+    crossings: tuple
+    ended: str
+
+
+def group_of(modes, group) -> Group:
+    """A Group of laws given as such, as a law, as a contact model, or as (row, law) pairs."""
+    return group if isinstance(group, Group) else Group(modes, group)
+
+
+def balance_of(modes, group: Group, samples: int) -> Balance:
+    """The equations of the rows of `group` on `samples` of a cycle."""
+    gridded = group.with_samples(samples)
+    return Balance(modes, gridded.rows, gridded)
+
+
+def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None) -> Periodic:
+    """The steady motion under a core.BaseSine. harmonics: exactly so many; None: as many as `tolerance` wants.
+
+    start: a Periodic or unknowns nearby; None: the contact held, then weaker drives. NotConverged where no balance is
+    found or LADDER ends before the tolerance.
+    """
+    group = group_of(modes, group)
+    x = start.unknowns if isinstance(start, Periodic) else start
+    if harmonics is not None:
+        return _solved(modes, drive, group, harmonics, x, 1)
+    found = None
+    for h in LADDER:
+        if start is not None and isinstance(start, Periodic) and h < min(start.harmonics, LADDER[-1]):
+            continue
+        try:
+            found = _solved(modes, drive, group, h, x, WIDER, tolerance)
+        except NotConverged:
+            if h == LADDER[-1]:
+                raise
+            continue
+        if found.error <= tolerance:
+            return found
+        x = _cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
+    if found is None or found.error > tolerance:
+        raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave an error of "
+                           f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; loosen it or march")
+    return found
+
+
+def _next(h: int) -> int:
+    return LADDER[min(LADDER.index(h) + 1, len(LADDER) - 1)] if h in LADDER else 2 * h + 1
+
+
+def _cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
+    """Unknowns for another number of harmonics from slides (i, K + 1)."""
+    y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
+    keep = min(harmonics, slides.shape[1] - 1) + 1
+    y[:, :keep] = balance.lift.T @ slides[:, :keep]
+    return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1):]])
+
+
+def _solved(modes, drive, group, h, x, wider, tolerance=1e-3) -> Periodic:
+    """The balance with h harmonics, those above up to wider h following, on samples sharp enough for its slides."""
+    samples = group.samples or group.samples_for(h * wider)
+    for _ in range(3):
+        balance = balance_of(modes, group, samples)
+        x, here, count = _reach(balance, x, drive, h)
+        amplitudes = np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1) / 2
+        want = group.samples or group.samples_for(h * wider, amplitudes)
+        if want <= samples:
+            break
+        samples = want
+    return _widened(balance, x, here, drive, h, wider, samples, tolerance, count)
+
+
+def _reach(balance, x, drive, h: int):
+    """`newton` from a start of any number of harmonics, from the held contact, or along weaker drives."""
+    omega, level = drive.omega, drive.acceleration
+    size = balance.size(omega, h)
+    held = _held(balance, omega, level, h)
+    starts = [held]
+    if x is not None:
+        r = balance.lift.shape[1]
+        free = sum(1 if k == 0 else 2 for k, *_ in balance.plant(omega, h).free)
+        have = (x.size - free) // r // 2 if (x.size - free) % r == 0 else -1
+        if have >= 0 and r * (2 * have + 1) + free == x.size:
+            y = unpack(x[:r * (2 * have + 1)], r)
+            starts.insert(0, _cut(balance, balance.lift @ y, x, have, h))
+    for one in starts:
+        try:
+            return newton(balance, one, omega, level, h)
+        except NotConverged:
+            pass
+    path = follow(lambda v, p: _by_level(balance, v, omega, p, h), held * 1e-3, 1e-3 * level, (0.0, level), True,
+                  0.05, 0.5, 1000, 1e-6)
+    if path.ended != "end" or path.x.shape[1] != size:
+        raise NotConverged(f"accuracy.harmonics: no balance with {h} harmonics was found at "
+                           f"{omega / (2 * np.pi):.6g} Hz, neither from the held contact nor along weaker drives")
+    return newton(balance, path.x[-1], omega, level, h)
+
+
+def _by_level(balance, x, omega, level, h):
+    s = balance.system(x, omega, level, h)
+    return s.residual, s.jacobian, s.by_level
+
+
+def _by_omega(balance, x, omega, level, h):
+    s = balance.system(x, omega, level, h)
+    return s.residual, s.jacobian, s.by_omega
+
+
+def _held(balance, omega, level, h: int) -> np.ndarray:
+    """Unknowns with every contact at its stiffness at rest: one linear step from zero."""
+    x = np.zeros(balance.size(omega, h))
+    here = balance.system(x, omega, level, h)
+    return -solve_linear(here.jacobian, None)(here.residual)
+
+
+def _widened(balance, x, here, drive, h, wider, samples, tolerance, count) -> Periodic:
+    """Harmonics above h by sweeps with the Jacobian of those below; the error they leave.
+
+    The last sweep takes twice the samples. changes: of the slides per sweep [m], first those that follow alone.
+    """
+    omega, level, top = drive.omega, drive.acceleration, h * wider
+    solve = solve_linear(here.jacobian, None)
+    probe = max(top, 2 * h)  # harmonics that tell what is left out
+    q = np.zeros((len(balance.rows), probe + 1), complex)
+    q[:, :h + 1] = balance.slides(x, omega, h)
+    size, changes, fine = float(np.linalg.norm(q)), [], samples
+    start, x = x, np.array(x)
+    for sweep in range(SWEEPS):
+        force = balance.contact.force(q, omega, probe, fine)
+        z = balance.motion(x, omega, level, h, force)
+        moved = -solve(_missed(balance, x, omega, level, h, force, z))
+        if sweep and wider > 1:
+            x = x + moved
+        new = (z @ balance.rows.T).T
+        new[:, :h + 1] = balance.slides(x, omega, h)
+        changes.append(float(np.hypot(np.linalg.norm(moved), np.linalg.norm(new[:, h + 1:] - q[:, h + 1:]))))
+        q = new
+        if fine > samples or (wider == 1 and sweep):
+            break
+        if sweep and changes[-1] <= 1e-2 * tolerance * size:
+            fine = 2 * samples
+        if sweep > 2 and (changes[-1] > changes[-2] > changes[-3] or changes[-1] > changes[1]):
+            return _diverged(balance, here, drive, h, samples, size, count, start)
+    return _periodic(balance, x, drive, h, top, fine, changes, size, count, q)
+
+
+def _diverged(balance, here, drive, h, samples, size, count, x) -> Periodic:
+    """The plain balance, where the harmonics above h do not follow: nothing is known of its error."""
+    q = balance.slides(x, drive.omega, h)
+    z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
+    return Periodic(drive.omega, drive.acceleration, q, here.fold.force, z, h, samples, np.inf, np.inf, count, x,
+                    balance.contact)
+
+
+def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
+    """Residual (N,) under forces (i, K + 1) that come from more harmonics than the unknowns have."""
+    low = balance.lift.shape[1] * (2 * h + 1)
+    y = unpack(x[:low], balance.lift.shape[1])
+    return np.concatenate([pack(y - (z[:h + 1] @ balance.faces.T).T),
+                           _free_miss(balance, x, omega, level, h, force)])
+
+
+def _free_miss(balance, x, omega, level, h, force):
+    out, at = [], balance.lift.shape[1] * (2 * h + 1)
+    for k, _, left, stiffness in balance.plant(omega, h).free:
+        c = complex(x[at], x[at + 1] if k else 0.0)
+        miss = (stiffness * c + left @ (balance.rows.T @ force[:, k]) / balance.modes.mass
+                - 1j * level * (left @ balance.modes.base if k == 1 else 0.0)) / omega**2
+        out += [miss.real, miss.imag][:2 if k else 1]
+        at += 2 if k else 1
+    return np.array(out)
+
+
+def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:
+    omega, level, group = drive.omega, drive.acceleration, balance.contact
+    q = q[:, :top + 1]
+    fine = group.forces(q, omega, 2 * samples)
+    used = group.force(q, omega, top, samples)
+    left = fine - synthesis(used, 2 * samples)
+    scale = float(np.sqrt(np.mean(fine**2)))
+    residual = float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
+    z = balance.motion(x, omega, level, h, used)
+    error = max(changes)
+    if top > h:
+        # what is left of the sweeps, and what lies beyond the top: as below it, falling like k^-5/2
+        ratio = min((changes[-2] / changes[1])**(1 / max(len(changes) - 3, 1)), 0.9) if len(changes) > 3 else 0.9
+        error = 2 * (changes[-1] + changes[-2] * ratio / (1 - ratio) + max(changes) * (h / top)**2.5)
+    return Periodic(omega, level, q, used, z, h, samples, residual, error / max(size, 1e-300), count, x, group)
+
+
+def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
+    """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, force and slip of row 0.
+
+    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics.
+    """
+    from .simulate_harmonic_laws import Track
+
+    omega, group = periodic.omega, periodic.group
+    inner = samples * max(1, -(-2 * periodic.samples // samples))
+    every = inner // samples
+
+    def cycle(values):
+        kept = values[..., ::every]
+        return np.concatenate([kept, kept[..., :1]], axis=-1).T
+
+    k = np.arange(periodic.modal.shape[0])[:, None]
+    z, rate = (synthesis((periodic.modal * f).T, inner) for f in (1.0, 1j * k * omega))
+    forces = group.forces(periodic.coefficients, omega, inner)
+    base = periodic.level * np.sin(2 * np.pi * np.arange(inner) / inner)
+    accel = -modes.base[:, None] * base - modes.dampers @ rate - modes.omega[:, None]**2 * z \
+        - group.rows.T @ forces / modes.mass
+    track = Track(periodic.coefficients[0], omega, inner)
+    found = [law.sample(track) for law in group.laws[0]]
+    limit = sum(s.limit for s in found)
+    stretch = sum(s.stretch for s in found if s.stretch is not None)
+    slip = track.q - stretch / limit if limit > 0 else np.zeros(inner)
+    floor = base if drive.moving else 0 * base
+    return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
+                    cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
+                    cycle(modes.output @ accel + floor), cycle(base), cycle(forces[0]), cycle(slip))
