@@ -58,18 +58,6 @@ def _top(y) -> float:
     return float(b - (a - c)**2 / (8 * bend)) if bend < 0 else float(b)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Branch:
-    """Points in the order of the curve; parameter: "omega" or "level"; folds and crossings: its values there; ended as
-    in dynamics.continuation.Path."""
-
-    points: tuple
-    parameter: str
-    folds: tuple
-    crossings: tuple
-    ended: str
-
-
 def group_of(modes, group) -> Group:
     """A Group of laws given as such, as a law, as a contact model, or as (row, law) pairs."""
     return group if isinstance(group, Group) else Group(modes, group)
@@ -103,7 +91,7 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
             continue
         if found.error <= tolerance:
             return found
-        x = _cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
+        x = cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
     if found is None or found.error > tolerance:
         raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave an error of "
                            f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; loosen it or march")
@@ -114,7 +102,7 @@ def _next(h: int) -> int:
     return LADDER[min(LADDER.index(h) + 1, len(LADDER) - 1)] if h in LADDER else 2 * h + 1
 
 
-def _cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
+def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
     """Unknowns for another number of harmonics from slides (i, K + 1)."""
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     keep = min(harmonics, slides.shape[1] - 1) + 1
@@ -148,13 +136,13 @@ def _reach(balance, x, drive, h: int):
         have = (x.size - free) // r // 2 if (x.size - free) % r == 0 else -1
         if have >= 0 and r * (2 * have + 1) + free == x.size:
             y = unpack(x[:r * (2 * have + 1)], r)
-            starts.insert(0, _cut(balance, balance.lift @ y, x, have, h))
+            starts.insert(0, cut(balance, balance.lift @ y, x, have, h))
     for one in starts:
         try:
             return newton(balance, one, omega, level, h)
         except NotConverged:
             pass
-    path = follow(lambda v, p: _by_level(balance, v, omega, p, h), held * 1e-3, 1e-3 * level, (0.0, level), True,
+    path = follow(lambda v, p: by_level(balance, v, omega, p, h), held * 1e-3, 1e-3 * level, (0.0, level), True,
                   0.05, 0.5, 1000, 1e-6)
     if path.ended != "end" or path.x.shape[1] != size:
         raise NotConverged(f"accuracy.harmonics: no balance with {h} harmonics was found at "
@@ -162,14 +150,26 @@ def _reach(balance, x, drive, h: int):
     return newton(balance, path.x[-1], omega, level, h)
 
 
-def _by_level(balance, x, omega, level, h):
+def by_level(balance, x, omega, level, h) -> tuple:
+    """(residual, Jacobian, slope over the level) for dynamics.continuation."""
     s = balance.system(x, omega, level, h)
     return s.residual, s.jacobian, s.by_level
 
 
-def _by_omega(balance, x, omega, level, h):
+def by_omega(balance, x, omega, level, h) -> tuple:
+    """(residual, Jacobian, slope over omega) for dynamics.continuation."""
     s = balance.system(x, omega, level, h)
     return s.residual, s.jacobian, s.by_omega
+
+
+def plain(balance, x, drive, h: int) -> tuple:
+    """(Periodic of solved unknowns, share of the motion that the next h harmonics would add) without more of them."""
+    here = balance.system(x, drive.omega, drive.acceleration, h)
+    found = _widened(balance, x, here, drive, h, 1, balance.contact.samples, 1.0, 0)
+    force = balance.contact.force(found.coefficients, drive.omega, 2 * h, balance.contact.samples)
+    z = balance.motion(x, drive.omega, drive.acceleration, h, force)
+    above = float(np.linalg.norm(z[h + 1:] @ balance.rows.T))
+    return found, above / max(float(np.linalg.norm(found.coefficients)), 1e-300)
 
 
 def _held(balance, omega, level, h: int) -> np.ndarray:

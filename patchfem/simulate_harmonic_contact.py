@@ -14,7 +14,8 @@ class Group:
 
     A row is a number of an interface of `modes` or participations (n,) of its own; a law alone sits on interface 0; a
     simulate_march.ContactModel becomes its law.
-    rows (i, n), laws: a tuple of laws per row. Calling it with the harmonics (i, H + 1) of the slides and omega gives a dynamics.harmonic.Fold.
+    rows (i, n), laws: a tuple of laws per row. Calling it with the harmonics (i, H + 1) of the slides and omega gives a
+    dynamics.harmonic.Fold.
     """
 
     def __init__(self, modes, parts, samples: int = 0):
