@@ -17,6 +17,7 @@ from .simulate_harmonic_laws import synthesis
 
 LADDER = (7, 15, 31, 63, 127, 255)  # harmonics that are tried
 WIDER = 4  # harmonics that follow, over those that are solved for
+CLIMB = (11, 15, 23, 31, 47, 63, 95, 127, 191)  # on the way from few
 SWEEPS = 40
 
 
@@ -44,6 +45,11 @@ class Periodic:
     group: Group
     stable: bool | None = None
     multipliers: np.ndarray | None = None
+
+    @property
+    def base_samples(self) -> int:
+        """Samples on which the unknowns were solved for."""
+        return self.samples // 2 if self.coefficients.shape[1] > self.harmonics + 1 else self.samples
 
     def amplitude(self, row, samples: int = 4096) -> float:
         """(max - min)/2 [m] of row @ coordinates, row (n,), between the samples by parabolas."""
@@ -76,15 +82,13 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
     found or LADDER ends before the tolerance.
     """
     group = group_of(modes, group)
-    x = start.unknowns if isinstance(start, Periodic) else start
+    x, near = (start.unknowns, start.base_samples) if isinstance(start, Periodic) else (start, 0)
     if harmonics is not None:
-        return _solved(modes, drive, group, harmonics, x, 1)
-    found = None
-    for h in LADDER:
-        if start is not None and isinstance(start, Periodic) and h < min(start.harmonics, LADDER[-1]):
-            continue
+        return _solved(modes, drive, group, harmonics, x, 1, near=near)
+    found, least = None, start.harmonics if isinstance(start, Periodic) else _least(modes, drive, group)
+    for h in [h for h in LADDER if h >= least] or LADDER[-1:]:
         try:
-            found = _solved(modes, drive, group, h, x, WIDER, tolerance)
+            found = _solved(modes, drive, group, h, x, WIDER, tolerance, near)
         except NotConverged:
             if h == LADDER[-1]:
                 raise
@@ -96,6 +100,12 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
         raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave an error of "
                            f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; loosen it or march")
     return found
+
+
+def _least(modes, drive, group) -> float:
+    """Harmonics (63 at most) from which inertia outweighs the contact's stiffness, so that the higher ones follow."""
+    stiff = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1))) / modes.mass
+    return min(np.sqrt(stiff) / drive.omega, 63)
 
 
 def _next(h: int) -> int:
@@ -110,44 +120,61 @@ def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
     return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1):]])
 
 
-def _solved(modes, drive, group, h, x, wider, tolerance=1e-3) -> Periodic:
-    """The balance with h harmonics, those above up to wider h following, on samples sharp enough for its slides."""
-    samples = group.samples or group.samples_for(h * wider)
+def _solved(modes, drive, group, h, x, wider, tolerance=1e-3, near=0) -> Periodic:
+    """The balance with h harmonics, those above up to wider h following, on samples sharp enough for its slides; near:
+    samples that a neighbour took."""
+    samples = group.samples or max(group.samples_for(h * wider), near)
+    balance = balance_of(modes, group, samples)
     for _ in range(3):
-        balance = balance_of(modes, group, samples)
         x, here, count = _reach(balance, x, drive, h)
-        amplitudes = np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1) / 2
-        want = group.samples or group.samples_for(h * wider, amplitudes)
-        if want <= samples:
+        swing = np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1) / 2
+        want = group.samples or group.samples_for(h * wider, swing)
+        if want <= balance.contact.samples:
             break
-        samples = want
-    return _widened(balance, x, here, drive, h, wider, samples, tolerance, count)
+        balance = balance.on(balance.contact.with_samples(want))
+    return _widened(balance, x, here, drive, h, wider, tolerance, count)
 
 
 def _reach(balance, x, drive, h: int):
     """`newton` from a start of any number of harmonics, from the held contact, or along weaker drives."""
     omega, level = drive.omega, drive.acceleration
-    size = balance.size(omega, h)
-    held = _held(balance, omega, level, h)
-    starts = [held]
+    starts = []
     if x is not None:
         r = balance.lift.shape[1]
         free = sum(1 if k == 0 else 2 for k, *_ in balance.plant(omega, h).free)
         have = (x.size - free) // r // 2 if (x.size - free) % r == 0 else -1
         if have >= 0 and r * (2 * have + 1) + free == x.size:
             y = unpack(x[:r * (2 * have + 1)], r)
-            starts.insert(0, cut(balance, balance.lift @ y, x, have, h))
-    for one in starts:
+            starts.append(lambda: cut(balance, balance.lift @ y, x, have, h))
+    for one in [*starts, lambda: _held(balance, omega, level, h)]:
         try:
-            return newton(balance, one, omega, level, h)
+            return newton(balance, one(), omega, level, h)
         except NotConverged:
             pass
-    path = follow(lambda v, p: by_level(balance, v, omega, p, h), held * 1e-3, 1e-3 * level, (0.0, level), True,
-                  0.05, 0.5, 1000, 1e-6)
-    if path.ended != "end" or path.x.shape[1] != size:
+    return newton(balance, _climbed(balance, omega, level, h), omega, level, h)
+
+
+def _climbed(balance, omega, level, h: int) -> np.ndarray:
+    """Unknowns by way of few harmonics, which are cheap to follow from weaker drives, to more of them."""
+    below = min(7, h)
+    x = _along_levels(balance, omega, level, below)
+    for rung in [k for k in CLIMB if below < k < h] + [h] * (h > below):
+        try:
+            start = cut(balance, balance.slides(x, omega, below), x, below, rung)
+            x, below = newton(balance, start, omega, level, rung)[0], rung
+        except NotConverged:
+            pass
+    return x if below == h else _along_levels(balance, omega, level, h)
+
+
+def _along_levels(balance, omega, level, h: int) -> np.ndarray:
+    """Unknowns by following the motion from a thousandth of the drive amplitude."""
+    path = follow(lambda v, p: by_level(balance, v, omega, p, h), _held(balance, omega, level, h) * 1e-3, 1e-3 * level,
+                  (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
+    if path.ended != "end":
         raise NotConverged(f"accuracy.harmonics: no balance with {h} harmonics was found at "
                            f"{omega / (2 * np.pi):.6g} Hz, neither from the held contact nor along weaker drives")
-    return newton(balance, path.x[-1], omega, level, h)
+    return path.x[-1]
 
 
 def by_level(balance, x, omega, level, h) -> tuple:
@@ -165,7 +192,7 @@ def by_omega(balance, x, omega, level, h) -> tuple:
 def plain(balance, x, drive, h: int) -> tuple:
     """(Periodic of solved unknowns, share of the motion that the next h harmonics would add) without more of them."""
     here = balance.system(x, drive.omega, drive.acceleration, h)
-    found = _widened(balance, x, here, drive, h, 1, balance.contact.samples, 1.0, 0)
+    found = _widened(balance, x, here, drive, h, 1, 1.0, 0)
     force = balance.contact.force(found.coefficients, drive.omega, 2 * h, balance.contact.samples)
     z = balance.motion(x, drive.omega, drive.acceleration, h, force)
     above = float(np.linalg.norm(z[h + 1:] @ balance.rows.T))
@@ -176,20 +203,21 @@ def _held(balance, omega, level, h: int) -> np.ndarray:
     """Unknowns with every contact at its stiffness at rest: one linear step from zero."""
     x = np.zeros(balance.size(omega, h))
     here = balance.system(x, omega, level, h)
-    return -solve_linear(here.jacobian, None)(here.residual)
+    return -solve_linear(here.jacobian)(here.residual)
 
 
-def _widened(balance, x, here, drive, h, wider, samples, tolerance, count) -> Periodic:
+def _widened(balance, x, here, drive, h, wider, tolerance, count) -> Periodic:
     """Harmonics above h by sweeps with the Jacobian of those below; the error they leave.
 
     The last sweep takes twice the samples. changes: of the slides per sweep [m], first those that follow alone.
     """
     omega, level, top = drive.omega, drive.acceleration, h * wider
-    solve = solve_linear(here.jacobian, None)
+    solve = solve_linear(here.jacobian)
     probe = max(top, 2 * h)  # harmonics that tell what is left out
     q = np.zeros((len(balance.rows), probe + 1), complex)
     q[:, :h + 1] = balance.slides(x, omega, h)
-    size, changes, fine = float(np.linalg.norm(q)), [], samples
+    samples = fine = balance.contact.samples
+    size, changes = float(np.linalg.norm(q)), []
     start, x = x, np.array(x)
     for sweep in range(SWEEPS):
         force = balance.contact.force(q, omega, probe, fine)

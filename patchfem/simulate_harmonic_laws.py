@@ -6,7 +6,7 @@ damps every harmonic by (k pi/N)^2/6 besides. Turning points lie where the harmo
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,12 @@ from .compiled import load
 from .core import PatchfemError, frozen_array
 
 SHARPEST = 48  # samples while an element goes from one limit to the other
+
+
+@cache
+def kernels():
+    """The compiled laws."""
+    return load("simulate_harmonic_kernels")
 
 
 class Sampled(NamedTuple):
@@ -43,7 +49,7 @@ class Track:
         n = self.samples
         angle, place, cell = np.empty(n), np.empty(n), np.empty(n, np.int64)
         re, im = np.ascontiguousarray(self.x.real), np.ascontiguousarray(self.x.imag)
-        count, start = load("simulate_harmonic_kernels").turning_points(re, im, self.rate, angle, place, cell)
+        count, start = kernels().turning_points(re, im, self.rate, angle, place, cell)
         return angle[:count], place[:count], cell[:count], start
 
 
@@ -97,7 +103,7 @@ class Jenkins:
         _, places, cells, start = track.turning
         n, (stiff, full, square) = track.samples, self.sums
         force, slope, stretch, hold = np.empty(n), np.empty(n), np.empty(n), np.zeros((places.size, n))
-        load("simulate_harmonic_kernels").jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full,
+        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full,
                                                         square, force, slope, hold, stretch)
         return Sampled(force, slope, None, hold, float(full[-1]), stretch)
 
@@ -127,7 +133,7 @@ class Stretch:
         _, places, cells, start = track.turning
         n = track.samples
         force, slope, hold = np.empty(n), np.empty(n), np.zeros((places.size, n))
-        load("simulate_harmonic_kernels").bond_cycle(track.q, start, cells, places, self.limit, self.length, force,
+        kernels().bond_cycle(track.q, start, cells, places, self.limit, self.length, force,
                                                      slope, hold)
         return Sampled(force, slope, None, hold, self.limit, self.length * force)
 

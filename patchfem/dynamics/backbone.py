@@ -105,7 +105,7 @@ class FreeBalance:
         rows = np.full(x.size, 1 / amplitude)
         for _ in range(most):
             residual, jacobian, _ = self.system(x, amplitude)
-            solve = solve_linear(jacobian * unit * rows[:, None], None)
+            solve = solve_linear(jacobian * unit * rows[:, None])
             step = -solve(residual * rows)
             length, share, best = float(np.linalg.norm(step)), 1.0, None
             if not np.isfinite(length):

@@ -9,7 +9,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..core import NotConverged
 
@@ -87,14 +87,6 @@ def _bordered(jacobian, by_p, t, size, width) -> np.ndarray:
     return matrix
 
 
-def _factors(matrix):
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return lu_factor(matrix, check_finite=False)
-
-
 def _correct(system, x, p, tx, tp, size, width, goal, fixed=None):
     """Newton across the tangent from a guess: (x, p, iterations) or None; fixed: the parameter stays there."""
     t, before = np.append(tx, tp), np.inf
@@ -102,8 +94,8 @@ def _correct(system, x, p, tx, tp, size, width, goal, fixed=None):
         residual, jacobian, by_p = system(x, p)
         if not np.isfinite(residual).all():
             return None
-        step = lu_solve(_factors(_bordered(jacobian, by_p, t, size, width)), -np.append(residual / size, 0.0),
-                        check_finite=False)
+        factors, pivots, _ = dgetrf(_bordered(jacobian, by_p, t, size, width))
+        step = dgetrs(factors, pivots, -np.append(residual / size, 0.0))[0]
         length = float(np.linalg.norm(step))
         if not np.isfinite(length) or (fixed is None and (length > 2 * before or length > 1.0)):
             return None
@@ -120,11 +112,11 @@ def _tangent(system, x, p, last, size, width, forward) -> tuple:
     _, jacobian, by_p = system(x, p)
     n = x.size
     guide = np.append(np.zeros(n), 1.0) if last is None else last
-    factors = _factors(_bordered(jacobian, by_p, guide, size, width))
-    t = lu_solve(factors, np.append(np.zeros(n), 1.0), check_finite=False)
+    factors, pivots, _ = dgetrf(_bordered(jacobian, by_p, guide, size, width))
+    t = dgetrs(factors, pivots, np.append(np.zeros(n), 1.0))[0]
     t /= np.linalg.norm(t)
-    swaps = np.sum(factors[1] != np.arange(n + 1)) % 2
-    sign = (-1.0) ** (np.sum(np.diag(factors[0]) < 0) + swaps)
+    swaps = np.sum(pivots != np.arange(n + 1))
+    sign = (-1.0) ** (np.sum(np.diag(factors) < 0) + swaps)
     if last is None and not forward:
         return -sign, -t
     return sign, t

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..core import ModalBasis, NotConverged, PatchfemError
 
@@ -114,6 +114,12 @@ class Balance:
         self.faces = rows if full else s[:rank, None] * vt[:rank]
         self._plants = {}
 
+    def on(self, contact) -> "Balance":
+        """The same rows and modes with another contact on them."""
+        other = object.__new__(Balance)
+        other.__dict__.update(self.__dict__, contact=contact)
+        return other
+
     def plant(self, omega: float, harmonics: int) -> Plant:
         """`plant`, kept for the last frequencies."""
         key = (omega, harmonics)
@@ -208,34 +214,31 @@ class Balance:
             at += count
 
 
-def solve_linear(matrix, right):
-    """Solution and a function for further right sides; least squares where the matrix is singular (a mean that
-    nothing holds)."""
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", LinAlgWarning)
-        factors = lu_factor(matrix, check_finite=False)
-    pivots = np.abs(np.diag(factors[0]))
-    if np.isfinite(pivots).all() and pivots.min() > 1e-13 * pivots.max():
-        return lambda b: lu_solve(factors, b, check_finite=False)
+def solve_linear(matrix):
+    """A function b -> matrix^-1 b; least squares where the matrix is singular (a mean that nothing holds)."""
+    factors, pivots, _ = dgetrf(matrix)
+    sizes = np.abs(np.diag(factors))
+    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():
+        return lambda b: dgetrs(factors, pivots, b)[0]
+    if not np.isfinite(matrix).all():
+        return lambda b: np.full(b.shape, np.nan)
     return lambda b: np.linalg.lstsq(matrix, b, rcond=1e-12)[0]
 
 
 def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal: float = 1e-10, most: int = 40):
-    """(unknowns, System there, iterations) by Newton's method damped by the natural monotonicity test.
+    """(unknowns, System one last step before, iterations) by Newton's method damped by the natural monotonicity test.
 
     Ends when a step is below `goal` of the motion; NotConverged after `most` steps.
     """
     here = balance.system(x, omega, level, harmonics)
     for count in range(1, most + 1):
-        solve = solve_linear(here.jacobian, None)
+        solve = solve_linear(here.jacobian)
         step = -solve(here.residual)
         length, size = float(np.linalg.norm(step)), float(np.linalg.norm(x))
         if not np.isfinite(length):
             break
         if length <= goal * max(size, 1e-300) or length < 1e-300:
-            return x + step, balance.system(x + step, omega, level, harmonics), count
+            return x + step, here, count
         share, best = 1.0, None
         while True:
             tried = x + share * step

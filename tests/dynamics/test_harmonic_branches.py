@@ -276,9 +276,9 @@ load = "100 N"
 kind = "sine"
 amplitude = "{amplitude} um"
 frequency = "10 Hz"
-cycles = 3
+cycles = 2
 [accuracy]
-steps_per_cycle = 4000
+steps_per_cycle = 1000
 """
 
 
@@ -287,7 +287,7 @@ steps_per_cycle = 4000
     ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', Stretch(30.0, 2e-6))], ids=["elastic-plastic", "bonds"])
 def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     """A scene's bench measures stiffness and area of the loop; with one harmonic they are the backbone's."""
-    omega, amplitudes = W, np.array([3.0, 5.0, 12.0])
+    omega, amplitudes = W, np.array([3.0, 12.0])
     found = backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
     for k, amplitude in enumerate(amplitudes):
         result = run(plan(loads(BENCH.format(law=text, amplitude=amplitude))))
