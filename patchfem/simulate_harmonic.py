@@ -14,11 +14,16 @@ from .dynamics.continuation import follow
 from .dynamics.harmonic import Balance, newton, pack, solve_linear, unpack
 from .simulate_harmonic_contact import Group
 from .simulate_harmonic_laws import synthesis
+from .simulate_harmonic_starts import one_harmonic
 
 LADDER = (7, 15, 31, 63, 127, 255)  # harmonics that are tried
 WIDER = 4  # harmonics that follow, over those that are solved for
 CLIMB = (11, 15, 23, 31, 47, 63, 95, 127, 191)  # on the way from few
 SWEEPS = 40
+
+
+class _Unbounded(NotConverged):
+    """More harmonics would not help."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -89,6 +94,8 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
     for h in [h for h in LADDER if h >= least] or LADDER[-1:]:
         try:
             found = _solved(modes, drive, group, h, x, WIDER, tolerance, near)
+        except _Unbounded:
+            raise
         except NotConverged:
             if h == LADDER[-1]:
                 raise
@@ -151,6 +158,11 @@ def _reach(balance, x, drive, h: int):
             return newton(balance, one(), omega, level, h)
         except NotConverged:
             pass
+    for one in one_harmonic(balance, omega, level):
+        try:
+            return newton(balance, cut(balance, balance.slides(one, omega, 1), one, 1, h), omega, level, h)
+        except NotConverged:
+            pass
     return newton(balance, _climbed(balance, omega, level, h), omega, level, h)
 
 
@@ -172,8 +184,11 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
     path = follow(lambda v, p: by_level(balance, v, omega, p, h), _held(balance, omega, level, h) * 1e-3, 1e-3 * level,
                   (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
     if path.ended != "end":
-        raise NotConverged(f"accuracy.harmonics: no balance with {h} harmonics was found at "
-                           f"{omega / (2 * np.pi):.6g} Hz, neither from the held contact nor along weaker drives")
+        bare = any(k for k, *_ in balance.plant(omega, h).free)
+        why = "; an undamped mode driven at its own frequency has a bounded motion only where friction can hold it: " \
+            "give it damping" if bare else ", neither from the held contact nor along weaker drives"
+        raise (_Unbounded if bare else NotConverged)(
+            f"accuracy.harmonics: no balance with {h} harmonics was found at {omega / (2 * np.pi):.6g} Hz{why}")
     return path.x[-1]
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from .core import BaseSine, NotConverged, PatchfemError
 from .dynamics.backbone import FreeBalance, stuck_mode, trace
@@ -11,6 +10,7 @@ from .dynamics.continuation import follow
 from .simulate_harmonic import LADDER, Periodic, balance_of, by_level, by_omega, cut, group_of, plain, point
 from .simulate_harmonic_laws import synthesis
 from .simulate_harmonic_stability import with_stability
+from .simulate_harmonic_starts import one_harmonic
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -121,7 +121,7 @@ def branches(modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: 
     """
     group = group_of(modes, group)
     found = []
-    for start in [None, *one_harmonic(modes, drive, group)]:
+    for start in [None, *one_harmonic(balance_of(modes, group, 512), drive.omega, drive.acceleration)]:
         try:
             new = point(modes, drive, group, None, tolerance, start)
         except NotConverged:
@@ -138,41 +138,6 @@ def branches(modes, drive: BaseSine, group, tolerance: float = 1e-3, stability: 
 def _apart(a: Periodic, b: Periodic) -> float:
     k = min(a.coefficients.shape[1], b.coefficients.shape[1])
     return float(np.abs(a.coefficients[:, :k] - b.coefficients[:, :k]).max())
-
-
-def one_harmonic(modes, drive: BaseSine, group, count: int = 240) -> list:
-    """Unknowns (3 r,) of every root of the one-harmonic balance between 1e-7 and 1e4 of the free linear motion."""
-    balance = balance_of(modes, group_of(modes, group), 512)
-    here = balance.plant(drive.omega, 1)
-    if here.free:
-        return []
-    through = balance.faces @ here.inverse[1]
-    linear = 1j * drive.acceleration * (through @ modes.base)
-    size = float(np.linalg.norm(linear))
-    if size == 0:
-        return []
-    along, receptance = linear / size, through @ balance.rows.T / modes.mass
-
-    def left(log):
-        q = np.zeros((balance.lift.shape[0], 2), complex)
-        q[:, 1] = balance.lift @ along * np.exp(log)
-        force = balance.contact.force(q, drive.omega, 1, 512)[:, 1]
-        return np.exp(log) + along.conj() @ (receptance @ force)
-
-    def miss(log):
-        return abs(left(log)) - size
-
-    grid = np.log(size) + np.linspace(np.log(1e-7), np.log(1e4), count)
-    values = [miss(g) for g in grid]
-    out = []
-    for a, b, va, vb in zip(grid[:-1], grid[1:], values[:-1], values[1:]):
-        if va * vb > 0:
-            continue
-        log = brentq(miss, a, b, xtol=1e-10)
-        turn = left(log)
-        y = along * np.exp(log) * (turn.conjugate() / abs(turn))
-        out.append(np.concatenate([[0.0, v.real, v.imag] for v in y]))
-    return out
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -42,10 +42,15 @@ class Group:
         return other
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
-        """A power of two that holds the products of H harmonics and the sharpest stick at the amplitudes (i,) [m]."""
+        """A power of two that holds the products of H harmonics and the sharpest stick at the amplitudes (i,) [m].
+
+        What aliases is the corner of a law, so a law counts by the root of its share of all corners.
+        """
         want = max(FEWEST, 12 * harmonics)
         if amplitudes is not None:
-            want = max([want, *(law.sharpness(a) for a, laws in zip(amplitudes, self.laws) for law in laws)])
+            found = [(law.total * a, law.sharpness(a)) for a, laws in zip(amplitudes, self.laws) for law in laws]
+            whole = sum(corner for corner, sharp in found if sharp)
+            want = max([want, *(sharp * np.sqrt(corner / whole) for corner, sharp in found if sharp and whole > 0)])
         return int(min(2 ** int(np.ceil(np.log2(want))), MOST))
 
     def stiffness(self) -> np.ndarray:

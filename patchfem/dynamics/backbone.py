@@ -110,7 +110,7 @@ class FreeBalance:
             length, share, best = float(np.linalg.norm(step)), 1.0, None
             if not np.isfinite(length):
                 break
-            if length <= goal:
+            if length <= goal and np.linalg.norm((residual + jacobian @ (unit * step)) * rows) < 1e-7:
                 x = x + unit * step
                 return x, self.system(x, amplitude)[2]
             while True:

@@ -92,7 +92,7 @@ def _correct(system, x, p, tx, tp, size, width, goal, fixed=None):
     t, before = np.append(tx, tp), np.inf
     for count in range(1, 13):
         residual, jacobian, by_p = system(x, p)
-        if not np.isfinite(residual).all():
+        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return None
         factors, pivots, _ = dgetrf(_bordered(jacobian, by_p, t, size, width))
         step = dgetrs(factors, pivots, -np.append(residual / size, 0.0))[0]
@@ -138,8 +138,8 @@ def _folds(found, width) -> tuple:
         a, b = t0 * h, t1 * h
         rise = (p1 - p0) / width
         # derivative of the cubic: a + 2 s (3 rise - 2 a - b) + 3 s^2 (a + b - 2 rise)
-        roots = np.roots([3 * (a + b - 2 * rise), 2 * (3 * rise - 2 * a - b), a])
-        s = [r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real <= 1] or [a / (a - b)]
-        s = s[0]
+        c, d = 3 * (a + b - 2 * rise), 2 * (3 * rise - 2 * a - b)
+        roots = np.roots([c, d, a]) if abs(c) > 1e-9 * (abs(a) + abs(b)) else np.zeros(0)
+        s = next((r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real <= 1), a / (a - b))
         out.append(p0 + width * (a * s + (3 * rise - 2 * a - b) * s * s + (a + b - 2 * rise) * s**3))
     return tuple(out)

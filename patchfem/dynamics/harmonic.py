@@ -188,6 +188,17 @@ class Balance:
         self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
         return System(*[np.concatenate(parts[0])], jacobian, np.concatenate(parts[1]), np.concatenate(parts[2]), fold)
 
+    def met(self, here: System, left, omega: float, level: float, harmonics: int, size: float) -> bool:
+        """Whether what a step leaves of the residual (N,) is rounding: a least-squares step can vanish where nothing
+        balances. size: of the unknowns [m]."""
+        low = self.lift.shape[1] * (2 * harmonics + 1)
+        push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (self.modes.mass * omega**2)
+        for part, own in ((slice(0, low), size), (slice(low, None), push)):
+            scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
+            if float(np.linalg.norm(left[part])) > 1e-7 * scale:
+                return False
+        return True
+
     def _free(self, here, coordinates, jacobian, parts, fold, z, level, linked, omega, size):
         """Rows and columns of the coordinates without receptance, equations over omega^2 [m]."""
         h, r, at = z.shape[0] - 1, self.lift.shape[1], size
@@ -238,6 +249,8 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal
         if not np.isfinite(length):
             break
         if length <= goal * max(size, 1e-300) or length < 1e-300:
+            if not balance.met(here, here.residual + here.jacobian @ step, omega, level, harmonics, size):
+                break
             return x + step, here, count
         share, best = 1.0, None
         while True:

@@ -133,8 +133,8 @@ def test_exact_bistable_starts_with_friction():
     drive = BaseSine(LEVEL, 2 * np.pi * 152)
     found = branches(RIG, drive, FRICTION)
     assert [p.stable for p in found] == [True, False, True]
-    up = response(RIG, drive, FRICTION, np.linspace(130, 152, 12)).points[-1]
-    down = response(RIG, drive, FRICTION, np.linspace(190, 152, 12)).points[-1]
+    up = response(RIG, drive, FRICTION, np.linspace(130, 152, 8)).points[-1]
+    down = response(RIG, drive, FRICTION, np.linspace(190, 152, 8)).points[-1]
     assert up.amplitude([1.0]) == pytest.approx(found[2].amplitude([1.0]), rel=1e-2)
     assert down.amplitude([1.0]) == pytest.approx(found[0].amplitude([1.0]), rel=1e-2)
     whole = response(RIG, drive, FRICTION, (125.0, 200.0))
@@ -143,10 +143,10 @@ def test_exact_bistable_starts_with_friction():
 
     k, w = 1e6, 4e-6
     for p in (found[0], found[2]):
-        r = periodic_response(p, RIG, drive, 4000)
+        r = periodic_response(p, RIG, drive, 2000)
         stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), np.array([k]), np.array([w]))[1][0]
-        dt, z, v = drive.period / 4000, r.modal[0, 0], r.modal_rate[0, 0]
-        for i in range(4000):  # leapfrog, one cycle
+        dt, z, v = drive.period / 2000, r.modal[0, 0], r.modal_rate[0, 0]
+        for i in range(2000):  # leapfrog, one cycle
             a = -W**2 * z - 0.006 * W * v - (CUBIC * z**3 + k * stretch) / MASS - LEVEL * np.sin(drive.omega * i * dt)
             half = v + a * dt / 2
             new = z + half * dt
@@ -276,9 +276,9 @@ load = "100 N"
 kind = "sine"
 amplitude = "{amplitude} um"
 frequency = "10 Hz"
-cycles = 2
+cycles = 6
 [accuracy]
-steps_per_cycle = 1000
+steps_per_cycle = 600
 """
 
 
@@ -294,7 +294,7 @@ def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
         stiffness = result.measures["equivalent_stiffness"].value
         area = result.measures["loop_area"].value
         w = np.sqrt(omega**2 + stiffness / MASS)
-        assert 2 * np.pi * found.frequency[k] == pytest.approx(w, rel=1e-4)
+        assert 2 * np.pi * found.frequency[k] == pytest.approx(w, rel=2e-4)
         loss = area / (2 * np.pi * MASS * w * w * (amplitude * 1e-6)**2)
         assert found.damping[k] == pytest.approx(0.003 * omega / w + loss, rel=3e-4)
         assert found.loss[k] == pytest.approx(area, rel=3e-4)

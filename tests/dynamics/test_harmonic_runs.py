@@ -17,6 +17,7 @@ from patchfem.simulate_rig import drive_of, modes_of
 SCENE = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "20 um"\n' + STRUCTURE + \
     '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
 LOAD = 26 * 4.4482216152605
+DRIVE = BaseSine(1.0, 1.0)
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
@@ -113,6 +114,23 @@ def test_always_a_sweep_finds_what_cold_starts_find():
     for p in swept.points:
         cold = point(modes, BaseSine(1.0, p.omega), law, tolerance=1e-4)
         assert p.amplitude([1.0]) == pytest.approx(cold.amplitude([1.0]), rel=3e-4)
+
+
+@pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
+def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit, bounded):
+    """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
+    modes, law = sdof(0.0), Jenkins([20.0], [limit / 20.0])
+    if not bounded:
+        with pytest.raises(NotConverged, match="undamped mode driven at its own frequency"):
+            point(modes, DRIVE, law)
+        return
+    p = point(modes, DRIVE, law, tolerance=1e-4)
+    assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # the whole drive of the first harmonic
+    r = periodic_response(p, modes, DRIVE, 4000)
+    k, w = np.array([20.0]), np.array([limit / 20.0])
+    stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
+    rows, _ = march(modes, DRIVE, k, w, np.array([r.modal[0, 0], r.modal_rate[0, 0]]), stretch, 4000)
+    assert np.abs(rows[:, 0] - r.modal[:, 0]).max() < 3e-4 * np.abs(r.modal).max()
 
 
 def test_refuses_a_tolerance_that_no_ladder_reaches():
