@@ -76,23 +76,22 @@ class FreeBalance:
         miss = y - (z @ faces.T).T
         last = p[1, j] @ z[1] + (balance.rows[:, j] @ fold.force[:, 1]) / mass
         # slopes
-        linked = (fold.slope.transpose(1, 0, 2)[:, :, None, :] * balance.lift[None, :, :, None]).reshape(
-            h + 1, len(balance.rows), -1)
-        through = inverse @ balance.rows.T / mass  # (H + 1, n, i): -dz/dF
+        linked = balance.gathered(fold.slope)
+        through = inverse @ faces.T / mass  # (H + 1, n, r): -dz/d(forces on y)
         size = x.size - 2
         block = (faces @ through @ linked).reshape(h + 1, r, r, 2 * h + 1)
         block = np.concatenate([block.real, block.imag[1:]]).transpose(1, 0, 2, 3).reshape(size, size)
         jacobian = np.zeros((size + 2, size + 2))
         jacobian[:size, :size] = np.eye(size) + block
-        grip = (balance.rows[:, j] / mass - p[1, j] @ through[1])
+        grip = faces[:, j] / mass - p[1, j] @ through[1]
         line = (grip @ linked[1]) / self.scale**2
         jacobian[size, :size], jacobian[size + 1, :size] = line.real, line.imag
         for column, dp, unit in ((size, by_omega, self.scale), (size + 1, by_zeta, 1.0)):
             turned = np.einsum("kab,kbc,kc->ka", inverse, dp, z)
             end = dp[1, j] @ z[1] - p[1, j] @ turned[1]
             if dp is by_omega and fold.rate is not None:
-                turned = turned + np.einsum("kai,ik->ka", through, fold.rate)
-                end = end + grip @ fold.rate[:, 1]
+                turned = turned + np.einsum("kar,rk->ka", through, balance.lift.T @ fold.rate)
+                end = end + grip @ (balance.lift.T @ fold.rate)[:, 1]
             jacobian[:size, column] = pack((turned @ faces.T).T) * unit
             end = end * unit / self.scale**2
             jacobian[size:, column] = end.real, end.imag

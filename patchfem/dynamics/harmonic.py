@@ -171,22 +171,30 @@ class Balance:
         z = self._motion(here, coordinates, level, fold.force[:, :h + 1])
         through = -np.einsum("ra,kab->krb", self.faces, here.inverse)  # -faces R_k
         miss = y - (z @ self.faces.T).T
-        receptance = -through @ self.rows.T / mass  # (H + 1, r, i)
-        linked = fold.slope.transpose(1, 0, 2)[:, :, None, :] * self.lift[None, :, :, None]
-        block = (receptance @ linked.reshape(h + 1, len(self.rows), -1)).reshape(h + 1, r, r, 2 * h + 1)
+        receptance = -through @ self.faces.T / mass  # (H + 1, r, r)
+        linked = self.gathered(fold.slope)
+        block = (receptance @ linked).reshape(h + 1, r, r, 2 * h + 1)
         size = r * (2 * h + 1)
         jacobian = np.eye(x.size)
         block = _real(block).transpose(1, 0, 2, 3).reshape(size, size)
         jacobian[:size, :size] += block
         turned = -np.einsum("krb,kbc,kc->rk", through, here.slope, z)
         if fold.rate is not None:
-            turned = turned + np.einsum("kri,ik->rk", receptance, fold.rate)
+            turned = turned + np.einsum("krs,sk->rk", receptance, self.lift.T @ fold.rate)
         lifted = np.zeros((r, h + 1), complex)
         if h:
             lifted[:, 1] = 1j * through[1] @ self.modes.base
         parts = [[pack(miss)], [pack(turned)], [pack(lifted)]]
         self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
         return System(*[np.concatenate(parts[0])], jacobian, np.concatenate(parts[1]), np.concatenate(parts[2]), fold)
+
+    def gathered(self, slope) -> np.ndarray:
+        """Slopes (i, H + 1, 2 H + 1) of the rows' forces as those of the forces on y to y, (H + 1, r, r (2 H + 1))."""
+        count, r = self.lift.shape
+        h = slope.shape[1] - 1
+        pairs = (self.lift[:, :, None] * self.lift[:, None, :]).reshape(count, r * r)
+        both = (pairs.T @ np.ascontiguousarray(slope).reshape(count, -1).view(float)).view(complex)
+        return both.reshape(r, r, h + 1, 2 * h + 1).transpose(2, 0, 1, 3).reshape(h + 1, r, -1)
 
     def met(self, here: System, left, omega: float, level: float, harmonics: int, size: float) -> bool:
         """Whether what a step leaves of the residual (N,) is rounding: a least-squares step can vanish where nothing
@@ -209,7 +217,7 @@ class Balance:
             by_omega = left @ here.slope[k] @ z[k] / omega**2
             if fold.rate is not None:
                 by_omega = by_omega + w @ fold.rate[:, k]
-            row = (w @ linked[k].reshape(len(self.rows), -1))
+            row = left @ self.faces.T / self.modes.mass / omega**2 @ linked[k]
             across = self.faces @ right
             count = 2 if k else 1
             for j in range(count):

@@ -310,6 +310,16 @@ def test_exact_backbone_ends_at_the_held_and_the_free_modes():
     assert found.damping.argmax() in (1, 2) and found.loss[0] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_order_of_the_loss_of_an_iwan_joint():
+    """Limit slides spread like w^chi: the loss in microslip goes like A^(3 + chi) (Segalman 2005), 4000 elements."""
+    chi = -0.4
+    w = ((np.arange(4000) + 0.5) / 4000)**(1 / (1 + chi))
+    found = backbone(sdof(0.0), Jenkins(np.full(4000, 1e-6), w), np.array([0.1, 0.2, 0.4]), harmonics=1)
+    slope = np.diff(np.log(found.loss)) / np.log(2)
+    assert slope == pytest.approx([3 + chi] * 2, abs=0.01)
+    assert np.diff(np.log(found.damping)) / np.log(2) == pytest.approx([1 + chi] * 2, abs=0.01)
+
+
 def test_exact_backbone_is_where_the_response_is_in_quadrature():
     """With one harmonic the forced motion 90 degrees behind, at the balancing level, is the free one."""
     law, modes = Jenkins([0.2], [0.5]), sdof(0.01)
