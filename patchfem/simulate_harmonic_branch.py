@@ -7,8 +7,8 @@ import numpy as np
 from .core import BaseSine, NotConverged, PatchfemError
 from .dynamics.backbone import FreeBalance, stuck_mode, trace
 from .dynamics.continuation import follow
-from .simulate_harmonic import LADDER, Periodic, balance_of, by_level, by_omega, cut, group_of, plain, point
 from .simulate_harmonic_laws import synthesis
+from .simulate_harmonic_point import LADDER, Periodic, balance_of, by_level, by_omega, cut, group_of, plain, point
 from .simulate_harmonic_stability import with_stability
 from .simulate_harmonic_starts import one_harmonic
 

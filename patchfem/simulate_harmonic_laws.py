@@ -54,7 +54,10 @@ class Track:
 
 
 def synthesis(x, samples: int) -> np.ndarray:
-    """Samples (..., N) over one cycle of Re sum X_k exp(i k theta), X (..., H + 1), 2 H < N."""
+    """Samples (..., N) over one cycle of Re sum X_k exp(i k theta), X (..., H + 1)."""
+    if 2 * x.shape[-1] > samples:
+        every = -(-2 * x.shape[-1] // samples)
+        return synthesis(x, samples * every)[..., ::every]
     spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
     spectrum[..., :x.shape[-1]] = x * (samples / 2)
     spectrum[..., 0] *= 2

@@ -214,7 +214,7 @@ class Balance:
             w = left @ self.rows.T / self.modes.mass / omega**2
             drive = left @ self.modes.base / omega**2 if k == 1 else 0.0
             miss = stiffness / omega**2 * c + w @ fold.force[:, k] - 1j * level * drive
-            by_omega = left @ here.slope[k] @ z[k] / omega**2
+            by_omega = left @ here.slope[k] @ z[k] / omega**2 - 2 * miss / omega
             if fold.rate is not None:
                 by_omega = by_omega + w @ fold.rate[:, k]
             row = left @ self.faces.T / self.modes.mass / omega**2 @ linked[k]

@@ -13,9 +13,10 @@ from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic import Balance, newton, pack, unpack
 from patchfem.friction.law import Bonds
 from patchfem.friction.recursion import advance
-from patchfem.simulate_harmonic import balance_of, group_of, periodic_response, point
+from patchfem.simulate_harmonic import periodic_response, point
 from patchfem.simulate_harmonic_contact import Group
 from patchfem.simulate_harmonic_laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, analysis, synthesis
+from patchfem.simulate_harmonic_point import balance_of, group_of
 from patchfem.simulate_march import coulomb_model, jenkins_model, points_model, rate_model
 
 DRIVE = BaseSine(1.0, 1.0)
@@ -94,6 +95,12 @@ def test_exact_areas_of_the_closed_loops():
             assert force[0] == pytest.approx(truth[1], rel=1e-12)
 
 
+def test_exact_samples_of_more_harmonics_than_they_resolve():
+    x = harmonics(7, 40)
+    angle = 2 * np.pi * np.arange(16) / 16
+    assert synthesis(x, 16) == pytest.approx((x * np.exp(1j * np.outer(angle, np.arange(41)))).sum(axis=1).real)
+
+
 # ---- the balance
 
 def dense(modes, omega, level, spring):
@@ -126,6 +133,29 @@ def test_exact_a_mode_without_stiffness_or_damping():
         assert np.abs(found.modal[0]).max() < 1e-12
     shaken = point(modes, BaseSine(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4)
     check_cycle(modes, BaseSine(1.0, 1.0), shaken, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4)
+
+
+def test_exact_the_jacobian_of_the_balance():
+    """Against central differences: a rigid mode, coupled damping, two rows, a law of the rate; over x, omega, level."""
+    one = np.ones(3)
+    c = 0.1 * np.eye(3) + 0.05
+    faces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
+    for damping in (None, c):
+        modes = ModalBasis(("r", "a", "b"), np.array([0.0, 1.0, 3.0]), 0.02 * one, faces[0], one, one, 1.3, damping,
+                           faces)
+        group = Group(modes, [(0, Tanh(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, Stretch(0.5, 0.4))], 1024)
+        balance = Balance(modes, group.rows, group)
+        x = np.random.default_rng(4).normal(size=balance.size(1.1, 3)) * 0.5
+        here = balance.system(x, 1.1, 0.7, 3)
+
+        def residual(v, omega=1.1, level=0.7, balance=balance):
+            return balance.system(v, omega, level, 3).residual
+
+        eps = 1e-6
+        found = np.stack([(residual(x + d) - residual(x - d)) / (2 * eps) for d in eps * np.eye(x.size)], axis=1)
+        assert here.jacobian == pytest.approx(found, abs=1e-7)
+        assert here.by_omega == pytest.approx((residual(x, 1.1 + eps) - residual(x, 1.1 - eps)) / (2 * eps), abs=1e-7)
+        assert here.by_level == pytest.approx((residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9)
 
 
 def test_exact_more_rows_than_modes():

@@ -8,12 +8,15 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, PatchfemError
+from patchfem.dynamics.backbone import FreeBalance
 from patchfem.dynamics.continuation import follow
 from patchfem.dynamics.floquet import exponentials, is_stable, kind_of_loss, multipliers, product
+from patchfem.dynamics.harmonic import Balance
 from patchfem.scene import loads
 from patchfem.simulate import plan, run
 from patchfem.simulate_harmonic import periodic_response, point
 from patchfem.simulate_harmonic_branch import backbone, branches, levels, response
+from patchfem.simulate_harmonic_contact import Group
 from patchfem.simulate_harmonic_laws import Jenkins, Spring, Stretch, Tanh, synthesis
 from patchfem.simulate_harmonic_stability import monodromy_of, with_stability
 
@@ -224,6 +227,16 @@ def test_exact_a_perturbed_march_of_elements(omega):
     assert np.sum(np.abs(multipliers(found)) < 1e-4) >= found.shape[0] - 10
 
 
+def test_order_of_the_map_in_its_cells():
+    """Turning points and corners inside cells cost the square of the width, not the width."""
+    modes, drive = sdof(0.05), BaseSine(1.0, 0.9)
+    p = point(modes, drive, Jenkins([3.0, 1.0], [0.2, 0.5]), tolerance=1e-6)
+    best = monodromy_of(p, modes, 16384)
+    cells = np.array([128, 256, 512, 1024, 2048])
+    errors = [np.abs(monodromy_of(p, modes, c)[:2, :2] - best[:2, :2]).max() for c in cells]
+    assert errors[0] < 1e-2 and -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.6
+
+
 def test_exact_bonds_forget_as_a_march_does():
     """One mode and the recursion: the whole map (z, v, u) by DOP853 on z'' and u' = (q' - |q'| u)/length."""
     modes, drive, limit, length = sdof(0.05), BaseSine(1.0, 1.2), 0.4, 0.3
@@ -257,6 +270,17 @@ def test_exact_small_matrices():
 
 
 # ---- backbone
+
+def test_exact_the_jacobian_of_the_free_balance():
+    """Against central differences, with a law of the rate and coupled modes."""
+    modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
+    group = Group(modes, [Tanh(0.4, 0.3), Spring(0.3, 0.8), Stretch(0.5, 0.4)], 1024)
+    equations = FreeBalance(Balance(modes, group.rows, group), 1, 3, 2.0)
+    x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
+    found = np.stack([(equations.system(x + d, 0.6)[0] - equations.system(x - d, 0.6)[0]) / 2e-6
+                      for d in 1e-6 * np.eye(9)], axis=1)
+    assert equations.system(x, 0.6)[1] == pytest.approx(found, abs=1e-7)
+
 
 def test_exact_backbone_of_the_undamped_duffing_oscillator():
     """Period 4 K(m)/sqrt(1 + c a^2), m = c a^2/(2 (1 + c a^2)); a is the peak, the amplitudes are of one harmonic."""

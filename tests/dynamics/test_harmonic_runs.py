@@ -9,9 +9,10 @@ from patchfem.core import BaseSine, ModalBasis, NotConverged
 from patchfem.response.measures import acceleration_peak, harmonic, interface_loop, slip_measures
 from patchfem.scene import loads
 from patchfem.simulate import plan, run
-from patchfem.simulate_harmonic import group_of, periodic_response, point
+from patchfem.simulate_harmonic import periodic_response, point
 from patchfem.simulate_harmonic_branch import response
 from patchfem.simulate_harmonic_laws import Jenkins, Spring, Stretch, synthesis
+from patchfem.simulate_harmonic_point import group_of
 from patchfem.simulate_rig import drive_of, modes_of
 
 SCENE = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "20 um"\n' + STRUCTURE + \
