@@ -24,13 +24,15 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
+        from .simulate_exact import run_exact
+
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
         share, rough = _shares(scene, patch, coarse[0] if estimate else None)
-        raw = rig.run_exact(scene, settings, modes, drive, load, progress, share)
+        raw = run_exact(scene, settings, modes, drive, load, rig.start_of(scene, modes), progress, share, say)
         seconds["march"] = raw.seconds
         errors = []
         if rough is not None:
-            other = rig.run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, rough)
+            other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, None, rough)
             errors, seconds["error"] = [change(raw.values, other.values)], other.seconds
         found = with_errors(raw.values, *errors, least=1e-9)
     else:

@@ -83,8 +83,24 @@ def _element(scene, number: int, drive, start):
 def other_windows(window) -> list:
     """The histories of the interfaces after the first as windows of their own."""
     extra = window.extra
-    if "slips" not in extra:
+    if "slides" not in extra:
         return []
-    names = ("slides", "slide_rates", "forces", "slips")
-    return [replace(window, slide=q, slide_rate=v, force=f, slip=s)
-            for q, v, f, s in list(zip(*(extra[name] for name in names)))[1:]]
+    slips = extra.get("slips", extra["slides"])
+    return [replace(window, slide=extra["slides"][:, k], slide_rate=extra["slide_rates"][:, k],
+                    force=extra["forces"][:, k], slip=slips[:, k]) for k in range(1, slips.shape[1])]
+
+
+def other_measures(window, drive, steps: int) -> dict:
+    """Measures of the interfaces after the first, their number behind the name: slip_amplitude_2, stick_fraction_2,
+    friction_force_peak_2, loop_area_2 (by the trapezoidal rule)."""
+    from .response.measures import slip_measures
+
+    out = {}
+    for k, one in enumerate(other_windows(window), 2):
+        found = slip_measures(one, drive, steps)
+        found.pop("slip_start_phase", None)
+        span = max((one.time[-1] - one.time[0]) / drive.period, 1e-300)
+        found |= {"friction_force_peak": float(np.abs(one.force).max()),
+                  "loop_area": float(np.trapezoid(one.force, one.slide)) / span}
+        out |= {f"{name}_{k}": value for name, value in found.items()}
+    return out

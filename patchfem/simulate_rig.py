@@ -7,10 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from . import simulate_drive
-from .core import BaseSine, Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
+from .core import Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
-    circular_mean,
     classify,
     harmonic,
     interface_loop,
@@ -45,7 +44,8 @@ class Settings:
 @dataclass(frozen=True, eq=False, slots=True)
 class Raw:
     """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
-    error) or (None, None), snapshots; levels: of a run in levels, slips: as `simulate_levels.onset` asks."""
+    error) or (None, None), snapshots; levels: of a run in levels, slips: as `simulate_levels.onset` asks;
+    log: events of the exact engine."""
 
     values: dict
     response: Response
@@ -61,6 +61,7 @@ class Raw:
     message: str = ""
     levels: tuple = ()
     slips: object = None
+    log: object = None
 
 
 def modes_of(scene) -> ModalBasis:
@@ -89,11 +90,10 @@ def speed_of(scene, drive) -> float:
 
 
 def simple(scene) -> bool:
-    """Whether a structure is linear beside at most one interface."""
-    structure = scene.structure
-    bonded = structure.bonded
-    bent = structure.stiffening is not None or (bonded is not None and bonded.wavelength is not None)
-    return not bent and len(structure.interface) <= 1
+    """Whether a structure is linear and every interface of [[structure.interface]] slides by Coulomb's law."""
+    bonded = scene.structure.bonded
+    bent = scene.structure.stiffening is not None or (bonded is not None and bonded.wavelength is not None)
+    return not bent and all(one.law == "coulomb" for one in scene.structure.interface)
 
 
 def law_of(scene, speed: float) -> Bonds:
@@ -118,7 +118,7 @@ def choose(scene, per_point: bool = False) -> Settings:
         raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
                             f"{f' with {shear}' if shear else ''}; use method = \"march\"")
     drive = drive_of(scene)
-    closed = closed and isinstance(drive, BaseSine) and simple(scene)
+    closed = closed and bool(drive.segments) and simple(scene)
     engine = "exact" if closed and accuracy.method != "march" else "march"
     if engine == "march" and f is not None:
         _refuse(scene, shear, side)
@@ -213,55 +213,16 @@ def contact_model(scene, settings: Settings, patch, drive):
     return hub.points_model(law, [1.0], [load])
 
 
-def whole(span: float, drive) -> bool:
-    """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
-    return span > drive.period * (1 - 1e-6)
-
-
 def _ledger(ledger) -> dict:
     """Measures of the ledger but for what is stored, which depends on the instant at which the run ends."""
     return {name: value for name, value in ledger_measures(ledger).items() if name != "energy_stored"}
-
-
-def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None,
-              share: float = 1.0) -> Raw:
-    """Closed-form run of a Coulomb scene, or of a structure without friction; share: of mu N that the law keeps."""
-    from .dynamics.histories import simulate
-
-    f = acting(scene).friction
-    static = f.static * load * share if f is not None else 0.0
-    kinetic = f.kinetic * load if f is not None and f.kinetic is not None else static
-    travel = scene.structure.travel or np.inf
-    begin = perf_counter()
-    done = simulate(modes, drive, static, kinetic, settings.cycles, settings.window, travel, progress)
-    last = min(settings.window, len(done.amplitudes))
-    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
-    span = done.window.time[-1] - done.window.time[0]
-    if f is not None:
-        slip = done.window.slip
-        values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
-                   "normal_load": load, **_ledger(np.array([[done.ledger["friction"]], [0.0]])[[0, 1, 0, 1]])}
-        if done.starts.size:
-            values["slip_start_phase"] = circular_mean(done.starts)
-        time, weight, slide, rate, force = done.loop
-        work = float(weight @ (force * rate)) * drive.period / span
-        omega = simulate_drive.omega_of(drive)
-        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, mode_stiffness(scene)) if whole(span, drive) else {}
-    else:
-        values.pop("friction_force_peak")
-    stuck = f is not None and done.stick >= span * (1 - 1e-12)
-    outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
-               done.ledger, perf_counter() - begin)
 
 
 def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
     """One march at settings.steps per cycle."""
     from . import simulate_levels
     from . import simulate_march as hub
-    from .simulate_interfaces import model_of
+    from .simulate_interfaces import model_of, other_measures
     from .simulate_march import Mark
 
     travel, marks, start = scene.structure.travel or np.inf, simulate_levels.ends(scene), start_of(scene, modes)
@@ -285,7 +246,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         held *= scene.friction.law != "tanh"  # a law of the speed never holds
 
         def rubbing(part):
-            return _rubbing(scene, settings, modes, drive, patch, part)
+            return _rubbing(scene, settings, modes, drive, patch, part) | other_measures(part.window, drive,
+                                                                                         settings.steps)
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
@@ -309,7 +271,7 @@ def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -
     """Measures of the interface in a Mark of a march."""
     w, omega = part.window, simulate_drive.omega_of(drive)
     values = slip_measures(w, drive, settings.steps)
-    if not sinusoidal(drive):
+    if not simulate_drive.sinusoidal(drive):
         values.pop("slip_start_phase", None)
     values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
     weight = np.full(w.time.size, 1.0)
@@ -317,15 +279,10 @@ def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -
     span = w.time[-1] - w.time[0]
     work = part.work * drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
-    if whole(span, drive):
+    if simulate_drive.whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,
                                  mode_stiffness(scene))
     return values
-
-
-def sinusoidal(drive) -> bool:
-    """Whether a drive ends as a sine: only then do phases and steady cycles mean anything."""
-    return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
 
 def list_cost(scene, settings: Settings, drive) -> tuple:

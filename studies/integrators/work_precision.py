@@ -4,8 +4,8 @@ Largest error of the slide over the last 5 of 60 (block) or 20 cycles, CPU time 
 of everybody. Where friction is Coulomb's and the drive a sine, the event engine is exact in 18 ms (block, even as plain
 Python); for 1e-6 DOP853 with events takes 7 times as long, CVODE with its root finder 4 times, the march 11 times, and
 Siconos (theta = 1/2) 16 times as long for 1e-4. On the two masses of Fig 16, with more events per time and twice the
-modes, plain Python takes 59 ms, and DOP853 and CVODE reach 1e-6 in half of that. (The event engine is the truth of both, drawn at
-1e-13; DOP853 at 1e-12 is within 3e-12 and 3e-11 of it.)
+modes, plain Python takes 59 ms, and DOP853 and CVODE reach 1e-6 in .55 and .58 of that. (The event engine is the truth
+of both, drawn at 1e-13; DOP853 at 1e-12 is within 3e-12 and 3e-11 of it.)
 
 On a patch that slips part by part (41 parallel elements, two modes) there is no closed form: the march needs 7 ms for
 5e-3 and 33 ms for 1e-4; CVODE takes 23 times as long for 1e-2 and 7 times for 1e-4, DOP853 17 times for 1e-4. The march
