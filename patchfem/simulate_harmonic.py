@@ -14,7 +14,33 @@ from .simulate_harmonic_point import Periodic, point
 from .simulate_harmonic_stability import with_stability
 
 __all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "Periodic", "Spring", "Stretch", "Tanh", "backbone",
-           "branches", "law_of_model", "levels", "periodic_response", "point", "response", "with_stability"]
+           "branches", "law_of_model", "levels", "periodic_response", "point", "regime", "response", "with_stability"]
+
+
+STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
+
+
+def regime(periodic: Periodic) -> tuple:
+    """(name, share of the friction limit that slips within a cycle): "stuck", "partial slip", "slides", "no friction".
+
+    An elastic-plastic element slips where the slide's swing exceeds twice its limit slide, bonds where their slip does
+    STUCK bond lengths; a law of the speed always slides.
+    """
+    slips = whole = 0.0
+    for track, laws in zip(periodic.group.tracks(periodic.coefficients, periodic.omega), periodic.group.laws):
+        places = track.turning[1]
+        swing = float(np.ptp(places)) if places.size else 0.0
+        for law in laws:
+            found = law.sample(track)
+            whole += found.limit
+            if isinstance(law, Jenkins):
+                slips += float(law.stiffness @ (law.limit_slide * (2 * law.limit_slide < swing)))
+            elif found.limit:
+                held = isinstance(law, Stretch) and np.ptp(track.q - found.stretch / found.limit) < STUCK * law.length
+                slips += 0.0 if held else found.limit
+    share = slips / whole if whole else 0.0
+    return ("no friction" if not whole else "stuck" if not slips else "slides" if share > 1 - 1e-12 else
+            "partial slip"), share
 
 
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:

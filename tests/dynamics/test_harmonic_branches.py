@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, PatchfemError
-from patchfem.dynamics.backbone import FreeBalance
+from patchfem.dynamics.backbone import FreeBalance, stuck_mode, trace
 from patchfem.dynamics.continuation import follow
 from patchfem.dynamics.floquet import exponentials, is_stable, kind_of_loss, multipliers, product
 from patchfem.dynamics.harmonic import Balance
@@ -280,6 +280,20 @@ def test_exact_the_jacobian_of_the_free_balance():
     found = np.stack([(equations.system(x + d, 0.6)[0] - equations.system(x - d, 0.6)[0]) / 2e-6
                       for d in 1e-6 * np.eye(9)], axis=1)
     assert equations.system(x, 0.6)[1] == pytest.approx(found, abs=1e-7)
+
+
+def test_exact_the_free_motion_balances_every_mode():
+    """Coupled damping: the modal equations with the balancing negative damping, harmonic by harmonic."""
+    modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
+    group = Group(modes, Jenkins(*many(20)), 512)
+    omega, shape = stuck_mode(modes, group.rows, group.stiffness(), 1)
+    for free in trace(FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape):
+        for k in range(6):
+            a = np.diag(modes.omega**2 - (k * free.omega)**2) + 1j * k * free.omega * (
+                modes.dampers - 2 * free.zeta * free.omega * np.eye(5))
+            rest = a @ free.modal[k] + modes.slide * free.forces[0, k] / modes.mass
+            assert np.abs(rest).max() < 1e-9 * free.amplitude
+        assert free.modal[1, 1] == free.amplitude and free.slides[0] == pytest.approx(free.modal @ modes.slide)
 
 
 def test_exact_backbone_of_the_undamped_duffing_oscillator():

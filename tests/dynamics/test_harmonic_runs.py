@@ -9,7 +9,7 @@ from patchfem.core import BaseSine, ModalBasis, NotConverged
 from patchfem.response.measures import acceleration_peak, harmonic, interface_loop, slip_measures
 from patchfem.scene import loads
 from patchfem.simulate import plan, run
-from patchfem.simulate_harmonic import periodic_response, point
+from patchfem.simulate_harmonic import periodic_response, point, regime
 from patchfem.simulate_harmonic_branch import response
 from patchfem.simulate_harmonic_laws import Jenkins, Spring, Stretch, synthesis
 from patchfem.simulate_harmonic_point import group_of
@@ -115,6 +115,19 @@ def test_always_a_sweep_finds_what_cold_starts_find():
     for p in swept.points:
         cold = point(modes, BaseSine(1.0, p.omega), law, tolerance=1e-4)
         assert p.amplitude([1.0]) == pytest.approx(cold.amplitude([1.0]), rel=3e-4)
+
+
+def test_exact_regimes():
+    """Slides of a given swing through elements that slip at 0.1 and 0.5."""
+    modes, law = sdof(0.0), Jenkins([1.0, 1.0], [0.1, 0.5])
+    for amplitude, want in ((0.05, ("stuck", 0.0)), (0.3, ("partial slip", 0.1 / 0.6)), (0.6, ("slides", 1.0))):
+        # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
+        p = point(modes, BaseSine(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
+        name, share = regime(p)
+        assert (name, share) == (want[0], pytest.approx(want[1]))
+    assert regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
+    assert regime(point(modes, BaseSine(1e-4, 0.5), Stretch(1.0, 1.0), harmonics=3))[0] == "stuck"
+    assert regime(point(modes, BaseSine(1.0, 0.5), Stretch(0.1, 0.1), harmonics=7))[0] == "slides"
 
 
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
