@@ -154,7 +154,7 @@ class SlotRun(Run):
         return out + (super().strained() if self.model.patch is not None else 0.0)
 
     def response(self, rows, number) -> Response:
-        """Histories; `extra` has slides, slide_rates, forces, slips (k, i) of the interfaces and spring_forces (k, s)."""
+        """Histories; `extra`: slides, slide_rates, forces, slips (k, i) of the interfaces, spring_forces (k, s)."""
         n, modes = 2 * self.modes.omega.size, self.modes
         out = super().response(rows, number)
         parts = rows[:, n + 10:].reshape(len(rows), len(self.kinds), 4)
