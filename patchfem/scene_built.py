@@ -21,14 +21,8 @@ NOT_YET_BUILT: dict[str, str] = {
     "structure.mode.lateral": "",
     "structure.mode.yaw": "",
     "wear": "",
-    "accuracy.method=duhamel": "auto, exact or march",
-    "accuracy.method=newmark": "auto, exact or march",
-    "accuracy.method=euler": "auto, exact or march",
     "accuracy.method=harmonic": "auto, exact or march",
     "accuracy.harmonics": "",
-    "accuracy.convergence": "",
-    "accuracy.convergence_tolerance": "",
-    "accuracy.stick_speed": "",
 }
 
 
@@ -59,10 +53,8 @@ def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
 
 def combinations(draft: Draft, kind: str) -> None:
     """Say every combination of built keys that a run of this kind cannot do yet; silent about values not there."""
-    contact, law, accuracy = draft.tables.contact, draft.tables.friction, draft.tables.accuracy
+    contact, law = draft.tables.contact, draft.tables.friction
     shear = contact.gives_way if contact is not None else ""
-    if kind == "linear" and accuracy and accuracy.method == "march":
-        draft.say("accuracy.method", "'march' without friction: leave method out; not yet built")
     if kind not in ("bench", "rig") or law is None:
         return
     normal = draft.tables.normal

@@ -63,7 +63,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         warnings = [*warnings, *unripe(law, float(np.abs(raw.window.slide_rate).max())),
                     *creeping(law, outcome, found)]
     warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
-    warnings = [*warnings, raw.message] if raw.message else warnings
+    warnings = [*warnings, *raw.notes, *([raw.message] if raw.message else [])]
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 
 
@@ -83,11 +83,14 @@ def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, sa
     from .response.errors import step_error, with_errors
 
     frames = FRAMES if patch is not None else 0
-    raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
+    go = rig.run_march
+    if settings.engine in rig.COMPARED:
+        from .simulate_comparison import run_comparison as go
+    raw = go(scene, settings, modes, drive, patch, frames, say, progress)
     seconds |= {"march": raw.seconds, "reduce": raw.prepare["reduce"], "load": raw.prepare["load"], "error": 0.0}
     if not estimate or raw.outcome is Outcome.NOT_CONVERGED:
         return raw, settings, with_errors(raw.values)
-    half, quarter = (rig.run_march(scene, replace(settings, steps=max(1, settings.steps // k)), modes, drive, patch)
+    half, quarter = (go(scene, replace(settings, steps=max(1, settings.steps // k)), modes, drive, patch)
                      for k in (2, 4))
     seconds["error"] += half.seconds + quarter.seconds
     rest = _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds)
@@ -107,7 +110,7 @@ def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, sa
             return raw, settings, found
         half, quarter, settings = raw, half, replace(settings, steps=again)
         seconds["error"] += raw.seconds
-        raw = rig.run_march(scene, settings, modes, drive, patch, frames, say, progress)
+        raw = go(scene, settings, modes, drive, patch, frames, say, progress)
         seconds["march"] = raw.seconds
 
 

@@ -25,6 +25,8 @@ from .simulate_acting import acting
 from .simulate_structure import highest_frequency, mode_stiffness
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
+COMPARED = ("duhamel", "newmark", "euler")
+COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
 
 
@@ -45,7 +47,7 @@ class Settings:
 class Raw:
     """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
     error) or (None, None), snapshots; levels: of a run in levels, slips: as `simulate_levels.onset` asks;
-    log: events of the exact engine."""
+    log: events of the exact engine; notes: warnings of the method."""
 
     values: dict
     response: Response
@@ -62,6 +64,7 @@ class Raw:
     levels: tuple = ()
     slips: object = None
     log: object = None
+    notes: tuple = ()
 
 
 def modes_of(scene) -> ModalBasis:
@@ -89,13 +92,6 @@ def speed_of(scene, drive) -> float:
     return simulate_drive.peak_speed(drive, start_of(scene, modes_of(scene)))
 
 
-def simple(scene) -> bool:
-    """Whether a structure is linear and every interface of [[structure.interface]] slides by Coulomb's law."""
-    bonded = scene.structure.bonded
-    bent = scene.structure.stiffening is not None or (bonded is not None and bonded.wavelength is not None)
-    return not bent and all(one.law == "coulomb" for one in scene.structure.interface)
-
-
 def law_of(scene, speed: float) -> Bonds:
     """Bond law of [friction]; `speed` [m/s] sets the default floor v_h = 1e-3 of the peak speed."""
     f = acting(scene).friction
@@ -106,22 +102,14 @@ def law_of(scene, speed: float) -> Bonds:
 
 def choose(scene, per_point: bool = False) -> Settings:
     """Engine and numerical settings from the scene; PatchfemError for a method that cannot do it."""
-    accuracy, f, contact = scene.accuracy, scene.friction, scene.contact
-    shear = contact.gives_way if contact is not None else ""
-    closed = f is None or (f.law in ("coulomb", "convolution") and not shear)
+    accuracy, contact = scene.accuracy, scene.contact
     side = "upper"
     if contact is not None:
         from .simulate_plan import shape_side
 
         side = shape_side(contact)
-    if accuracy.method == "exact" and not closed:
-        raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
-                            f"{f' with {shear}' if shear else ''}; use method = \"march\"")
     drive = drive_of(scene)
-    closed = closed and bool(drive.segments) and simple(scene)
-    engine = "exact" if closed and accuracy.method != "march" else "march"
-    if engine == "march" and f is not None:
-        _refuse(scene, shear, side)
+    engine = engine_of(scene, drive, side)
     cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
     fastest = max(simulate_drive.fastest(drive), highest_frequency(scene) * drive.period)
@@ -129,11 +117,51 @@ def choose(scene, per_point: bool = False) -> Settings:
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
-    if engine == "march" and side == "lower" and accuracy.quadrature not in ("auto", "recursion"):
-        raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{accuracy.quadrature}' with pressure on the lower "
-                            "piece in the rig: not yet built; use \"recursion\" or the upper piece")
+    if engine in COMPARED:
+        steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Settings(engine, steps, cycles, window, accuracy.shear_modes, per_point or side == "lower",
                     frozenset(pinned))
+
+
+def engine_of(scene, drive, side: str) -> str:
+    """"exact" where a closed form exists, else "march", or the method that the scene names."""
+    method, f, contact = scene.accuracy.method, scene.friction, scene.contact
+    shear = contact.gives_way if contact is not None else ""
+    if method in COMPARED:
+        if shear:
+            raise PatchfemError(f"{scene.where('accuracy.method')}: '{method}' takes an interface as a whole, not "
+                                f"{shear}; use method = \"march\"")
+        return method
+    if method == "harmonic":
+        return method
+    why = no_closed_form(scene, drive, shear)
+    if method == "exact" and why:
+        raise PatchfemError(f"{scene.where('accuracy.method')}: no exact solution exists {why}; use method = \"march\"")
+    if not why and method != "march":
+        return "exact"
+    if f is not None:
+        _refuse(scene, shear, side)
+    if side == "lower" and scene.accuracy.quadrature not in ("auto", "recursion"):
+        raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{scene.accuracy.quadrature}' with pressure on the "
+                            "lower piece in the rig: not yet built; use \"recursion\" or the upper piece")
+    return "march"
+
+
+def no_closed_form(scene, drive, shear: str) -> str:
+    """Why a run has no exact solution; empty where it has one."""
+    f, structure = scene.friction, scene.structure
+    laws = [one.law for one in structure.interface] or ([f.law] if f is not None else [])
+    if odd := [law for law in laws if law not in ("coulomb", "convolution")]:
+        return f"for law '{odd[0]}'{f' with {shear}' if shear else ''}"
+    if shear and laws:
+        return f"with {shear}"
+    if not drive.segments:
+        return f"under a drive of waveform '{scene.drive.waveform}'"
+    if structure.stiffening is not None:
+        return "with [structure.stiffening]"
+    if structure.bonded is not None and structure.bonded.wavelength is not None:
+        return "with structure.bonded.wavelength"
+    return ""
 
 
 def quadrature_of(scene, settings: Settings, drive):
