@@ -82,7 +82,8 @@ def start_of(scene, found: ModalBasis) -> Start:
         try:
             return starts.given(found, structure.start.displacement, structure.start.velocity)
         except PatchfemError as error:
-            raise PatchfemError(f"{scene.where('structure.start')}: {error}") from None
+            text = str(error).removeprefix("structure.start: ")
+            raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
     if drive.kind == "free":
         named = structure.masses is not None or drive.mass is not None
         if not named:
@@ -170,6 +171,8 @@ def refuse_unbuilt(scene, found: ModalBasis) -> None:
     if scene.structure.interface:
         raise PatchfemError(f"{scene.where('structure.interface')}: runs with it are not yet built; use "
                             "[[structure.mode]] with [friction] meanwhile")
+    if scene.structure.start is not None:
+        raise PatchfemError(f"{scene.where('structure.start')}: runs with it are not yet built; leave it out meanwhile")
     if found.damping is not None:
         raise PatchfemError(f"{scene.where('structure')}: dampers couple the modes here (or act on a rigid one): use "
                             "damping in proportion to mass and stiffness; not yet built")
