@@ -82,7 +82,8 @@ def start_of(scene, found: ModalBasis) -> Start:
         try:
             return starts.given(found, structure.start.displacement, structure.start.velocity)
         except PatchfemError as error:
-            raise PatchfemError(f"{scene.where('structure.start')}: {error}") from None
+            text = str(error).removeprefix("structure.start: ")
+            raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
     if drive.kind == "free":
         named = structure.masses is not None or drive.mass is not None
         if not named:

@@ -23,9 +23,10 @@ def _found(scene) -> tuple:
         stamp = path.stat()
     except OSError as error:
         raise PatchfemError(f"{scene.where('structure.file')}: {path} cannot be read ({error.strerror})") from None
+    kind, mass = scene.drive.kind, scene.drive.mass
     try:
-        data = _read(path, stamp.st_mtime_ns, stamp.st_size)
-        return _measured(scene, data) if path.suffix.lower() in (".uff", ".unv") else _arrays(scene, data)
+        return _built(path, stamp.st_mtime_ns, stamp.st_size, scene.structure, kind, None if kind == "base" else mass,
+                      scene.kind == "rig")
     except PatchfemError as error:
         head, _, rest = str(error).partition(": ")
         named = head.startswith(("structure.", "drive."))
@@ -43,23 +44,31 @@ def _read(path, changed: int, size: int):
     return read(path)
 
 
-def _arrays(scene, data) -> tuple:
+@lru_cache(maxsize=8)
+def _built(path, changed: int, size: int, structure, kind: str, mass: int | None, rubs: bool) -> tuple:
+    """(basis, notes) of a file of this age; rubs: an interface is needed."""
+    data = _read(path, changed, size)
+    if path.suffix.lower() in (".uff", ".unv"):
+        return _measured(data, structure, kind, mass)
+    return _arrays(data, structure, kind, mass, rubs)
+
+
+def _arrays(data, structure, kind, mass, rubs) -> tuple:
     from .structure import arrays
 
-    structure, drive = scene.structure, scene.drive
+    forced = kind == "force"
     pairs = [one.between for one in structure.interface]
-    found = arrays.basis(data, pairs, drive.mass if drive.kind == "force" else None, drive.kind == "force",
-                         structure.moving_mass)
-    if scene.kind == "rig" and not len(found.interfaces):
+    found = arrays.basis(data, pairs, mass if forced else None, forced, structure.moving_mass)
+    if rubs and not len(found.interfaces):
         raise PatchfemError("structure.file: lacks slide, the motion at the patch; give it, or [[structure.interface]]")
     return found, []
 
 
-def _measured(scene, shapes) -> tuple:
+def _measured(shapes, structure, kind, mass) -> tuple:
     from .structure import places
 
-    structure, forced = scene.structure, scene.drive.kind == "force"
-    if scene.drive.mass is not None and scene.drive.kind != "base":
+    forced = kind == "force"
+    if mass is not None:
         raise PatchfemError("drive.mass: a universal file has no numbered masses; use structure.force_at or output_at")
     found = places.basis(shapes, structure.moving_mass, {key: getattr(structure, key) for key in PLACES}, forced)
     return found, [*shapes.notes, *([] if forced else places.held_note(found))]

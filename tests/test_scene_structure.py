@@ -116,7 +116,9 @@ def test_exact_numbers_for_the_plan():
     assert frequencies(free)[0] == 0.0
     assert first_frequency(free) == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
     assert plan(free).chain["mode"] == pytest.approx(1.5e5 / (2 / 3)), "modal mass at the output 1/(2/3)"
-    assert friction_limit(loads(RUB + MASSES), 0.0) == pytest.approx(3.0)
+    rub = loads(RUB + MASSES)
+    assert friction_limit(rub, 0.0) == pytest.approx(3.0)
+    assert plan(rub).groups["D"] == pytest.approx(3.0 / (moving_mass(rub) * 2.0))
     second = loads(LINEAR, sets=["structure.mode.axial.frequency=0 Hz"])
     assert first_frequency(second) == 990.0
 
@@ -270,6 +272,9 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
     np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
     with pytest.raises(PatchfemError, match=r"structure\.file: lacks slide"):
         modes_of(write_scene(tmp_path, POINT + FILE))
+    late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
+    with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values stand for 2 modes or masses"):
+        start_of(late, modes_of(late))
     with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
     for text, says in ((FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),

@@ -220,6 +220,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     notes += [f"the mode at {f / (2 * np.pi):.5g} Hz does not move {_named(ref)} and is left out" for f in w[~good]]
     if not good.any():
         raise PatchfemError(f"structure.file: no mode moves {_named(ref)} with the force there; check its sign")
+    notes += _below(fit, theta, data[:, alive], omega)
     misfit = np.linalg.norm(fit.residual(theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > 0.5:
         raise NotConverged(f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained")
@@ -228,6 +229,17 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
                      "unexplained")
     shape = A[good] / np.sqrt(own[good])[:, None]
     return Shapes(w[good] / (2 * np.pi), zeta[good], {place: shape[:, k] for k, place in enumerate(places)}, notes)
+
+
+def _below(fit, theta, data, omega) -> list:
+    """A sentence where modes below the band, rigid ones among them, make up much of the lowest frequency."""
+    first = fit.residues(theta)[1] / omega[0]**2 * np.abs(fit.lift[0])
+    share = np.linalg.norm(first) / np.linalg.norm(data[0])
+    if share < 0.2:
+        return []
+    return [f"motion below the band makes up {100 * min(share, 1):.0f} % of the responses at "
+            f"{omega[0] / 2 / np.pi:.4g} Hz and is left out; a rig that nothing holds needs its rigid modes: use "
+            "masses or matrices"]
 
 
 def _named(place) -> str:

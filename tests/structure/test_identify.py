@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses
-from patchfem.structure.identify import modes_from_responses, poles
+from patchfem.structure.identify import Fit, modes_from_responses, poles
 from patchfem.structure.response import receptance
 
 BAND = np.arange(20.0, 400.0, 0.5)
@@ -65,9 +65,22 @@ def test_always_modes_outside_the_band_go_into_the_rest():
     found = modes_from_responses(BAND, measured, [])
     inside = [np.abs(found.frequency - one).argmin() for one in (100, 200)]
     np.testing.assert_allclose(found.frequency[inside], [100, 200], rtol=1e-4)
+    assert np.all((found.frequency > 20) & (found.frequency < 400))
     got = np.stack([found.motion[k + 1, 0][inside] for k in range(4)])
     signs = np.sign(shape[0, 1:3])
     np.testing.assert_allclose(got, shape[:, 1:3] * signs, atol=0.02 * np.abs(shape).max())
+
+
+def test_exact_jacobian_is_the_derivative_off_the_columns():
+    """Central differences of the residual, less what lies in the span of the design, which Kaufman leaves out."""
+    shape = np.random.default_rng(1).normal(size=(2, 2))
+    fit = Fit(2 * np.pi * BAND, responses([100, 200], [0.05, 0.1], shape), np.zeros(2, int))
+    theta = np.log([600.0, 1300.0, 0.08, 0.06])
+    Q, jacobian = fit.solve(theta)[2], fit.jacobian(theta)
+    for k in range(4):
+        step = 1e-5 * np.eye(4)[k]
+        slope = (fit.solve(theta + step)[0] - fit.solve(theta - step)[0]) / 2e-5
+        np.testing.assert_allclose(jacobian[:, k], (slope - Q @ (Q.T @ slope)).ravel(), atol=1e-7 * np.abs(slope).max())
 
 
 def test_exact_shapes_of_masses():
@@ -84,6 +97,17 @@ def test_exact_shapes_of_masses():
     got = np.stack([found.motion[k, 2] for k in range(3)])
     np.testing.assert_allclose(got, rig.shapes * np.sign(rig.shapes[1]), atol=1e-6)
     assert not notes
+
+
+def test_always_a_free_rig_is_told_that_its_rigid_mode_is_missing():
+    """Two free masses: of rigid mode and sqrt(2) the elastic one is found, and the rigid one named as left out."""
+    rig = masses.basis([1.0, 1.0], [((1, 2), 4e5)], [((1, 2), 8.0)], [], 1)
+    H = receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[0])[:, :, 0]
+    notes = []
+    found = modes_from_responses(BAND, {((k, 0), (0, 0)): (H[:, k], 0) for k in range(2)}, notes)
+    np.testing.assert_allclose(2 * np.pi * found.frequency, rig.omega[1:], rtol=1e-9)
+    np.testing.assert_allclose(found.motion[0, 0], np.sqrt(0.5), rtol=1e-6)
+    assert len(notes) == 1 and "rigid modes" in notes[0]
 
 
 def test_refuses_responses_without_scale_or_modes():

@@ -8,6 +8,7 @@ from scipy.linalg import eig, eigh
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses, matrices
+from patchfem.structure.response import receptance
 
 
 def chain(n, held=True, k=1.0):
@@ -69,6 +70,22 @@ def test_exact_soft_mode_beside_a_stiff_link():
     found = masses.basis([1.0, 1.0], [((1, 0), 1.0), ((1, 2), 1e14)], [], [(2, 0)], 1)
     assert found.omega[0] == pytest.approx(np.sqrt(0.5), rel=1e-7)
     assert found.omega[1] == pytest.approx(np.sqrt(2e14), rel=1e-12)
+
+
+@given(st.integers(0, 10**6), st.integers(2, 6))
+def test_always_springs_one_by_one_are_their_matrix(seed, n):
+    """The same net of springs by its single springs (singular values) and by its K (eigenvalues), free or held."""
+    rng = np.random.default_rng(seed)
+    pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)][int(rng.integers(0, 2)):]
+    springs = [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))]
+    m = rng.uniform(0.5, 2, n)
+    rows = masses.rows(pairs, n)
+    ours = masses.basis(m, springs, [], [(1, 0)], n)
+    want = matrices.basis(np.diag(m), rows.T @ np.diag([k for _, k in springs]) @ rows, faces=masses.rows([(1, 0)], n))
+    np.testing.assert_allclose(ours.omega, want.omega, atol=1e-12)
+    assert (ours.omega == 0).sum() == (want.omega == 0).sum() == n - len(springs)
+    w = np.array([0.37])
+    np.testing.assert_allclose(*(receptance(one, w, one.slide, one.base) for one in (ours, want)), rtol=1e-8)
 
 
 @given(st.integers(0, 10**6), st.integers(1, 6))
