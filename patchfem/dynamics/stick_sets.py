@@ -148,8 +148,8 @@ def settle(system: System, entry: Entry, signs, resting, omega: float, unit: flo
             choice = _judge(system, entry, guess, resting, omega, unit, noise)
             if choice is not None:
                 return choice
-    raise NotConverged("dynamics: no state of stick and slip satisfies the law of friction after an event; with "
-                       "friction.kinetic below static and coupled interfaces there may be none: raise kinetic")
+    raise NotConverged("dynamics: no state of stick and slip that satisfies the law of friction was found after an "
+                       "event; bring friction.kinetic nearer to static, or use method = \"march\"")
 
 
 def _guesses(system, entry, signs, resting):
@@ -205,10 +205,20 @@ def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int,
 
 def _by_squares(system, entry, signs, resting):
     """Choices for many faces at rest: forces that minimise the square of the accelerations, then their own, within the
-    static limits; the faces at a limit in every combination; at last, for not too many, everything."""
+    static limits; or within the kinetic ones, where the law always has a solution; at last, for not too many faces,
+    every choice."""
     rest = list(resting)
-    faces, limit = system.faces[rest], system.static[rest]
-    moving = [0 if c in resting else s for c, s in enumerate(signs)]
+    static = system.static[rest]
+    for limit in (static, np.maximum(system.kinetic[rest], 1e-9 * static)):
+        yield from _within(system, entry, signs, rest, limit)
+    if len(rest) <= MANY:
+        yield from sorted(product((0, 1, -1), repeat=len(rest)), key=lambda c: sum(map(abs, c)))
+
+
+def _within(system, entry, signs, rest, limit):
+    """Choices by forces within `limit`, in every combination of the faces that are at theirs without moving."""
+    faces, moving = system.faces[rest], np.array(signs)
+    moving[rest] = 0
     pull = entry.under(system, moving * system.kinetic)[0][system.n:2 * system.n]
     large, fixed = np.abs(faces) @ np.abs(pull) + np.abs(faces @ faces.T) @ limit / system.mass, {}
     for _ in range(4 * len(rest)):
@@ -223,8 +233,6 @@ def _by_squares(system, entry, signs, resting):
     for choice in sorted(product((1, 0), repeat=min(len(edge), 10)), key=sum, reverse=True):
         slips = fixed | {k: int(np.sign(force[k])) for k, yes in zip(edge, choice) if yes}
         yield tuple(slips.get(k, 0) for k in range(len(rest)))
-    if len(rest) <= MANY:
-        yield from sorted(product((0, 1, -1), repeat=len(rest)), key=lambda c: sum(map(abs, c)))
 
 
 def _forces(faces, mass: float, pull, limit, fixed):

@@ -9,7 +9,7 @@ from event_reference import march_reference, run_reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError, Segment, Start
+from patchfem.core import BaseSine, ModalBasis, PatchfemError, Segment, Start
 from patchfem.dynamics import drives
 from patchfem.dynamics.engine import Engine
 from patchfem.dynamics.event_list import BORDER, RELEASE, REVERSAL, STOP
@@ -206,7 +206,7 @@ def test_exact_seven_interfaces_stop_together():
 
 
 @settings(max_examples=40)
-@given(st.integers(0, 10**6), st.integers(5, 7), st.floats(0.6, 1.0))
+@given(st.integers(0, 10**6), st.integers(5, 11), st.floats(0.3, 1.0))
 def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
     """All at rest at once: the accelerations of the choice agree with its signs, the forces with their limits."""
     rng = np.random.default_rng(seed)
@@ -216,21 +216,21 @@ def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
     system = System(modes, np.asarray(modes.interfaces), static, ratio * static)
     z, v = rng.normal(size=n), rng.normal(size=n)
     rows = system.faces
+    weak = np.linalg.matrix_rank(rows) < faces
     v -= np.linalg.pinv(rows) @ (rows @ v)
     entry = Entry(system, z, v, 0.7, 0.3, 0.4)
-    try:
-        choice = settle(system, entry, (0,) * faces, range(faces), 1.0, 0.3)
-    except NotConverged:
-        assert ratio < 1  # with static above kinetic friction there may be no such state
-        return
+    choice = settle(system, entry, (0,) * faces, range(faces), 1.0, 0.3)
     flow = system.stick_set(tuple(s == 0 for s in choice.signs), 1.0, 0.3)
     full, _ = entry.under(system, choice.given)
     accel = rows @ (flow.motion[2] @ full) * 2 / 0.09
     for c, sign in enumerate(choice.signs):
-        if sign:
+        if choice.held[c]:
+            assert abs(accel[c]) < 1e-9
+        elif sign:
             assert sign * accel[c] > 0
         else:
             assert abs(accel[c]) < 1e-9 and abs(flow.watch[c][0] @ full) <= static[c] * (1 + 1e-9)
+    assert weak or not any(choice.held)
 
 
 # starts, drives and printed numbers
@@ -360,10 +360,10 @@ def test_exact_phase_after_a_million_cycles():
 
 
 @pytest.mark.slow
-def test_exact_million_cycles():
+def test_exact_hundred_thousand_stuck_cycles():
     rate = 2 * pi * 0.37
-    drive, modes = drives.levels([0.5, 1.25], rate, 10**6), basis_of(rate, 0.003)
-    late = simulate(modes, drive, 1.0, 1.0, 10**6 + 4, 4)
+    drive, modes = drives.levels([0.5, 1.25], rate, 10**5), basis_of(rate, 0.003)
+    late = simulate(modes, drive, 1.0, 1.0, 10**5 + 4, 4)
     early = simulate(modes, BaseSine(1.25, rate), 1.0, 1.0, 4, 4)
     np.testing.assert_allclose(late.amplitudes[-4:], early.amplitudes, atol=1e-14)
     np.testing.assert_allclose(late.log.phase[-10:], early.log.phase[-10:], atol=1e-13)
@@ -505,3 +505,10 @@ def test_exact_interface_without_friction_among_others():
     assert set(two.log.interface) == {1} and two.stick == 0 and not two.window.force.any()
     np.testing.assert_array_equal(two.window.extra["forces"][:, 1], one.window.force)
     assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-13)
+
+
+def test_exact_log_has_a_limit(monkeypatch):
+    monkeypatch.setattr("patchfem.dynamics.event_list.ROOM", 30)
+    log = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 20).log
+    assert log.time.size == log.slide.size == 30 and log.count == 80
+    assert not log.time.flags.writeable
