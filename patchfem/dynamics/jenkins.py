@@ -68,7 +68,7 @@ class Jenkins:
                 z, pull = z + shift, pull + k * shift
                 if ends:
                     way = 1.0 if pull > 0 else -1.0
-                    pull, step[2] = way * self.limit, 0.0
+                    pull = way * self.limit
             else:
                 g0 = way * (bs - self.w**2 * z) - self.limit
                 span = stop(way * v, g0, way * bc, way * bs, self.free, left)

@@ -417,13 +417,15 @@ def test_exact_a_dip_of_the_speed_is_not_missed(over):
         assert end * om == pytest.approx(2 * asin(sqrt(1 + over * om / (2 * b))), abs=1e-15 / sqrt(-over))
 
 
-def test_always_the_longest_travel_ends_the_run():
-    modes, drive = modes_of(W, 0.003), BaseSine(8 * G_N, W)
-    a = histories.simulate(modes, drive, 39.0, 39.0, 100, 10, 1e-4)
-    b = simulate(modes, drive, 39.0, 39.0, 100, 10, 1e-4)
+@pytest.mark.parametrize("base", [1.0, -1.0])
+@pytest.mark.parametrize("stop", [1e-4, 1.1e-4, 1.2e-4])
+def test_always_the_longest_travel_ends_the_run(base, stop):
+    modes, drive = modes_of(W, 0.003, base=base), BaseSine(8 * G_N, W)
+    a = histories.simulate(modes, drive, 39.0, 39.0, 100, 10, stop)
+    b = simulate(modes, drive, 39.0, 39.0, 100, 10, stop)
     assert a.outcome == b.outcome == Outcome.EXCEEDS_TRAVEL
     assert b.cycles_done == pytest.approx(a.cycles_done, rel=1e-10)
-    assert abs(b.window.output[-1]) == pytest.approx(1e-4, rel=1e-10)
+    assert abs(b.window.output[-1]) == pytest.approx(stop, rel=1e-10)
 
 
 def test_refuses_what_it_is_not_for():
@@ -438,6 +440,26 @@ def test_refuses_what_it_is_not_for():
         simulate(modes_of(slide=0.0), BaseSine(1.0, 1.0), 0.1, 0.1, 5)
     with pytest.raises(PatchfemError, match="travel"):
         simulate(modes_of(), BaseSine(1.0, 1.0), 0.1, 0.1, 5, travel=1.0, start=Start(np.array([2.0]), np.zeros(1)))
+
+
+@pytest.mark.parametrize("friction, kinetic, ratio", [(0.3, 0.3, 0.5), (0.6, 0.6, 1.0), (0.5, 0.4, 1.6)])
+def test_exact_power_changes_its_sign(friction, kinetic, ratio):
+    """The integral of |power in| against fine samples; with and without damping to divide by."""
+    for zeta in (0.0, 0.05):
+        result = driven(friction, zeta, ratio, 4, kinetic=kinetic, window=4)
+        fine = np.linspace(0, result.window.time[-1], 400_001)
+        power = np.abs(np.sin(ratio * fine) * np.interp(fine, result.window.time, result.window.slide_rate))
+        assert result.ledger["power"] == pytest.approx(power.mean() * fine[-1], rel=1e-4)  # samples 1/400 cycle apart
+
+
+def test_exact_release_at_rounding_from_its_phase():
+    """A stick that begins a rounding error past the release lets go at once, not a cycle later; one that begins where
+    the limit is just no longer passed waits for the other direction."""
+    for sign in (1.0, -1.0):
+        here = asin(0.8) + (0.0 if sign > 0 else pi)
+        assert sdof_kernels.release(0.0, sign, here + 1e-15, 0.8)[:2] == (0.0, 1.0)
+        wait, way, _, _ = sdof_kernels.release(0.0, sign, here + pi - 2 * asin(0.8) - 1e-15, 0.8)
+        assert way == -1.0 and wait == pytest.approx(2 * asin(0.8), abs=1e-12)
 
 
 def test_exact_release_phase_is_the_arcsine_of_the_need():
