@@ -214,7 +214,7 @@ def march_wrench(first, steps, state, held, at_piece, body, prop, drive, mass, k
         low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
         dq, used = 0.0, 0.0
         bad = False
-        for outer in range(1, 61):
+        for outer in range(1, 81):
             mean, after = load, load
             if given:
                 after = loads[i + 1]
@@ -238,8 +238,12 @@ def march_wrench(first, steps, state, held, at_piece, body, prop, drive, mass, k
             miss = used - guess
             if not mixed or abs(miss) <= 0.01 * goal:
                 break
-            if outer == 60 or (high < np.inf and low > -np.inf and high - low <= 1e-15 * (abs(low) + abs(high))):
-                bad = bad or abs(miss) > goal
+            if outer == 80 or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
+                if kind == COULOMB and beta[0, 0] > 0 and rub.force[1] * mean <= abs(guess) <= rub.force[0] * mean:
+                    used = guess  # between kinetic and static friction the step starts to slip
+                    dq = slides - beta[0, 0] * used
+                else:
+                    bad = bad or abs(miss) > goal
                 break
             if miss > 0:
                 low = guess

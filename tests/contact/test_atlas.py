@@ -102,7 +102,7 @@ def test_exact_tangent_holds_to_the_border_of_its_piece():
 
 
 def test_exact_lift_off_leaves_nothing():
-    atlas, state, opening = crowned()
+    atlas, state, _ = crowned()
     book, slot = compiled_book(atlas)
     force = np.ones(atlas.x.size)
     far = -3 * state.approach
