@@ -165,7 +165,8 @@ class _Run:
         n = 2 * self.modes.omega.size
         work = rows[:-1, n + 4] * np.diff(rows[:, n])
         lost = work - np.diff(rows[:, n + 5])
-        noise = self.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])) \
+        size = np.maximum(self.limit, np.abs(rows[:-1, n + 4]))
+        noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * np.abs(rows[:-1, n])) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
         sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
