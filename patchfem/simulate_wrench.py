@@ -121,18 +121,20 @@ class _Run:
         self.slot = np.array([slot])
         m = arrays["x"].size
         now = np.zeros(m)
+        self.state = np.zeros((modes.omega.size, 2))
+        if start is not None:
+            self.state[:, 0], self.state[:, 1] = start.z, start.v
+        self.preload = float(arrays["base"][0])
         if load is None:
-            press.press_state(self.book, slot, 0.0, 0.0, now)
+            heave, turn = rows[1:] @ self.state[:, 0]
+            self.slot[0] = press.locate(self.book, slot, -heave, turn)
+            press.press_state(self.book, int(self.slot[0]), -heave, turn, now)
         else:
-            now[0] = arrays["base"][0]
-        self.preload = float(now.sum())
+            now[0] = self.preload
         memory = np.zeros((3, m))
         memory[1 if law.kind == PLASTIC else 0] = now * (1.0 if law.kind == PLASTIC else law.force[3])
         self.rub = rub.Rub(np.array(law.force, float), memory, memory.copy(), now.copy(), now,
                            np.full(1, law.length), np.full(1, law.length), np.array(law.growth, float))
-        self.state = np.zeros((modes.omega.size, 2))
-        if start is not None:
-            self.state[:, 0], self.state[:, 1] = start.z, start.v
         self.held, self.ledger, self.totals = np.zeros(2), np.zeros(9), np.zeros(3)
         self.done, self.outcome, self.message = 0, None, ""
         self.limit = law.static * self.preload if law.static > 0 else self.preload
@@ -166,7 +168,8 @@ class _Run:
         work = rows[:-1, n + 4] * np.diff(rows[:, n])
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.limit, np.abs(rows[:-1, n + 4]))
-        noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * np.abs(rows[:-1, n])) \
+        digit = np.abs(rows[:-1, :n // 2]) @ np.abs(self.modes.slide)  # of the slide, a sum over the modes
+        noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * digit) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
         sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)

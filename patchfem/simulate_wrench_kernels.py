@@ -1,10 +1,10 @@
 """Compiled step of modes that feel the whole wrench of the contact: normal force, moment and friction.
 
 Heave h (> 0 away) and pitch t (> 0 opens +x) move the upper holder, so d = -h closes it. Over a step the modes move
-exactly under constant forces. Those of the normal contact are a discrete gradient of its energy: the mean of both ends
-and, where the contact set changes in the step, what lacks along the increment, so that they do exactly the work
-E(end) - E(start) (Gonzalez, J. Nonlinear Sci. 6, 1996); inside one piece nothing lacks. Friction acts with the
-path mean of its law under the mean load of the step. So the sum of all energies never rises by itself.
+exactly under constant forces. Those of the normal contact are the path mean of its slopes along the straight increment,
+through every contact set on the way, so they do exactly the work E(end) - E(start) (a discrete gradient; McLachlan,
+Quispel, Robidoux, Phil. Trans. R. Soc. A 357, 1999). Friction acts with the path mean of its law under the mean load of
+the step. So the sum of all energies never rises by itself.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from .contact.press_kernels import locate, press_state, pull
+from .contact.press_kernels import locate, path_mean, press_state, pull
 from .dynamics.kernels import note, sample, stored
 from .friction.kernels import LEAN
 from .simulate_rub_kernels import (
@@ -94,49 +94,20 @@ def place_of(state, rows, r):
 
 
 @njit(error_model="numpy", **LEAN)
-def gradient(book, k0, begin, k, dh, dt, stiff, arm, out):
-    """Discrete gradient over (dh, dt) from `begin` = (h, t, energy, slopes (2,)) on piece k0 to a point of piece k.
-
-    out (9,): mean slopes (2,), energy and slopes (2,) at the end, their derivatives (2, 2) by (dh, dt).
-    """
-    e1, s1, s2 = pull(book, k, begin[0] + dh, begin[1] + dt)
-    q = book.energy[k]
-    g1, g2 = 0.5 * (begin[3] + s1), 0.5 * (begin[4] + s2)
-    h11, h12, h21, h22 = 0.5 * q[3], -0.5 * q[4], -0.5 * q[4], 0.5 * q[5]
-    if k != k0:
-        size = stiff * (dh * dh + arm * arm * dt * dt)
-        lack = e1 - begin[2] - g1 * dh - g2 * dt
-        if size > 0 and abs(lack) > 4e-16 * (book.base[2] + abs(e1) + abs(begin[2])):
-            part = lack / size
-            k1, k2 = stiff * dh, stiff * arm * arm * dt
-            by1 = (s1 - g1 - h11 * dh - h12 * dt - 2 * part * k1) / size
-            by2 = (s2 - g2 - h21 * dh - h22 * dt - 2 * part * k2) / size
-            g1 += part * k1
-            g2 += part * k2
-            h11 += part * stiff + k1 * by1
-            h12 += k1 * by2
-            h21 += k2 * by1
-            h22 += part * stiff * arm * arm + k2 * by2
-    out[0], out[1], out[2], out[3], out[4] = g1, g2, e1, s1, s2
-    out[5], out[6], out[7], out[8] = h11, h12, h21, h22
-
-
-@njit(error_model="numpy", **LEAN)
 def press_step(book, k0, begin, f1, f2, beta, arm, stiff, move, out):
-    """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta gradient, by Newton's method with step halving from the
-    guess in `move` (2,). Returns (piece at the end, iterations, residual as a force [N]); `out` as in `gradient`.
+    """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
+    free motion. Returns (piece at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
 
-    Inside one piece the equations are linear, one step solves them.
+    The slopes have a convex potential, so the answer is unique; inside one piece one step finds it.
     """
     b11, b12, b21, b22 = beta[1, 1], beta[1, 2], beta[2, 1], beta[2, 2]
     dh, dt = move[0], move[1]
     old_h, old_t, step_h, step_t, part, best = dh, dt, 0.0, 0.0, 1.0, np.inf
     k = k0
     for count in range(1, 100):
-        k = locate(book, k, -(begin[0] + dh), begin[1] + dt)
+        k = path_mean(book, k0, begin[0], begin[1], dh, dt, out)
         if k < 0:
             return k, count, np.inf
-        gradient(book, k0, begin, k, dh, dt, stiff, arm, out)
         p1, p2 = b11 * out[0] + b12 * out[1], b21 * out[0] + b22 * out[1]
         r1, r2 = dh - f1 + p1, dt - f2 + p2
         size = abs(r1) + arm * abs(r2)
@@ -154,8 +125,7 @@ def press_step(book, k0, begin, f1, f2, beta, arm, stiff, move, out):
             part *= 0.5
             if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
                 move[0], move[1] = old_h, old_t
-                k = locate(book, k, -(begin[0] + old_h), begin[1] + old_t)
-                gradient(book, k0, begin, k, old_h, old_t, stiff, arm, out)
+                k = path_mean(book, k0, begin[0], begin[1], old_h, old_t, out)
                 return k, count, best / (b11 + b22 / (arm * arm) + 2 / stiff)
         dh, dt = old_h - part * step_h, old_t - part * step_t
     return k, 100, best / (b11 + b22 / (arm * arm) + 2 / stiff)
