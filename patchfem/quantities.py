@@ -40,6 +40,7 @@ KINDS: dict[str, dict[str, float]] = {
     "cubic stiffness": {"N/m^3": 1.0, "kN/m^3": 1e3, "MN/m^3": 1e6, "N/mm^3": 1e9},
     "wear coefficient": {"m^2/N": 1.0, "mm^2/N": 1e-6, "mm^3/(N m)": 1e-9, "1/Pa": 1.0, "1/MPa": 1e-6},
     "sweep rate": {"Hz/s": 1.0, "Hz/min": 1.0 / 60.0, "kHz/s": 1e3},
+    "logarithmic sweep rate": {"oct/s": 1.0, "oct/min": 1.0 / 60.0, "dec/min": math.log2(10.0) / 60.0},
     "participation": {"rad/m": 1.0, "rad/mm": 1e3},
     "areal density": {"1/m^2": 1.0, "1/cm^2": 1e4, "1/mm^2": 1e6, "1/um^2": 1e12},
 }
@@ -50,6 +51,7 @@ EXAMPLES: dict[str, str] = {
     "pressure": "121 GPa", "angle": "0.1 mrad", "temperature": "293.15 K", "stiffness": "5e6 N/m",
     "rotational stiffness": "1e4 N m/rad", "foundation stiffness": "1e13 Pa/m", "damping": "10 N s/m",
     "cubic stiffness": "1e12 N/m^3", "wear coefficient": "1e-14 m^2/N", "sweep rate": "0.5 Hz/s",
+    "logarithmic sweep rate": "1 oct/min",
     "participation": "2 rad/m", "areal density": "1e10 1/m^2",
 }
 

@@ -16,15 +16,14 @@ from typing import Any
 from patchfem import scene_tables as tables
 from patchfem.lines import key_lines
 from patchfem.scene_built import combinations, not_yet_built
+from patchfem.scene_drive import drive_unused, waveform_unused
 from patchfem.scene_friction import temperature_unused
 from patchfem.scene_read import Draft, apply_set
 from patchfem.scene_rules import (
     ASPERITIES,
     LAWS,
     SLIDES,
-    WAVEFORMS,
     check,
-    drive_unused,
     kinetic_unused,
     method_unused,
     unused,
@@ -110,7 +109,7 @@ def _files(found: Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the scene names."""
     profile = found.contact and found.contact.profile
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
-             ("slide.file", found.slide and found.slide.file),
+             ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
              ("measured.file", found.measured and found.measured.file)]
     return [(key, file) for key, file in named if file]
 
@@ -178,7 +177,7 @@ def _finish(found: tables.Tables, kind: str) -> tables.Tables:
     if drive := found.drive:
         keys = set(drive_unused(drive))
         if drive.kind != "free":
-            keys |= unused(drive, "waveform", WAVEFORMS)
+            keys |= waveform_unused(drive)
         new["drive"] = _without(drive, keys)
     return found.model_copy(update=new)
 

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from patchfem.scene_built import NOT_YET_BUILT
+from patchfem.scene_drive import check_drive, check_length
 from patchfem.scene_friction import check_spread, remark_temperature
 from patchfem.scene_tables import Friction, Tables
 from patchfem.scene_types import keys
@@ -33,13 +34,6 @@ SLIDES: dict[str, tuple[str, str]] = {
     "dwell": ("speed distance hold", "distance_after"),
     "file": ("file", ""),
 }
-WAVEFORMS: dict[str, tuple[str, str]] = {
-    "sine": ("frequency", "acceleration displacement force cycles duration"),
-    "step": ("", "acceleration displacement force cycles duration"),
-    "sweep": ("from to rate", "acceleration displacement force cycles duration"),
-    "levels": ("frequency levels", "cycles duration"),
-    "file": ("file", "cycles duration"),
-}
 ASPERITIES: dict[str, tuple[str, str]] = {
     "linear": ("normal_stiffness", "tangential_ratio"),
     "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
@@ -61,10 +55,10 @@ class Draft(Protocol):
 
 def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, _drive):
+    for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, check_drive):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_method, _quadrature, _sliding, _run_length):
+    for rule in (_method, _quadrature, _sliding, check_length):
         rule(draft, kind)
     return kind
 
@@ -255,47 +249,6 @@ def _modes(draft: Draft) -> None:
                        "the base motion; the first mode's is its slide unless given)")  # fmt: skip
 
 
-def _drive(draft: Draft) -> None:
-    drive = draft.tables.drive
-    if drive is None:
-        return
-    if drive.kind in ("base", "force"):
-        _needs(draft, "drive", drive, "waveform", WAVEFORMS)
-    cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
-    if cycles and duration:
-        draft.say("drive.duration", "cycles and duration exclude each other: keep one")
-    if not cycles and not duration and (drive.kind == "free" or drive.waveform in ("sine", "step", "levels")):
-        draft.lacks("drive.cycles", "or drive.duration instead")
-    _drive_level(draft, drive)
-
-
-def _drive_level(draft: Draft, drive: Any) -> None:
-    levelled = drive.waveform in ("sine", "step", "sweep")
-    acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
-    if drive.kind == "base" and levelled:
-        if acceleration and displacement:
-            draft.say("drive.displacement", "acceleration and displacement exclude each other: keep one")
-        if not acceleration and not displacement:
-            draft.lacks("drive.acceleration", "or drive.displacement instead")
-    if drive.kind == "force" and levelled and not draft.given("drive.force"):
-        draft.lacks("drive.force", "kind 'force' needs it")
-    if drive.kind == "free" and not displacement:
-        draft.lacks("drive.displacement", "kind 'free' needs it: released from there")
-    for key in drive_unused(drive):
-        if draft.given(f"drive.{key}"):
-            draft.remark(f"drive.{key} has no meaning for kind '{drive.kind}' and is not used")
-
-
-def drive_unused(drive: Any) -> list[str]:
-    """Keys of [drive] that its kind gives no meaning, whatever the waveform."""
-    without = {
-        "base": ["force", "mass"],
-        "force": ["acceleration", "displacement"],
-        "free": ["acceleration", "force", "frequency", "from", "to", "rate", "levels", "file", "waveform"],
-    }
-    return without.get(drive.kind, [])
-
-
 def _kind(draft: Draft) -> str:
     """The kind of run from the tables that stand together, or a mistake for each one missing or in the way."""
     has = {name for name in ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
@@ -383,14 +336,3 @@ def _sliding(draft: Draft, kind: str) -> None:
     if modes and all(mode.slide == 0 for mode in modes):
         draft.say("structure.mode.0.slide", "0 in every mode, so nothing slides at the patch; give the slide of a mode "
                                             "that moves it, or leave out [friction] and its load")  # fmt: skip
-
-
-def _run_length(draft: Draft, kind: str) -> None:
-    drive, least = draft.tables.drive, 0.25
-    if kind not in ("rig", "linear") or drive is None:
-        return
-    if drive.cycles is not None and drive.cycles < least:
-        draft.say("drive.cycles", f"at least a quarter of a cycle is wanted, cycles >= {least}, not {drive.cycles:g}")
-    elif drive.duration is not None and drive.frequency and drive.duration * drive.frequency < least:
-        draft.say("drive.duration", f"at least a quarter of a cycle is wanted, duration >= {least / drive.frequency:g} "
-                                    f"s, not {drive.duration:g} s")  # fmt: skip

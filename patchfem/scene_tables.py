@@ -299,6 +299,7 @@ class Drive(Table):
     from_: Frequency | None = Field(None, alias="from")
     to: Frequency | None = None
     rate: quantity("sweep rate", gt=0) | None = None
+    log_rate: quantity("logarithmic sweep rate", gt=0) | None = None
     acceleration: quantity("acceleration", ge=0) | None = None
     displacement: quantity("length", ge=0) | None = None
     levels: Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None = None

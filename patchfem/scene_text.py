@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from patchfem.quantities import format_si
-from patchfem.scene_rules import ASPERITIES, LAWS, SLIDES, WAVEFORMS, drive_unused, unused
+from patchfem.scene_drive import drive_unused, waveform_unused
+from patchfem.scene_rules import ASPERITIES, LAWS, SLIDES, unused
 from patchfem.scene_tables import Accuracy, Asperities, Drive, Friction, Material, OnePiece, Slide
 from patchfem.scene_types import Table, keys, kind_of
 
@@ -47,7 +48,7 @@ def _unused(table: Table) -> set[str]:
         if isinstance(table, model):
             return unused(table, selector, used)
     if isinstance(table, Drive):
-        return set(drive_unused(table)) | (unused(table, "waveform", WAVEFORMS) if table.kind != "free" else set())
+        return set(drive_unused(table)) | (waveform_unused(table) if table.kind != "free" else set())
     return set()
 
 

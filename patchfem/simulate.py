@@ -276,7 +276,7 @@ def _rig(what, patch, coarse, seconds, warnings, say, progress, per_point, estim
         warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
                     f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
     if scene.friction is not None and scene.friction.law == "nonlocal":
-        law = rig.law_of(scene, drive.acceleration / drive.omega)
+        law = rig.law_of(scene, rig.speed_of(scene, drive))
         warnings = [*warnings, *_unripe(law, float(np.abs(raw.window.slide_rate).max())),
                     *_creeping(law, outcome, found)]
     warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
@@ -363,7 +363,7 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
     time = np.array([s["time"] for s in shots])
     shear = bool(scene.contact.gives_way)
     if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or settings.per_point):
-        law = rig.law_of(scene, drive.acceleration / drive.omega)
+        law = rig.law_of(scene, rig.speed_of(scene, drive))
         tau, local = bench.point_fields(patch, law, raw.model.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
         length = f.bond_length if f.law == "elastic-plastic" else 0.0

@@ -99,10 +99,9 @@ def resolved(scene) -> str:
 
             law = bonds_of(scene)
         else:
-            from .simulate_rig import drive_of, law_of
+            from .simulate_rig import drive_of, law_of, speed_of
 
-            drive = drive_of(scene)
-            law = law_of(scene, drive.acceleration / drive.omega)
+            law = law_of(scene, speed_of(scene, drive_of(scene)))
         friction = friction.model_copy(update={"rest_speed": law.rest_speed})
     return replace(scene, contact=contact, friction=friction).resolved()
 
@@ -150,7 +149,9 @@ def report_data(result: Result) -> dict:
         if not slow:
             data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
-            data["loop"] |= {"period": 1 / scene.drive.frequency}
+            from .simulate_rig import drive_of
+
+            data["loop"] |= {"period": drive_of(scene).period}
     if scene.measured is not None:
         from .response.measured import read_table
 
@@ -158,7 +159,8 @@ def report_data(result: Result) -> dict:
         data["measured"] = {"rows": table, "frequency": scene.drive.frequency if scene.drive else None,
                             "gain": scene.measured.acceleration_gain}
         if scene.drive is not None:
+            from .simulate_drive import largest
             from .simulate_rig import drive_of
 
-            data["measured"]["input"] = drive_of(scene).acceleration
+            data["measured"]["input"] = largest(drive_of(scene))
     return data

@@ -35,7 +35,7 @@ def heating(scene, patch, work: float, duration: float) -> list:
 def _cycle(scene) -> float | None:
     """Period of the motion [s], None where it does not repeat."""
     if scene.drive is not None:
-        return 1 / scene.drive.frequency
+        return 1 / scene.drive.frequency if scene.drive.frequency else None
     if scene.slide.kind == "sine":
         return 1 / scene.slide.frequency
     return 4 * scene.slide.amplitude / scene.slide.speed if scene.slide.kind == "triangle" else None

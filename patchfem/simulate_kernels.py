@@ -8,7 +8,7 @@ has a loop of its own, so that a scene compiles only what it names.
 import numpy as np
 from numba import njit
 
-from .dynamics.kernels import accelerations, free_slide, move, note, sample, step_energy, stored, tell
+from .dynamics.kernels import accelerations, free_slide, move, note, push_back, sample, stored, tell
 from .friction.kernels import LEAN, grow
 from .friction.slide_kernels import rigid_path
 from .simulate_step_kernels import (
@@ -24,7 +24,6 @@ from .simulate_step_kernels import (
     commit,
     contact_state,
     contact_step,
-    pressure_at,
     scalar_force,
     solve_modes,
 )
@@ -33,40 +32,35 @@ __all__ = ["COULOMB", "JENKINS", "LIST", "POINTS", "RATE", "Contact", "Modes", "
            "follow_path", "march", "march_contact"]
 
 
-@njit(error_model="numpy", **LEAN)
-def sources(kind, c, q0, dq):
-    """Pressure under the new bonds when it stays on the lower piece: mean of the places at the ends of the step."""
-    for j in range(c.source.size):
-        here = c.place[j] + q0
-        c.source[j] = 0.5 * (pressure_at(here, c.x, c.sigma) + pressure_at(here + dq, c.x, c.sigma))
+def march(first, steps, state, held, modes, prop, table, mass, kind, follow, c, work, goal, travel, ledger, rows):
+    """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us per step, a few ns per point.
 
-
-def march(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, work, goal, travel, ledger, rows):
-    """March `steps` steps from step number `first` of the drive; 0.2-0.5 us per step and a few ns per point.
-
-    modes: (omega, 2 zeta omega, slide, base, output); prop: (step, gauss, sine, sine_gauss, weights, dt, beta);
-    held: (1,) last friction force (kind 0); ledger (9,): work in, viscous loss, |power in|, friction loss, peak stored,
-    iterations, worst iterations, steps without convergence, friction work;
+    modes: Modes; prop: Steps; table: of `propagator.Propagator`; state (2, n); held: (1,) last friction force (kind 0);
+    ledger (9,): work in, viscous loss, |work in| per step, friction loss, peak stored, iterations, worst iterations,
+    steps without convergence, friction work;
     rows (steps + 1, 2 n + 6): z, z', q, q', F, slip, mean force of the step that follows, energy in the interface.
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 bond list full, 3 not finite.
     """
     if kind == LIST:
         from .simulate_list_kernels import march_list
 
-        return march_list(first, steps, state, modes, prop, drive, mass, c, work, goal, travel, ledger, rows)
-    return march_contact(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, work, goal, travel,
-                         ledger, rows)
+        return march_list(first, steps, state, modes, prop, table, mass, c, work, goal, travel, ledger, rows)
+    if follow:
+        from .simulate_follow_kernels import march_follow
+
+        return march_follow(first, steps, state, modes, prop, table, mass, c, work, goal, travel, ledger, rows)
+    return march_contact(first, steps, state, held, modes, prop, table, mass, kind, c, work, goal, travel, ledger, rows)
 
 
 @njit(error_model="numpy", cache=True)
-def march_contact(first, steps, state, held, modes, prop, drive, mass, kind, follow, c, work, goal, travel, ledger,
+def march_contact(first, steps, state, held, modes, prop, table, mass, kind, c, work, goal, travel, ledger,
                   rows):
     """`march` of the kinds without a list."""
-    omega, damp, slide, base, output = modes
-    step, gauss, sine, sine_gauss, weights, dt, beta = prop
-    n = omega.size
-    around = sine.shape[0] - 1
-    accel = np.empty(n)
+    omega, damp, slide, base, output, damping = modes
+    free_map, push, dense, reach, loss, dense_loss, dt, beta = prop
+    n = slide.size
+    around = table.shape[0]
+    accel, spare = np.empty(n), np.empty((2, n))
     for i in range(steps + 1):
         q, v, out = sample(rows[i], state, slide, output)
         force, energy, slip = contact_state(kind, c, q, held[0])
@@ -76,38 +70,40 @@ def march_contact(first, steps, state, held, modes, prop, drive, mass, kind, fol
         if i == steps:
             break
         at = (first + i) % around
-        s, co = sine[at, 0], sine[at, 1]
-        free = free_slide(state, step, slide, s, co)
-        if follow:
-            sources(kind, c, q, free if abs(free) < 1e-3 else 0.0)
+        free = free_slide(state, reach, 0, table, at)
         dq, force, count, middle = contact_step(free, beta, v, dt, kind, c, work, goal)
-        if follow:
-            for _ in range(20):
-                guess = dq
-                sources(kind, c, q, dq)
-                dq, force, count, middle = contact_step(free, beta, v, dt, kind, c, work, goal)
-                if abs(dq - guess) <= 1e-12 * (abs(dq) + 1e-12):
-                    break
         used = (free - dq) / beta
         tell(count, used * dq, ledger)
-        step_energy(state, gauss, slide, base, damp, mass, drive, used, s, co, sine_gauss[at], dt, weights, ledger)
-        v1 = move(state, step, slide, mass, used, s, co)
+        push_back(used, slide, mass, accel)
+        move(state, free_map, push, loss, dense, dense_loss, table, at, accel, spare, ledger)
+        v1 = 0.0
+        for k in range(n):
+            v1 += slide[k] * state[1, k]
         held[0] = used
         if kind == RATE:
             held[0] = c.force[0] * np.tanh(v1 / c.force[1])
         rows[i, 2 * n + 4] = used
         if kind == COULOMB and dq == 0.0:
-            accelerations(state, omega, damp, slide, base, mass, drive, 0.0, sine[at + 1, 0], accel)
-            need, gain = 0.0, 0.0
-            for k in range(n):
-                need += slide[k] * accel[k]
-                gain += slide[k] * slide[k] / mass
-            held[0] = min(max(need / gain, -c.force[0]), c.force[0])
-        burnt, ok = commit(dq, used, v, v1, dt, kind, c, work, middle, q, follow)
+            held[0] = holding(state, omega, damp, damping, base, slide, table[at, 8 * n + 2], mass, c.force[0], accel,
+                              spare)
+        burnt, ok = commit(dq, used, v, v1, dt, kind, c, work, middle, q, False)
         ledger[3] += burnt
         if not ok:
             return i, 2
     return steps, 0
+
+
+@njit(error_model="numpy", **LEAN)
+def holding(state, omega, damp, damping, base, slide, drive, mass, limit, accel, spare):
+    """Friction force [N] within the limit that keeps the slide from accelerating at an instant; drive [m s-2]."""
+    for k in range(accel.size):
+        accel[k] = 0.0
+    accelerations(state, omega, damp, damping, base, drive, accel, spare)
+    need, gain = 0.0, 0.0
+    for k in range(accel.size):
+        need += slide[k] * spare[0, k]
+        gain += slide[k] * slide[k] / mass
+    return min(max(need / gain, -limit), limit)
 
 
 @njit(error_model="numpy", cache=True)

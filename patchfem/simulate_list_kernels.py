@@ -7,7 +7,7 @@ of `friction.place_sum_kernels`.
 import numpy as np
 from numba import njit
 
-from .dynamics.kernels import free_slide, move, note, sample, step_energy, stored, tell
+from .dynamics.kernels import free_slide, move, note, push_back, sample, stored, tell
 from .friction.bond_kernels import list_mean, list_slope, list_step
 from .friction.bond_sum_kernels import MOMENTS
 from .friction.kernels import LEAN
@@ -90,11 +90,12 @@ def list_status(c, q):
 
 
 @njit(error_model="numpy", cache=True)
-def march_list(first, steps, state, modes, prop, drive, mass, c, work, goal, travel, ledger, rows):
+def march_list(first, steps, state, modes, prop, table, mass, c, work, goal, travel, ledger, rows):
     """`simulate_kernels.march` of a list."""
-    omega, damp, slide, base, output = modes
-    step, gauss, sine, sine_gauss, weights, dt, beta = prop
-    last, around = work.last, sine.shape[0] - 1
+    omega, _, slide, _, output, _ = modes
+    free_map, push, dense, reach, loss, dense_loss, dt, beta = prop
+    last, around, n = work.last, table.shape[0], slide.size
+    accel, spare = np.empty(n), np.empty((2, n))
     for i in range(steps + 1):
         q, v, out = sample(rows[i], state, slide, output)
         force, energy, slip = list_status(c, q)
@@ -104,14 +105,16 @@ def march_list(first, steps, state, modes, prop, drive, mass, c, work, goal, tra
         if i == steps:
             break
         at = (first + i) % around
-        s, co = sine[at, 0], sine[at, 1]
-        free = free_slide(state, step, slide, s, co)
+        free = free_slide(state, reach, 0, table, at)
         dq, force, count = solve_list(free, beta, 2 * last[0, 0] - last[1, 0], c, v, dt, goal)
         last[1, 0], last[0, 0] = last[0, 0], dq
         used = (free - dq) / beta
         tell(count, used * dq, ledger)
-        step_energy(state, gauss, slide, base, damp, mass, drive, used, s, co, sine_gauss[at], dt, weights, ledger)
-        v1 = move(state, step, slide, mass, used, s, co)
+        push_back(used, slide, mass, accel)
+        move(state, free_map, push, loss, dense, dense_loss, table, at, accel, spare, ledger)
+        v1 = 0.0
+        for k in range(n):
+            v1 += slide[k] * state[1, k]
         rows[i, rows.shape[1] - 2] = used
         burnt, ok = commit_list(dq, used, v, v1, dt, c)
         ledger[3] += burnt

@@ -145,30 +145,51 @@ def _response(rows, number, dt, modes, drive) -> Response:
     """Histories of the samples with step numbers `number` (k,)."""
     n = modes.omega.size
     z, rate, time = rows[:, :n], rows[:, n:2 * n], number * dt
-    base = drive.acceleration * np.sin(drive.omega * time)
-    accel = -np.outer(base, modes.base) - rate * (2 * modes.zeta * modes.omega) - z * modes.omega**2 \
+    push = drive.values(time)
+    base = push if drive.moving else np.zeros_like(push)
+    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
+    accel = -np.outer(push, modes.base) - damped - z * modes.omega**2 \
         - np.outer(rows[:, 2 * n + 2], modes.slide) / modes.mass
     return Response(time, z, rate, rows[:, 2 * n], rows[:, 2 * n + 1], z @ modes.output, rate @ modes.output,
                     accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3],
                     {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
 
 
+def modes_arrays(modes: ModalBasis, hub):
+    """hub.Modes of a basis."""
+    damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
+    return hub.Modes(*(np.array(v, float) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base,
+                                                    modes.output, damping)))
+
+
+def steps_arrays(prop, hub):
+    """hub.Steps of a Propagator of one interface."""
+    return hub.Steps(*(np.array(v) for v in (prop.free, prop.push, prop.dense, prop.reach, prop.loss,
+                                             prop.dense_loss)), prop.dt, float(prop.beta[0, 0]))
+
+
+def _runner(model):
+    """The class that marches a model: Run, or that of a model of several elements."""
+    return getattr(model, "runner", None) or Run
+
+
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
     """Load the compiled loop, or compile it, by a march of no steps."""
-    run = _Run(modes, drive, model, 4, np.inf, load_kernels(say))
+    run = _runner(model)(modes, drive, model, 4, np.inf, load_kernels(say))
     run.cycle(0, 0, [])
 
 
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
-          window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None) -> MarchResult:
-    """March from rest for `cycles` drive cycles at `steps_per_cycle` steps.
+          window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
+          start=None) -> MarchResult:
+    """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
 
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle. The outcome is set
     for travel and where a step missed its residual or the motion is not finite (not_converged, `message` says what);
     Missing when a bond list overflows.
     """
 
-    run = _Run(modes, drive, model, steps_per_cycle, travel, load_kernels(say))
+    run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total, n = round(cycles * steps_per_cycle), modes.omega.size
     last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
     size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
@@ -191,8 +212,8 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     rows, first = _joined(end)
     whole, start = _joined(list(last))
     number = np.concatenate([*kept_at, start + np.arange(len(whole))])
-    full = _response(np.concatenate([*kept, whole]), number, run.prop.dt, modes, drive)
-    last_rows = _response(rows, first + np.arange(len(rows)), run.prop.dt, modes, drive)
+    full = run.response(np.concatenate([*kept, whole]), number)
+    last_rows = run.response(rows, first + np.arange(len(rows)))
     return MarchResult(full, last_rows, rows[:-1, 2 * n + 4].copy(), np.array(extremes), np.array(phasors), run.book(),
                        run.outcome, snapshots, sum(work for _, _, work in end), run.done / steps_per_cycle, run.message)
 
@@ -202,22 +223,33 @@ def _joined(parts) -> tuple:
     return np.concatenate([rows[:-1] for _, rows, _ in parts] + [parts[-1][1][-1:]]), parts[0][0]
 
 
-class _Run:
+class Run:
     """The arrays of one march and its clock."""
 
-    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub):
-        from .dynamics.propagator import GAUSS_W, propagator
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
+        from .dynamics.propagator import propagator
 
         self.modes, self.drive, self.model, self.travel, self.hub = modes, drive, model, travel, hub
-        self.prop = propagator(modes, drive, steps_per_cycle)
+        self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
         self.contact, self.work = model.build(hub)
-        self.state, self.held = np.zeros((modes.omega.size, 2)), np.zeros(1)
+        self.state, self.held = np.zeros((2, modes.omega.size)), np.zeros(1)
+        if start is not None:
+            self.state[:] = start.z, start.v
         self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
-        self.totals = np.zeros(3)
-        self.arrays = hub.Modes(*(np.array(v) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide,
-                                                        modes.base, modes.output)))
-        p = self.prop
-        self.steps = hub.Steps(p.step, p.gauss, p.sine, p.sine_gauss, GAUSS_W.copy(), p.dt, p.beta)
+        self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 6
+        self.ledger[0] = self.motion()  # what is released at the start counts as work in
+        self.arrays, self.steps = modes_arrays(modes, hub), steps_arrays(self.prop, hub)
+        self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+
+    def table(self, count: int) -> tuple:
+        """(table, row of the next step) for `count` steps from here."""
+        if self.periodic is not None:
+            return self.periodic, self.done % len(self.periodic)
+        return self.prop.tables(self.drive, self.done, max(count, 1)), 0
+
+    def response(self, rows, number) -> Response:
+        """Histories of the samples with step numbers `number` (k,)."""
+        return _response(rows, number, self.prop.dt, self.modes, self.drive)
 
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
         """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
@@ -225,11 +257,8 @@ class _Run:
         self._make_room(size)
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
-            rows = np.empty((piece + 1, 2 * self.modes.omega.size + 6))
-            did, status = self.hub.march(self.done, int(piece), self.state, self.held, self.arrays, self.steps,
-                                         self.drive.acceleration, self.modes.mass, self.model.kind,
-                                         self.model.follow, self.contact, self.work, GOAL * self.model.limit,
-                                         self.travel, self.ledger, rows)
+            rows = np.empty((piece + 1, self.width))
+            did, status = self._steps(int(piece), rows)
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)
@@ -240,18 +269,30 @@ class _Run:
         rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
         return first, self._booked(rows), self.ledger[8] - before
 
+    def _steps(self, count: int, rows) -> tuple:
+        """March `count` steps into rows (count + 1, width): (steps done, status)."""
+        table, row = self.table(count)
+        return self.hub.march(row, count, self.state, self.held, self.arrays, self.steps, table, self.modes.mass,
+                              self.model.kind, self.model.follow, self.contact, self.work, GOAL * self.model.limit,
+                              self.travel, self.ledger, rows)
+
     def _booked(self, rows) -> np.ndarray:
         """Rows with the friction work, the energy dissipated and that created since the start [J] as further columns;
         per step the net of the work and of what the interface stores."""
         n = 2 * self.modes.omega.size
-        work = rows[:-1, n + 4] * np.diff(rows[:, n])
+        work = self._works(rows)
         lost = work - np.diff(rows[:, n + 5])
         # of the step solve, and of the slide's last digit
         noise = self.model.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n]))
         parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
         sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
         self.totals = sums[:, -1]
-        return np.concatenate([rows, sums.T], axis=1)
+        return np.concatenate([rows[:, :n + 6], sums.T, rows[:, n + 6:]], axis=1)
+
+    def _works(self, rows) -> np.ndarray:
+        """Friction work [J] of the steps between the rows."""
+        n = 2 * self.modes.omega.size
+        return rows[:-1, n + 4] * np.diff(rows[:, n])
 
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
@@ -287,13 +328,19 @@ class _Run:
             self.message = (f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of the "
                             "friction limit; raise accuracy.steps_per_cycle")
 
+    def motion(self) -> float:
+        """Kinetic and elastic energy of the modes [J]."""
+        return 0.5 * self.modes.mass * float(np.sum(self.state[1]**2 + (self.modes.omega * self.state[0])**2))
+
+    def strained(self) -> float:
+        """Energy stored in the interface [J]."""
+        slide = float(self.modes.slide @ self.state[0])
+        return float(self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))[1])
+
     def book(self) -> dict:
         """The energy ledger [J]."""
-        slide = float(self.modes.slide @ self.state[:, 0])
-        _, energy, _ = self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))
-        motion = 0.5 * self.modes.mass * float(np.sum(self.state[:, 1]**2 + (self.modes.omega * self.state[:, 0])**2))
         names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
-        book = dict(zip(names, map(float, self.ledger))) | {"stored": motion + energy}
+        book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
         tally = self.contact.tally
         if tally.size:
             book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),

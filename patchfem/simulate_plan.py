@@ -1,7 +1,7 @@
 """What a scene would run, before anything runs: engine, sizes, cost, stiffness chain and dimensionless groups."""
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 from .core import Missing, PatchfemError
 from .effects import EFFECTS, absent
@@ -209,15 +209,16 @@ def _groups(scene, chain) -> dict:
     f, contact = scene.friction, scene.contact
     load = nominal_load(scene)
     if scene.kind == "rig":
+        from .simulate_drive import largest, omega_of
         from .simulate_rig import drive_of
 
         drive = drive_of(scene)
-        push = scene.structure.moving_mass * drive.acceleration
+        push = scene.structure.moving_mass * largest(drive)
         out["D"] = f.static * load / push if push > 0 else None
-        ratio = scene.structure.mode[0].frequency / scene.drive.frequency
+        ratio = scene.structure.mode[0].frequency * drive.period if scene.drive.frequency else inf
         out["knee"] = 4 / pi * f.static * load / scene.structure.moving_mass if abs(ratio - 1) < 0.2 else None
         if f.bond_length:
-            out["drive_amplitude_over_bond_length"] = drive.acceleration / drive.omega**2 / f.bond_length
+            out["drive_amplitude_over_bond_length"] = largest(drive) / omega_of(drive)**2 / f.bond_length
     if scene.kind == "bench" and f.bond_length:
         from .simulate_slide import amplitude
 

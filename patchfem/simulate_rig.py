@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from . import simulate_drive
 from .core import BaseSine, Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
@@ -60,24 +61,24 @@ class Raw:
     message: str = ""
 
 
-def drive_of(scene) -> BaseSine:
-    """The base sine of [drive]; a displacement amplitude X gives the acceleration X omega^2."""
-    drive = scene.drive
-    omega = 2 * np.pi * drive.frequency
-    a = drive.acceleration if drive.acceleration is not None else drive.displacement * omega**2
-    return BaseSine(float(a), float(omega))
-
-
 def modes_of(scene) -> ModalBasis:
     """Modes of [structure]."""
     return basis(scene.structure.mode, scene.structure.moving_mass)
 
 
-def cycles_of(scene, drive: BaseSine) -> float:
-    """Length of the run in drive cycles."""
-    if scene.drive.cycles is not None:
-        return scene.drive.cycles
-    return scene.drive.duration / drive.period
+def drive_of(scene):
+    """The drive of [drive]."""
+    return simulate_drive.drive_of(scene, modes_of(scene))
+
+
+def start_of(scene, modes: ModalBasis):
+    """core.Start of a scene that does not begin at rest, else None."""
+    return None
+
+
+def speed_of(scene, drive) -> float:
+    """Size of the speeds to expect [m/s]: sets the default floor of the speed in the growth of bonds."""
+    return simulate_drive.peak_speed(drive, start_of(scene, modes_of(scene)))
 
 
 def law_of(scene, speed: float) -> Bonds:
@@ -101,16 +102,17 @@ def choose(scene, per_point: bool = False) -> Settings:
     if accuracy.method == "exact" and not closed:
         raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
                             f"{f' with {shear}' if shear else ''}; use method = \"march\"")
+    drive = drive_of(scene)
+    closed = closed and isinstance(drive, BaseSine) and scene.structure.stiffening is None
     engine = "exact" if closed and accuracy.method != "march" else "march"
     if engine == "march" and f is not None:
         _refuse(scene, shear, side)
-    drive = drive_of(scene)
-    cycles = cycles_of(scene, drive)
+    cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
-    fastest = max(m.frequency for m in scene.structure.mode) / scene.drive.frequency
+    fastest = max(simulate_drive.fastest(drive), *(m.frequency * drive.period for m in scene.structure.mode))
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
-        2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * max(1.0, fastest)), 100, MOST_STEPS))
+        2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
     if engine == "march" and side == "lower" and accuracy.quadrature not in ("auto", "recursion"):
         raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{accuracy.quadrature}' with pressure on the lower "
@@ -119,12 +121,13 @@ def choose(scene, per_point: bool = False) -> Settings:
                     frozenset(pinned))
 
 
-def quadrature_of(scene, settings: Settings, drive: BaseSine):
+def quadrature_of(scene, settings: Settings, drive):
     """The engines.Choice of a nonlocal law; a stroke is taken as the drive's own amplitude."""
     from .friction.engines import choose as engine_for
 
-    law, accuracy = law_of(scene, drive.acceleration / drive.omega), scene.accuracy
-    stroke = max(4 * drive.acceleration / drive.omega**2 / law.length, 1e-9)
+    speed = speed_of(scene, drive)
+    law, accuracy = law_of(scene, speed), scene.accuracy
+    stroke = max(4 * speed / simulate_drive.omega_of(drive) / law.length, 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engine_for(law, accuracy.tolerance, stroke, settings.steps / 2, accuracy.quadrature, tail, accuracy.merge)
 
@@ -140,12 +143,14 @@ def _refuse(scene, shear: str, side: str) -> None:
         raise PatchfemError(f"{scene.path}: {shear} with order = {f.order:g}: not yet built; use order = 1")
 
 
-def contact_model(scene, settings: Settings, patch, drive: BaseSine):
+def contact_model(scene, settings: Settings, patch, drive):
     """The ContactModel of a marching scene; patch: the solved Patch or None for [normal]."""
     from . import simulate_march as hub
 
     scene = acting(scene)
     f, contact = scene.friction, scene.contact
+    if f is None:
+        return hub.coulomb_model(0.0, 0.0)
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
     shear = contact.gives_way if contact is not None else ""
@@ -169,7 +174,7 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
         return hub.jenkins_model([limit / length], [length])
     if f.law == "tanh":
         return hub.rate_model(limit, f.reference_speed)
-    law = law_of(scene, drive.acceleration / drive.omega)
+    law = law_of(scene, speed_of(scene, drive))
     found = quadrature_of(scene, settings, drive)
     if found.engine == "exponential":
         return hub.place_model(law, limit, found.tail, found.nodes, found.width, found.ripe)
@@ -193,7 +198,25 @@ def contact_model(scene, settings: Settings, patch, drive: BaseSine):
     return hub.points_model(law, [1.0], [load])
 
 
-def whole(span: float, drive: BaseSine) -> bool:
+def with_springs(scene, model, modes: ModalBasis, drive):
+    """The model beside the springs of [structure] that are not linear, or as it is where there are none."""
+    structure = scene.structure
+    interlocked = structure.bonded is not None and structure.bonded.wavelength is not None
+    if structure.stiffening is None and not interlocked:
+        return model
+    from . import simulate_slots as slots
+
+    rows, springs = [modes.slide], []
+    if interlocked:
+        springs.append(slots.interlock(0, structure.bonded.stiffness, structure.bonded.wavelength))
+    if structure.stiffening is not None:
+        springs.append(slots.cubic(len(rows), structure.stiffening.cubic))
+        rows.append(modes.output)
+    size = modes.mass * simulate_drive.omega_of(drive) * simulate_drive.peak_speed(drive, start_of(scene, modes))
+    return slots.SlotsModel(model if model.limit > 0 else None, tuple(springs), np.array(rows), size)
+
+
+def whole(span: float, drive) -> bool:
     """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
     return span > drive.period * (1 - 1e-6)
 
@@ -225,7 +248,8 @@ def run_exact(scene, settings: Settings, modes, drive, load: float, progress=Non
             values["slip_start_phase"] = circular_mean(done.starts)
         time, weight, slide, rate, force = done.loop
         work = float(weight @ (force * rate)) * drive.period / span
-        q, part = (harmonic(time, weight, values_, drive.omega) for values_ in (slide - weight @ slide / span, force))
+        omega = simulate_drive.omega_of(drive)
+        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
         values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2) if whole(span, drive) else {}
     else:
         values.pop("friction_force_peak")
@@ -242,37 +266,54 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
 
     travel = scene.structure.travel or np.inf
     begin = perf_counter()
-    model = contact_model(scene, settings, patch, drive)
+    model = with_springs(scene, contact_model(scene, settings, patch, drive), modes, drive)
     reduced = perf_counter() - begin
     hub.warm_up(modes, drive, model, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
-                     progress)
+                     progress, start_of(scene, modes))
     seconds = perf_counter() - begin
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
-    values |= slip_measures(done.window, drive, settings.steps) | _ledger(done.response.extra["ledger"])
-    values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
-    w = done.window
-    weight = np.full(w.time.size, 1.0)
-    weight[[0, -1]] = 0.5
-    span = w.time[-1] - w.time[0]
-    work = float(done.window_work) * drive.period / span if span > 0 else 0.0
-    q = harmonic(w.time, weight, w.slide - w.slide.mean(), drive.omega)
-    if whole(span, drive):
-        values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, drive.omega), work,
-                                 modes.mass * modes.omega[0]**2)
-    length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
-    held = 1e-3 * length if model.kind else 1e-300
-    stuck = scene.friction.law != "tanh" and values["slip_amplitude"] < held  # a law of the speed never holds
+    stuck = False
+    if scene.friction is None:
+        values.pop("friction_force_peak")
+    else:
+        values |= _rubbing(scene, settings, modes, drive, patch, done)
+        length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
+        held = 1e-3 * length if model.kind else 1e-300
+        stuck = scene.friction.law != "tanh" and values["slip_amplitude"] < held  # a law of the speed never holds
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    return Raw(values, done.response, w, window_amplitudes(done.amplitudes, settings.window),
+    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
                steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,
                done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message)
 
 
-def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:
+def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, done) -> dict:
+    """Measures of the interface of a march."""
+    w, omega = done.window, simulate_drive.omega_of(drive)
+    values = slip_measures(w, drive, settings.steps) | _ledger(done.response.extra["ledger"])
+    if not sinusoidal(drive):
+        values.pop("slip_start_phase", None)
+    values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
+    weight = np.full(w.time.size, 1.0)
+    weight[[0, -1]] = 0.5
+    span = w.time[-1] - w.time[0]
+    work = float(done.window_work) * drive.period / span if span > 0 else 0.0
+    q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
+    if whole(span, drive):
+        values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, omega), work,
+                                 modes.mass * modes.omega[0]**2)
+    return values
+
+
+def sinusoidal(drive) -> bool:
+    """Whether a drive ends as a sine: only then do phases and steady cycles mean anything."""
+    return bool(drive.segments) and drive.segments[-1].amplitude != 0
+
+
+def list_cost(scene, settings: Settings, drive) -> tuple:
     """(expected strips, seconds) of a shared list of bonds."""
     found = quadrature_of(scene, settings, drive)
     steps = settings.cycles * settings.steps
@@ -280,7 +321,7 @@ def list_cost(scene, settings: Settings, drive: BaseSine) -> tuple:
     return strips, steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
 
-def refuse_costly(scene, settings: Settings, drive: BaseSine, limit: float = LONGEST) -> None:
+def refuse_costly(scene, settings: Settings, drive, limit: float = LONGEST) -> None:
     """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = scene.friction
     if f is None or f.law != "nonlocal" or quadrature_of(scene, settings, drive).engine == "recursion":

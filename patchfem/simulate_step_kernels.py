@@ -76,23 +76,25 @@ class Work(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """omega, damp = 2 zeta omega, slide, base, output: (n,)."""
+    """omega, damp = 2 zeta omega, slide, base, output: (n,); damping (n, n) where it couples, else (0, 0)."""
 
     omega: np.ndarray
     damp: np.ndarray
     slide: np.ndarray
     base: np.ndarray
     output: np.ndarray
+    damping: np.ndarray
 
 
 class Steps(NamedTuple):
-    """Arrays of `dynamics.propagator.Propagator`, the Gauss weights, dt and beta."""
+    """Arrays of `dynamics.propagator.Propagator`, dt [s] and the beta [m/N] of one interface."""
 
-    step: np.ndarray
-    gauss: np.ndarray
-    sine: np.ndarray
-    sine_gauss: np.ndarray
-    weights: np.ndarray
+    free: np.ndarray
+    push: np.ndarray
+    dense: np.ndarray
+    reach: np.ndarray
+    loss: np.ndarray
+    dense_loss: np.ndarray
     dt: float
     beta: float
 

@@ -1,4 +1,8 @@
-"""Compiled pieces of the march: free motion of the modes over a step and the energy that the step moves."""
+"""Compiled pieces of the march: motion of the modes over a step and the energy that the step moves.
+
+state (2, n): coordinates and rates; row: one line of `propagator.Propagator.tables`; forces enter as `accel` (n,), the
+modal accelerations that are constant over the step.
+"""
 
 import numpy as np
 from numba import njit
@@ -6,68 +10,99 @@ from numba.core.options import DefaultOptions
 
 # no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
 LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+FAST = {"reassoc", "contract", "arcp"}
 
 
-@njit(error_model="numpy", **LEAN)
-def free_slide(state, step, slide, s, c):
-    """Increment of the interface slide [m] over a step without friction; state (n, 2), step (n, 2, 5), slide (n,)."""
-    out = 0.0
-    for i in range(slide.size):
-        z1 = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 3] * s + step[i, 0, 4] * c
-        out += slide[i] * (z1 - state[i, 0])
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def free_slide(state, reach, port, table, at):
+    """Increment of the slide of a port [m] over a step without interface forces."""
+    n = state.shape[1]
+    out = table[at, 8 * n + 3 + port]
+    for i in range(n):
+        out += reach[port, i] * state[0, i] + reach[port, n + i] * state[1, i]
     return out
 
 
-@njit(error_model="numpy", **LEAN)
-def move(state, step, slide, mass, force, s, c):
-    """Advance the modes in place by one step under the constant interface force [N]; the slide's speed after it."""
-    speed = 0.0
-    for i in range(slide.size):
-        f = -slide[i] * force / mass
-        z = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 2] * f \
-            + step[i, 0, 3] * s + step[i, 0, 4] * c
-        v = step[i, 1, 0] * state[i, 0] + step[i, 1, 1] * state[i, 1] + step[i, 1, 2] * f \
-            + step[i, 1, 3] * s + step[i, 1, 4] * c
-        state[i, 0] = z
-        state[i, 1] = v
-        speed += slide[i] * v
-    return speed
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def push_back(force, row, mass, accel):
+    """Modal accelerations (n,) of one interface force [N] that resists the slide row (n,)."""
+    for i in range(accel.size):
+        accel[i] = -row[i] * force / mass
 
 
-@njit(error_model="numpy", **LEAN)
-def step_energy(state, gauss, slide, base, damp, mass, drive, force, s, c, sines, dt, weights, out):
-    """Add to `out` (3,) the work of the base [J], the viscous loss [J] and the integral of |power in| [J] of a step.
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def move(state, free, push, loss, dense, dense_loss, table, at, accel, spare, ledger):
+    """Advance the modes in place by one step and book it: work of the drive ledger[0], viscous loss ledger[1], work in
+    magnitude ledger[2] [J]. spare (2, n): room. The arrays of a step are passed one by one: a tuple of them would be
+    counted anew in every step."""
+    n = state.shape[1]
+    work, lost = table[at, 8 * n], table[at, 8 * n + 1]
+    for i in range(n):
+        z, v, f = state[0, i], state[1, i], accel[i]
+        work += table[at, 2 * n + i] * z + table[at, 3 * n + i] * v + table[at, 4 * n + i] * f
+        lost += table[at, 5 * n + i] * z + table[at, 6 * n + i] * v + table[at, 7 * n + i] * f
+    if dense.size == 0:
+        for i in range(n):
+            z, v, f = state[0, i], state[1, i], accel[i]
+            lost += (loss[0, i] * z + loss[1, i] * v + loss[3, i] * f) * z + (loss[2, i] * v + loss[4, i] * f) * v \
+                + loss[5, i] * f * f
+            state[0, i] = free[0, i] * z + free[1, i] * v + push[0, i] * f + table[at, i]
+            state[1, i] = free[2, i] * z + free[3, i] * v + push[1, i] * f + table[at, n + i]
+    else:
+        lost += _move_coupled(state, dense, dense_loss, table, at, accel, spare)
+    ledger[0] += work
+    ledger[1] += lost
+    ledger[2] += abs(work)
 
-    Four Gauss points on the exact motion inside the step; damp (n,) = 2 zeta omega.
-    """
-    for k in range(weights.size):
-        power, loss = 0.0, 0.0
-        for i in range(slide.size):
-            f = -slide[i] * force / mass
-            v = gauss[k, i, 1, 0] * state[i, 0] + gauss[k, i, 1, 1] * state[i, 1] + gauss[k, i, 1, 2] * f \
-                + gauss[k, i, 1, 3] * s + gauss[k, i, 1, 4] * c
-            power -= mass * base[i] * drive * sines[k] * v
-            loss += mass * damp[i] * v * v
-        share = weights[k] * dt / 2
-        out[0] += share * power
-        out[1] += share * loss
-        out[2] += share * abs(power)
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def _move_coupled(state, dense, loss, table, at, accel, spare):
+    """`move` where damping couples the coordinates; returns the quadratic part of the viscous loss [J]."""
+    n = state.shape[1]
+    lost = 0.0
+    for i in range(3 * n):
+        x = accel[i - 2 * n] if i >= 2 * n else state[i // n, i % n]
+        part = 0.0
+        for j in range(2):
+            for k in range(n):
+                part += loss[i, j * n + k] * state[j, k]
+        for k in range(n):
+            part += loss[i, 2 * n + k] * accel[k]
+        lost += x * part
+    for i in range(2 * n):
+        part = table[at, i]
+        for j in range(2):
+            for k in range(n):
+                part += dense[i, j * n + k] * state[j, k]
+        for k in range(n):
+            part += dense[i, 2 * n + k] * accel[k]
+        spare[i // n, i % n] = part
+    for i in range(n):
+        state[0, i] = spare[0, i]
+        state[1, i] = spare[1, i]
+    return lost
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def stored(state, omega, mass):
     """Kinetic and elastic energy [J] of the modes."""
     out = 0.0
     for i in range(omega.size):
-        out += 0.5 * mass * (state[i, 1] * state[i, 1] + omega[i] * omega[i] * state[i, 0] * state[i, 0])
-    return out
+        out += state[1, i] * state[1, i] + omega[i] * omega[i] * state[0, i] * state[0, i]
+    return 0.5 * mass * out
 
 
 @njit(error_model="numpy", **LEAN)
-def accelerations(state, omega, damp, slide, base, mass, drive, force, s, out):
-    """Modal accelerations (n,) [m s-2] at an instant, relative to the base."""
-    for i in range(omega.size):
-        out[i] = -base[i] * drive * s - damp[i] * state[i, 1] - omega[i] ** 2 * state[i, 0] - slide[i] * force / mass
+def accelerations(state, omega, damp, damping, base, drive, accel, out):
+    """Modal accelerations (n,) [m s-2] at an instant, relative to the base; drive [m s-2], accel (n,): of forces."""
+    n = omega.size
+    for i in range(n):
+        out[0, i] = accel[i] - base[i] * drive - omega[i] ** 2 * state[0, i]
+        if damping.size == 0:
+            out[0, i] -= damp[i] * state[1, i]
+        else:
+            for k in range(n):
+                out[0, i] -= damping[i, k] * state[1, k]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -78,16 +113,16 @@ def safe_point(low, high, guess):
     return 0.5 * (low + high)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def sample(row, state, slide, output):
     """(slide, its speed, output) of the modes, written with them into the first 2 n + 2 entries of a row."""
     n = slide.size
     q, v, out = 0.0, 0.0, 0.0
     for k in range(n):
-        row[k], row[n + k] = state[k, 0], state[k, 1]
-        q += slide[k] * state[k, 0]
-        v += slide[k] * state[k, 1]
-        out += output[k] * state[k, 0]
+        row[k], row[n + k] = state[0, k], state[1, k]
+        q += slide[k] * state[0, k]
+        v += slide[k] * state[1, k]
+        out += output[k] * state[0, k]
     row[2 * n], row[2 * n + 1] = q, v
     return q, v, out
 

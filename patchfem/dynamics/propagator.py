@@ -1,8 +1,9 @@
-"""Exact one-step propagation of damped modes under a sine and a force that is constant over the step.
+"""Exact one-step propagation of damped modes under any drive and interface forces that are constant over the step.
 
-Everything comes from one matrix exponential per mode of the state (z, z', force, sin, cos), so resonance without
-damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where 3.7 and 3.9
-print i w).
+Everything comes from matrix exponentials of the modes (of all of them at once where damping couples them), so resonance
+without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where 3.7 and
+3.9 print i w). What the drive adds in a step and the energies of the step are sums over Gauss points of the step, exact
+to round-off for a drive that is smooth inside it.
 """
 
 from dataclasses import dataclass
@@ -10,44 +11,154 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from ..core import BaseSine, ModalBasis
+from ..core import ModalBasis
 
-GAUSS_X, GAUSS_W = np.polynomial.legendre.leggauss(4)
+LEAST, MOST = 8, 48  # Gauss points of a step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Propagator:
-    """step: (n, 2, 5) maps (z, z', f, sin, cos) at a step's start to (z, z') at its end, f = -slide_i F/mass.
+    """Coefficients of a step of dt [s] for n coordinates and p ports.
 
-    gauss: (4, n, 2, 5) the same to four Gauss points inside; sine: (N + 1, 2) sin and cos of the drive at the steps of
-    one period, sine_gauss: (N, 4) its sine at the Gauss points; beta [m/N]: loss of slide per constant force.
+    free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both per modal
+    acceleration that is constant over the step; dense (2 n, 3 n): the same for (z, z', acceleration) where damping
+    couples the coordinates, else (0, 0). reach (p, 2 n): what the free motion moves every port; beta (p, p) [m/N]: what
+    port forces take from it; rows (p, n): the ports. loss (6, n) or dense_loss (3 n, 3 n): viscous loss of a step as a
+    quadratic form of (z, z', acceleration). drive: see `tables`; steps: per period.
     """
 
     dt: float
-    step: np.ndarray
-    gauss: np.ndarray
-    sine: np.ndarray
-    sine_gauss: np.ndarray
-    beta: float
+    steps: int
+    rows: np.ndarray
+    free: np.ndarray
+    push: np.ndarray
+    dense: np.ndarray
+    reach: np.ndarray
+    beta: np.ndarray
+    loss: np.ndarray
+    dense_loss: np.ndarray
+    nodes: np.ndarray
+    parts: dict
+
+    def tables(self, drive, first: int, count: int) -> np.ndarray:
+        """Rows (count, 8 n + 3 + p) of the steps from number `first`: what the drive adds to z and z' (n, n), linear
+        forms in (z, z', acceleration) of the work of the drive (3 n) and of the viscous loss (3 n) [J], the rest of
+        both [J], the drive at the end of the step [m s-2], what the drive moves every port (p) [m]."""
+        start = (first + np.arange(count)) * self.dt
+        a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)
+        p = self.parts
+        moved = a @ p["z"]
+        rest = np.stack([np.einsum("kj,jl,kl->k", a, p["work"], a), np.einsum("kj,jl,kl->k", a, p["lost"], a),
+                         drive.values(start + self.dt)], axis=1)
+        return np.concatenate([moved, a @ p["v"], *(a @ p[key] for key in ("wz", "wv", "wf", "dz", "dv", "df")), rest,
+                               moved @ self.rows.T], axis=1)
 
 
-def _maps(modes: ModalBasis, drive: BaseSine, dt: float) -> np.ndarray:
-    out = np.empty((modes.omega.size, 2, 5))
-    for i, (w, d, g) in enumerate(zip(modes.omega, modes.zeta, modes.base)):
-        a = np.zeros((5, 5))
-        a[0, 1] = 1.0
-        a[1] = [-w * w, -2 * d * w, 1.0, -g * drive.acceleration, 0.0]
-        a[3, 4], a[4, 3] = drive.omega, -drive.omega
-        out[i] = expm(a * dt)[:2]
-    return out
-
-
-def propagator(modes: ModalBasis, drive: BaseSine, steps_per_cycle: int) -> Propagator:
-    """Coefficients for `steps_per_cycle` equal steps of the drive period."""
+def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
+    """Coefficients of `steps_per_cycle` equal steps of the drive's period; rows: ports (p, n), None: the interfaces."""
     dt = drive.period / steps_per_cycle
-    phase = 2 * np.pi * np.arange(steps_per_cycle + 1) / steps_per_cycle
-    step = _maps(modes, drive, dt)
-    inside = np.stack([_maps(modes, drive, dt * (1 + x) / 2) for x in GAUSS_X])
-    at_gauss = np.sin(phase[:-1, None] + np.pi / steps_per_cycle * (1 + GAUSS_X))
-    beta = float(np.sum(modes.slide**2 * step[:, 0, 2]) / modes.mass)
-    return Propagator(dt, step, inside, np.stack([np.sin(phase), np.cos(phase)], axis=1), at_gauss, beta)
+    rows = np.array(modes.interfaces if rows is None else rows, float)
+    fastest = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
+    count = int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST))
+    x, w = np.polynomial.legendre.leggauss(count)
+    nodes, weight = dt * (1 + x) / 2, dt * w / 2
+    n, coupled = modes.omega.size, modes.damping is not None
+    at_end, inside = _flow(modes, np.array([dt])), _flow(modes, nodes)
+    push = _push(modes, dt)
+    parts, quadratic = _parts(modes, dt, nodes, weight, inside)
+    one = [part[0] for part in at_end]
+    if coupled:
+        block = np.block([[one[0], one[1]], [one[2], one[3]]])
+        dense = np.concatenate([block, np.concatenate(push)], axis=1)
+        reach = rows @ (block - np.eye(2 * n))[:n]
+        beta, free, loss = rows @ push[0] @ rows.T / modes.mass, np.zeros((4, n)), np.zeros((6, n))
+        short = np.zeros((2, n))
+    else:
+        dense, short, free, loss = np.zeros((0, 0)), np.array(push), np.array(one), quadratic
+        reach = np.concatenate([rows * (one[0] - 1), rows * one[1]], axis=1)
+        beta = (rows * push[0]) @ rows.T / modes.mass
+    return Propagator(dt, steps_per_cycle, rows, free, short, np.ascontiguousarray(dense), np.ascontiguousarray(reach),
+                      np.ascontiguousarray(beta), loss, quadratic if coupled else np.zeros((0, 0)), nodes, parts)
+
+
+def _flow(modes: ModalBasis, times) -> tuple:
+    """Blocks zz, zv, vz, vv of the free motion after `times` (k,): (k, n) each, (k, n, n) where damping couples."""
+    n = modes.omega.size
+    if modes.damping is None:
+        a = np.zeros((n, 2, 2))
+        a[:, 0, 1], a[:, 1, 0], a[:, 1, 1] = 1.0, -modes.omega**2, -2 * modes.zeta * modes.omega
+        e = expm(a * np.asarray(times)[:, None, None, None])
+        return e[..., 0, 0], e[..., 0, 1], e[..., 1, 0], e[..., 1, 1]
+    a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -modes.damping]])
+    e = expm(a * np.asarray(times)[:, None, None])
+    return e[:, :n, :n], e[:, :n, n:], e[:, n:, :n], e[:, n:, n:]
+
+
+def _push(modes: ModalBasis, dt: float) -> tuple:
+    """(z, z') after dt per constant modal acceleration: (n,) each, (n, n) where damping couples."""
+    n = modes.omega.size
+    if modes.damping is None:
+        a = np.zeros((n, 3, 3))
+        a[:, 0, 1], a[:, 1, 0], a[:, 1, 1], a[:, 1, 2] = 1.0, -modes.omega**2, -2 * modes.zeta * modes.omega, 1.0
+        e = np.stack([expm(one * dt) for one in a])
+        return e[:, 0, 2], e[:, 1, 2]
+    a = np.zeros((3 * n, 3 * n))
+    a[:n, n:2 * n], a[n:2 * n, 2 * n:] = np.eye(n), np.eye(n)
+    a[n:2 * n, :n], a[n:2 * n, n:2 * n] = -np.diag(modes.omega**2), -modes.damping
+    e = expm(a * dt)
+    return e[:n, 2 * n:], e[n:2 * n, 2 * n:]
+
+
+def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
+    """Weights on the drive at the Gauss points of what `tables` returns, and the quadratic form of the viscous loss."""
+    n, base, mass, m = modes.omega.size, modes.base, modes.mass, nodes.size
+    _, zv, vz, vv = inside
+    coupled = modes.damping is not None
+    back = _flow(modes, dt - nodes)
+
+    def times_base(part):
+        return part @ base if coupled else part * base
+
+    def base_times(part):
+        return np.einsum("i,kij->kj", base, part) if coupled else part * base
+
+    # velocity at point k per drive at point j: -int_0^tau_k E_vv(tau_k - s) base l_j(s) ds
+    inner = np.empty((m, m, n))
+    share = (1 + np.polynomial.legendre.leggauss(m)[0]) / 2
+    for k, tau in enumerate(nodes):
+        reply = times_base(_flow(modes, tau * (1 - share))[3])
+        spread = _lagrange(nodes, tau * share) * (weight * tau / dt)[:, None]
+        inner[k] = -spread.T @ reply
+    if coupled:
+        d = (modes.damping + modes.damping.T) / 2
+        damped = np.einsum("ij,klj->kli", d, inner)
+    else:
+        d = 2 * modes.zeta * modes.omega
+        damped = inner * d
+    parts = {"z": -weight[:, None] * times_base(back[1]), "v": -weight[:, None] * times_base(back[3]),
+             "wz": -mass * weight[:, None] * base_times(vz), "wv": -mass * weight[:, None] * base_times(vv),
+             "wf": -mass * weight[:, None] * base_times(zv),
+             "work": -mass * weight[:, None] * (inner @ base),
+             "lost": mass * np.einsum("k,kji,kli->jl", weight, damped, inner)}
+    for key, part in (("dz", vz), ("dv", vv), ("df", zv)):
+        rule = "k,kji,kil->jl" if coupled else "k,kjl,kl->jl"
+        parts[key] = 2 * mass * np.einsum(rule, weight, damped, part)
+    if coupled:
+        whole = np.concatenate([vz, vv, zv], axis=2)
+        return parts, mass * np.einsum("k,kai,ab,kbj->ij", weight, whole, d, whole)
+    pairs = (vz * vz, 2 * vz * vv, vv * vv, 2 * vz * zv, 2 * vv * zv, zv * zv)
+    return parts, np.stack([mass * d * (weight @ pair) for pair in pairs])
+
+
+def _lagrange(nodes, at) -> np.ndarray:
+    """Lagrange polynomials of the nodes (m,) at places (k,): (k, m)."""
+    gap = nodes[:, None] - nodes
+    np.fill_diagonal(gap, 1.0)
+    scale = 1 / np.prod(gap / np.ptp(nodes), axis=1)
+    apart = (at[:, None] - nodes) / np.ptp(nodes)
+    hit = np.abs(apart) < 1e-15
+    raw = scale / np.where(hit, 1.0, apart)
+    out = raw / raw.sum(axis=1, keepdims=True)
+    touched = hit.any(axis=1)
+    out[touched] = hit[touched]
+    return out

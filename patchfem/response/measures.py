@@ -5,7 +5,7 @@ Everything works on samples: values of an exact run and of a march differ only i
 
 import numpy as np
 
-from ..core import BaseSine, Outcome, Response
+from ..core import Outcome, Response
 
 UNITS = {
     "relative_displacement_amplitude": "m", "absolute_acceleration_peak": "m s-2", "slip_amplitude": "m",
@@ -59,7 +59,7 @@ def interface_loop(slide, q: complex, f: complex, work: float, stiffness: float)
     return out
 
 
-def slip_measures(window: Response, drive: BaseSine, steps_per_cycle: int) -> dict:
+def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
 
     From uniform samples of the irreversible motion; sticking is |slip speed| < 1e-2 of the cycle's peak.
@@ -81,7 +81,7 @@ def slip_measures(window: Response, drive: BaseSine, steps_per_cycle: int) -> di
     if rise.size:
         part = (STICK - level[rise]) / (level[rise + 1] - level[rise])
         step = times[1] - times[0]
-        phases = drive.omega * (times[rise] + step * (0.5 + part))
+        phases = 2 * np.pi / drive.period * (times[rise] + step * (0.5 + part))
         out["slip_start_phase"] = circular_mean(phases)
     return out
 
@@ -201,7 +201,7 @@ def _rises(a) -> bool:
     return bool(np.all(ratios > 0.5) and np.all(ratios < 3))
 
 
-def run_measures(window: Response, extremes, book: dict, drive: BaseSine, last: int, peak: float | None = None) -> dict:
+def run_measures(window: Response, extremes, book: dict, drive, last: int, peak: float | None = None) -> dict:
     """Measures that every engine shares: amplitude, acceleration, force, energy balance, drift.
 
     extremes (c, 2) of the output per cycle, `last` of them in the window; book: the energy ledger; peak: the largest

@@ -15,7 +15,6 @@ from patchfem import closed_forms
 from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError
 from patchfem.dynamics.events import Signal, combine, first_root, run
 from patchfem.dynamics.histories import simulate
-from patchfem.dynamics.propagator import GAUSS_W, GAUSS_X, propagator
 from patchfem.response.measures import energy_balance
 
 W = 2 * pi * 143
@@ -434,59 +433,3 @@ def test_exact_root_at_the_start_is_left_alone():
         found = first_root((f,), 6.5, 0.5)
         assert found == (pytest.approx(pi, rel=1e-13) if power == 1 else pytest.approx(2 * pi, abs=1e-6)
                          if power == 2 else np.inf)
-
-
-# one step of the march
-
-MODES = {"damped": (W, 0.003), "critical": (0.4 * W, 1.0), "overdamped": (W, 3.0), "rigid": (0.0, 0.0),
-         "undamped resonance": (2 * pi * 150, 0.0)}
-
-
-@pytest.mark.parametrize("kind", MODES)
-def test_exact_step_against_dop853(kind):
-    omega, zeta = MODES[kind]
-    modes, drive = modes_of(omega, zeta, (0.7,), (0.9,), (1.0,), 2.0), BaseSine(5 * G_N, 2 * pi * 150)
-    prop, theta, force = propagator(modes, drive, 40), 1.234, 31.0
-    state = np.array([2e-5, -0.013])
-
-    def rate(t, y):
-        lead = -0.9 * drive.acceleration * np.sin(theta + drive.omega * t)
-        return [y[1], lead - 2 * zeta * omega * y[1] - omega**2 * y[0] - 0.7 * force / 2.0]
-
-    done = solve_ivp(rate, (0, prop.dt), state, "DOP853", rtol=1e-13, atol=1e-18, dense_output=True)
-    entry = np.array([*state, -0.7 * force / 2.0, sin(theta), cos(theta)])
-    np.testing.assert_allclose(prop.step[0] @ entry, done.y[:, -1], rtol=1e-10)
-    for k, x in enumerate(GAUSS_X):
-        np.testing.assert_allclose(prop.gauss[k, 0] @ entry, done.sol(prop.dt * (1 + x) / 2), rtol=1e-9)
-    assert prop.beta == pytest.approx(0.49 * prop.step[0, 0, 2] / 2.0, rel=1e-15)
-
-
-def test_exact_step_closed_forms():
-    om, a = 2 * pi * 150, 5 * G_N
-    drive = BaseSine(a, om)
-    rigid, resonant, dead = (propagator(modes_of(*m), drive, 64) for m in ((0.0, 0.0), (om, 0.0), (W, 3.0)))
-    dt, t = rigid.dt, om * rigid.dt
-    exact = [[1, dt, dt**2 / 2, -a * (1 - cos(t)) / om**2, -a * (t - sin(t)) / om**2],
-             [0, 1, dt, -a * sin(t) / om, -a * (1 - cos(t)) / om]]
-    np.testing.assert_allclose(rigid.step[0], exact, rtol=1e-11)
-    z = [-a * t * sin(t) / (2 * om**2), -a * (sin(t) - t * cos(t)) / (2 * om**2)]
-    v = [-a * (sin(t) + t * cos(t)) / (2 * om), -a * t * sin(t) / (2 * om)]
-    np.testing.assert_allclose(resonant.step[0, :, 3:], [z, v], rtol=1e-12)
-    fast, slow = -W * (3 + sqrt(8)), -W * (3 - sqrt(8))
-    e, g = np.exp(fast * dt), np.exp(slow * dt)
-    free = [[(fast * g - slow * e), (e - g)], [fast * slow * (g - e), fast * e - slow * g]]
-    np.testing.assert_allclose(dead.step[0, :, :2], np.array(free) / (fast - slow), rtol=1e-11)
-
-
-def test_exact_two_half_steps_are_one():
-    modes, drive = modes_of([W, 0.0, W], [0.003, 0.0, 1.5], (1.0, 0.5, 0.2)), BaseSine(5 * G_N, W)
-    one, half = propagator(modes, drive, 50), propagator(modes, drive, 100)
-    turn = W * half.dt
-    for whole, part in zip(one.step, half.step):
-        full = np.zeros((5, 5))
-        full[:2], full[2, 2] = part, 1.0
-        full[3:, 3:] = [[cos(turn), sin(turn)], [-sin(turn), cos(turn)]]
-        np.testing.assert_allclose(part @ full, whole, rtol=0, atol=1e-13 * np.abs(whole).max())
-    np.testing.assert_allclose(one.sine[:, 0]**2 + one.sine[:, 1]**2, 1.0, atol=1e-15)
-    np.testing.assert_allclose(half.sine[::2], one.sine, atol=1e-15)
-    assert one.sine_gauss.shape == (50, GAUSS_X.size) and GAUSS_W.sum() == pytest.approx(2.0)

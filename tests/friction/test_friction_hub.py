@@ -8,11 +8,11 @@ from scipy.integrate import solve_ivp
 from patchfem.compiled import load_kernels
 from patchfem.contact.slip import jenkins_set, shear_modes
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.propagator import GAUSS_W, propagator
+from patchfem.dynamics.propagator import propagator
 from patchfem.friction.law import Bonds
 from patchfem.friction.quadrature import Quadrature
 from patchfem.friction.recursion import Recursion, advance
-from patchfem.simulate_march import GOAL, jenkins_model, list_model, march, points_model
+from patchfem.simulate_march import GOAL, jenkins_model, list_model, march, modes_arrays, points_model, steps_arrays
 
 OMEGA = 2 * np.pi * 143
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
@@ -249,28 +249,28 @@ def test_exact_energy_ledger_of_a_driven_march():
 def release(basis, model, start, steps_per_cycle, count):
     """Modal + stored energy at every step of a free march from the modal displacements `start`, and the last slide."""
     hub = load_kernels()
-    prop = propagator(basis, BaseSine(0.0, basis.omega[0]), steps_per_cycle)
+    drive = BaseSine(0.0, basis.omega[0])
+    prop = propagator(basis, drive, steps_per_cycle)
     contact, work = model.build(hub)
-    state = np.zeros((basis.omega.size, 2))
-    state[:, 0] = start
-    modes = hub.Modes(basis.omega, 2 * basis.zeta * basis.omega, basis.slide, basis.base, basis.output)
-    steps = hub.Steps(prop.step, prop.gauss, prop.sine, prop.sine_gauss, GAUSS_W.copy(), prop.dt, prop.beta)
+    state = np.zeros((2, basis.omega.size))
+    state[0] = start
+    modes, steps, table = modes_arrays(basis, hub), steps_arrays(prop, hub), prop.tables(drive, 0, 1)
     held, ledger, rows = np.zeros(1), np.zeros(9), np.zeros((2, 2 * basis.omega.size + 6))
 
     def energy():
-        out = 0.5 * basis.mass * np.sum(state[:, 1]**2 + (basis.omega * state[:, 0])**2)
+        out = 0.5 * basis.mass * np.sum(state[1]**2 + (basis.omega * state[0])**2)
         if model.kind == hub.JENKINS:
             return out + 0.5 * contact.stiffness @ contact.stretch**2
         return out + 0.5 * contact.weight @ contact.bonds[2] + 0.5 * contact.kappa @ contact.b**2
 
     history = [energy()]
-    for k in range(count):
-        done, status = hub.march(k, 1, state, held, modes, steps, 0.0, basis.mass, model.kind, False, contact, work,
+    for _ in range(count):
+        done, status = hub.march(0, 1, state, held, modes, steps, table, basis.mass, model.kind, False, contact, work,
                                  GOAL * model.limit, np.inf, ledger, rows)
         assert (done, status) == (1, 0)
         history.append(energy())
     assert ledger[7] == 0
-    return np.array(history), ledger, float(basis.slide @ state[:, 0])
+    return np.array(history), ledger, float(basis.slide @ state[0])
 
 
 @pytest.mark.parametrize("steps_per_cycle", [6, 12, 25])

@@ -1,0 +1,216 @@
+"""Drives: their signals, the march under each of them against closed forms and DOP853, scenes that name them."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
+from patchfem.dynamics.drives import Recorded, Sweep, levels, release, step
+from patchfem.scene import SceneError, loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_march import coulomb_model, jenkins_model, march
+
+W = 2 * np.pi * 143
+
+
+def one(omega=W, zeta=0.003, base=1.0):
+    unit = np.ones(1)
+    return ModalBasis(("axial",), omega * unit, zeta * unit, unit, base * unit, unit, 0.9)
+
+
+# ---- signals
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+@pytest.mark.parametrize("low, high", [(50.0, 200.0), (200.0, 50.0)])
+def test_exact_the_phase_of_a_sweep_is_the_integral_of_its_frequency(low, high, logarithmic):
+    sweep = Sweep(low, high, 2.0, 3.0, None, logarithmic)
+    for t in (0.3, 1.7, 2.0, 2.4):
+        turns = quad(lambda s: float(sweep.frequency(s)), 0, min(t, 2.0), epsabs=1e-12)[0] + max(t - 2.0, 0) * high
+        assert sweep.phase(t) == pytest.approx(2 * np.pi * turns, rel=1e-12)
+    assert sweep.frequency(np.array([0.0, 2.0, 9.0])) == pytest.approx([low, high, high])
+    middle = np.sqrt(low * high) if logarithmic else (low + high) / 2
+    assert sweep.frequency(1.0) == pytest.approx(middle)
+    other = Sweep(low, high, 2.0, 0.0, 1e-3, logarithmic)
+    assert other.values(1.0) == pytest.approx(1e-3 * (2 * np.pi * middle)**2 * np.sin(other.phase(1.0)))
+
+
+def test_exact_levels_go_on_in_phase():
+    drive, sine = levels([2.0, 3.0], W, 2.5), BaseSine(1.0, W)
+    t = np.linspace(0, 5 * sine.period, 101)[:-1]
+    size = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
+    assert drive.values(t) == pytest.approx(size * np.sin(W * t), abs=1e-12)
+
+
+def test_refuses_a_signal_without_a_rising_time():
+    for time in ([0.0], [0.0, 0.0], [1.0, 2.0]):
+        with pytest.raises(PatchfemError, match=r"drive\.file"):
+            Recorded(np.array(time), np.zeros(len(time)), 1.0)
+
+
+# ---- the march
+
+def free(modes, drive, cycles, steps=200, start=None):
+    return march(modes, drive, coulomb_model(0.0, 0.0), cycles, steps, window=1000, start=start)
+
+
+def by_dop853(modes, drive, duration, at):
+    w, d = modes.omega[0], 2 * modes.zeta[0] * modes.omega[0]
+    done = solve_ivp(lambda t, y: [y[1], -modes.base[0] * drive.values(np.array([t]))[0] - d * y[1] - w * w * y[0]],
+                     (0, duration), [0.0, 0.0], "DOP853", rtol=1e-11, atol=1e-16, t_eval=at, max_step=duration / 400)
+    return done.y[0]
+
+
+@pytest.mark.parametrize("drive", [
+    Sweep(100.0, 190.0, 0.1, 20.0), Sweep(190.0, 100.0, 0.1, 0.0, 1e-4, True), levels([10.0, 30.0, 5.0], W, 4),
+], ids=["up", "down, logarithmic, displacement", "levels"])
+def test_exact_linear_response_to_a_drive_is_that_of_dop853(drive):
+    got = free(one(), drive, 12, 100).response
+    truth = by_dop853(one(), drive, got.time[-1], got.time)
+    assert got.slide == pytest.approx(truth, abs=2e-8 * np.abs(truth).max())
+
+
+def test_exact_a_step_overshoots_and_settles():
+    """-a/w^2 (1 - exp(-z w t)(cos + z/sqrt(1 - z^2) sin)); the accelerometer reads 0 - a + a at first, then w^2 z."""
+    drive, zeta = step(9.0, 2 * np.pi / W), 0.05
+    r = free(one(zeta=zeta), drive, 20, 40).response
+    own = W * np.sqrt(1 - zeta**2)
+    shape = 1 - np.exp(-zeta * W * r.time) * (np.cos(own * r.time) + zeta * W / own * np.sin(own * r.time))
+    assert r.slide == pytest.approx(-9.0 / W**2 * shape, rel=1e-10, abs=1e-17)
+    assert r.acceleration == pytest.approx(-2 * zeta * W * r.slide_rate - W**2 * r.slide, abs=1e-9)
+    assert r.base_acceleration == pytest.approx(9.0)
+
+
+def test_exact_a_force_leaves_the_frame_at_rest():
+    push, base = free(one(base=-1.0), BaseSine(9.0, W, False), 3), free(one(base=-1.0), BaseSine(9.0, W), 3)
+    assert push.response.slide == pytest.approx(base.response.slide, rel=1e-14)
+    assert not push.response.base_acceleration.any()
+    difference = base.response.acceleration - push.response.acceleration
+    assert difference == pytest.approx(base.response.base_acceleration, abs=1e-10)
+
+
+def test_exact_a_release_decays_and_its_energy_counts_as_work():
+    """Free viscous decay in closed form; with friction the released energy is what is lost, to round-off."""
+    got = free(one(), release(2 * np.pi / W), 30, 50, Start(np.array([1e-3]), np.array([0.2])))
+    r, own, d = got.response, W * np.sqrt(1 - 0.003**2), 0.003 * W
+    truth = np.exp(-d * r.time) * (1e-3 * np.cos(own * r.time) + (0.2 + d * 1e-3) / own * np.sin(own * r.time))
+    assert r.slide == pytest.approx(truth, abs=1e-13)
+    got = march(one(), release(2 * np.pi / W), jenkins_model([39.0 / 1e-6], [1e-6]), 60, 100,
+                start=Start(np.array([3e-4]), np.zeros(1)))
+    book = got.ledger
+    assert book["work_in"] == pytest.approx(0.45 * (W * 3e-4)**2, rel=1e-12)
+    assert book["friction"] + book["viscous"] + book["stored"] == pytest.approx(book["work_in"], rel=1e-11)
+
+
+def test_order_a_recorded_sine_tends_to_the_sine():
+    """Straight lines between n samples a cycle: the error of the response falls with n^2."""
+    sine, errors = BaseSine(5.0, 2 * np.pi * 100), []
+    want = free(one(), sine, 10, 80).response
+    for n in (20, 40, 80):
+        t = np.arange(10 * n + 1) / (100 * n)
+        got = free(one(), Recorded(t, sine.values(t), sine.period), 10, 80).response
+        errors.append(np.abs(got.slide - want.slide).max())
+    assert np.log2(errors[0] / errors[2]) / 2 == pytest.approx(2.0, abs=0.1)
+    assert errors[2] < 1e-3 * np.abs(want.slide).max()
+
+
+# ---- scenes
+
+RIG = """\
+[normal]
+load = "26 lbf"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "1 um"
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[accuracy]
+tolerance = 1e-2
+"""
+
+
+def measured(drive, head=RIG):
+    result = run(plan(loads(f"{head}[drive]\n{drive}")))
+    assert result.outcome is not Outcome.NOT_CONVERGED
+    return result, {name: m.value for name, m in result.measures.items()}
+
+
+def test_exact_a_force_scene_is_the_base_scene_seen_from_outside():
+    _, force = measured('kind = "force"\nfrequency = "143 Hz"\nforce = "39 N"\ncycles = 30')
+    _, base = measured(f'kind = "base"\nfrequency = "143 Hz"\nacceleration = "{39 / 0.884!r} m/s^2"\ncycles = 30')
+    for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
+        assert force[name] == pytest.approx(base[name], rel=1e-9)
+    assert force["absolute_acceleration_peak"] != pytest.approx(base["absolute_acceleration_peak"], rel=1e-2)
+
+
+def test_exact_levels_end_as_a_run_at_the_last_level_began_from_the_one_before():
+    result, found = measured('kind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = ["4.2 g", "4.8 g"]\n'
+                             "cycles = 30")
+    assert result.response.time[-1] * 143 == pytest.approx(60)
+    _, alone = measured('kind = "base"\nfrequency = "143 Hz"\nacceleration = "4.8 g"\ncycles = 60')
+    assert found["relative_displacement_amplitude"] == pytest.approx(alone["relative_displacement_amplitude"], rel=1e-3)
+
+
+def test_exact_a_recorded_scene_follows_its_file(tmp_path):
+    t = np.arange(0, 0.1, 2e-5)
+    table = tmp_path / "shake.csv"
+    table.write_text("time [ms],acceleration [g]\n" + "\n".join(
+        f"{1e3 * s!r},{5 * float(np.sin(W * s))!r}" for s in t.tolist()), "utf-8")
+    scene = loads(RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n', tmp_path / "scene.toml")
+    got = {name: m.value for name, m in run(plan(scene)).measures.items()}
+    _, want = measured(f'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\nduration = "{float(t[-1])!r} s"')
+    assert got["relative_displacement_amplitude"] == pytest.approx(want["relative_displacement_amplitude"], rel=2e-3)
+
+
+@pytest.mark.parametrize("drive, key", [
+    ('kind = "base"\nwaveform = "sweep"\nfrom = "1 Hz"\nto = "9 Hz"\nacceleration = "1 g"', "drive.rate"),
+    ('kind = "base"\nwaveform = "sweep"\nfrom = "9 Hz"\nto = "9 Hz"\nrate = "1 Hz/s"\nacceleration = "1 g"',
+     "drive.to"),
+    ('kind = "base"\nwaveform = "sweep"\nfrom = "1 Hz"\nto = "9 Hz"\nrate = "1 Hz/s"\nlog_rate = "1 oct/min"\n'
+     'acceleration = "1 g"', "drive.log_rate"),
+    ('kind = "force"\nwaveform = "levels"\nlevels = ["1 g"]\nfrequency = "9 Hz"\ncycles = 3', "drive.waveform"),
+    ('kind = "base"\nwaveform = "levels"\nfrequency = "9 Hz"\ncycles = 3', "drive.levels"),
+    ('kind = "base"\nwaveform = "step"\ncycles = 3', "drive.acceleration"),
+    ('kind = "force"\nwaveform = "step"\ncycles = 3', "drive.force"),
+    ('kind = "base"\nwaveform = "file"', "drive.file"),
+])
+def test_refuses_a_drive_that_is_not_whole(drive, key):
+    with pytest.raises(SceneError, match=key.replace(".", r"\.")):
+        loads(f"{RIG}[drive]\n{drive}")
+
+
+@pytest.mark.parametrize("text, word", [
+    ("time [s],acceleration [g]\n0,0\n1,0\n", "0 in every row"), ("time [s],force [N]\n0,0\n1,1\n", "acceleration"),
+    ("time [s],acceleration [g]\n0,1\n0,2\n", "rising"), ("time [s],acceleration\n0,1\n1,2\n", "acceleration"),
+])
+def test_refuses_a_broken_signal(tmp_path, text, word):
+    (tmp_path / "shake.csv").write_text(text, "utf-8")
+    scene = loads(RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n', tmp_path / "scene.toml")
+    with pytest.raises(PatchfemError, match=word):
+        run(plan(scene))
+
+
+def test_exact_a_universal_file_is_read_back(tmp_path):
+    import pyuff
+
+    from patchfem.response.signals import read_signal
+
+    t = np.arange(200) / 1e4
+    path = tmp_path / "shake.uff"
+    pyuff.UFF(str(path)).write_sets(pyuff.prepare_58(
+        binary=0, func_type=1, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1, ordinate_spec_data_type=12,
+        data=np.sin(W * t), x=t, abscissa_spacing=1, abscissa_inc=1e-4, num_pts=200, ord_data_type=4, id1="a", id2="b",
+        id3="c", id4="d", id5="e", load_case_id=0, ver_num=0, rsp_ent_name="N", ref_ent_name="N",
+        **{f"{axis}_{key}": 0 for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
+           for key in ("spec_data_type", "len_unit_exp", "force_unit_exp", "temp_unit_exp")
+           if (axis, key) != ("ordinate", "spec_data_type")}), "overwrite")
+    time, value = read_signal(path, "acceleration")
+    assert time == pytest.approx(t, abs=1e-9)
+    assert value == pytest.approx(np.sin(W * t), abs=1e-6)
+    with pytest.raises(PatchfemError, match="force is wanted, 0 of 1"):
+        read_signal(path, "force")

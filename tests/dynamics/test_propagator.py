@@ -1,0 +1,131 @@
+"""One step of the march: maps, what the drive adds, energies of the step, against DOP853 and closed forms."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from patchfem.core import G_N, BaseSine, ModalBasis
+from patchfem.dynamics.drives import Recorded, Sweep, levels
+from patchfem.dynamics.propagator import propagator
+
+W = 2 * pi * 143
+MODES = {"damped": (W, 0.003), "critical": (0.4 * W, 1.0), "overdamped": (W, 3.0), "rigid": (0.0, 0.0),
+         "undamped resonance": (2 * pi * 150, 0.0)}
+DRIVES = {"sine": BaseSine(5 * G_N, 2 * pi * 150), "sweep": Sweep(120.0, 180.0, 0.05, 5 * G_N),
+          "swept displacement": Sweep(180.0, 90.0, 0.05, displacement=1e-4, logarithmic=True),
+          "force": BaseSine(20.0, 2 * pi * 40, False)}
+
+
+def basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
+    omega, zeta = np.atleast_1d(np.array(omega, float)), np.atleast_1d(np.array(zeta, float))
+    slide, base = np.array(slide, float), np.array(base, float)
+    return ModalBasis(tuple("abcdef"[:omega.size]), omega, zeta, slide, base, slide, mass, damping)
+
+
+def coupled():
+    """Three coordinates, one of them rigid, coupled by damping."""
+    root = np.array([[1.0, 0.4, -0.3], [0.0, 0.7, 0.5], [0.0, 0.0, 0.2]])
+    return basis([W, 0.0, 2.3 * W], [0.0] * 3, (1.0, -0.5, 0.3), (0.6, 0.5, -0.2), 1.3, 40.0 * root.T @ root)
+
+
+def by_dop853(modes, drive, start, state, force, dt):
+    """(z, z') after dt, work of the drive and viscous loss [J] meanwhile, from `state` at time `start`."""
+    n, d = modes.omega.size, modes.dampers
+
+    def rate(t, y):
+        z, v, a = y[:n], y[n:2 * n], float(drive.values(np.array([start + t]))[0])
+        push = -modes.base * a - modes.slide * force / modes.mass
+        return [*v, *(push - d @ v - modes.omega**2 * z), -modes.mass * a * (modes.base @ v), modes.mass * v @ d @ v]
+
+    done = solve_ivp(rate, (0, dt), [*state, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18)
+    return done.y[:2 * n, -1], done.y[2 * n, -1], done.y[2 * n + 1, -1]
+
+
+def by_step(modes, prop, drive, number, state, force):
+    """The same by the coefficients of step `number`, in NumPy; also the slide increment by reach and beta."""
+    n, row = modes.omega.size, prop.tables(drive, number, 1)[0]
+    push = -modes.slide * force / modes.mass
+    x = np.concatenate([state, push])
+    if prop.dense.size:
+        new, quadratic = prop.dense @ x + row[:2 * n], x @ prop.dense_loss @ x
+    else:
+        z, v = state[:n], state[n:]
+        zz, zv, vz, vv = prop.free
+        new = np.concatenate([zz * z + zv * v + prop.push[0] * push, vz * z + vv * v + prop.push[1] * push])
+        new += row[:2 * n]
+        quadratic = np.sum(prop.loss[0] * z * z + prop.loss[1] * z * v + prop.loss[2] * v * v
+                           + prop.loss[3] * z * push + prop.loss[4] * v * push + prop.loss[5] * push * push)
+    work = row[2 * n:5 * n] @ x + row[8 * n]
+    lost = row[5 * n:8 * n] @ x + row[8 * n + 1] + quadratic
+    moved = prop.reach[0] @ state + row[8 * n + 3] - prop.beta[0, 0] * force
+    return new, work, lost, moved
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("kind", [*MODES, "coupled"])
+@pytest.mark.parametrize("steps", [40, 4])
+def test_exact_step_against_dop853(kind, drive, steps):
+    drive = DRIVES[drive]
+    modes = coupled() if kind == "coupled" else basis(*MODES[kind], (0.7,), (0.9,))
+    prop, n, number = propagator(modes, drive, steps), modes.omega.size, 7
+    state = np.concatenate([2e-5 * np.cos(np.arange(n)), -0.013 * np.sin(1 + np.arange(n))])
+    want, work, lost = by_dop853(modes, drive, number * prop.dt, state, 31.0, prop.dt)
+    new, w, d, moved = by_step(modes, prop, drive, number, state, 31.0)
+    assert new == pytest.approx(want, rel=2e-9, abs=1e-10 * np.abs(want).max())
+    scale = modes.mass * 5 * G_N * np.abs(state[n:]).max() * prop.dt
+    assert w == pytest.approx(work, rel=1e-8, abs=1e-9 * scale)
+    assert d == pytest.approx(lost, rel=1e-8, abs=1e-9 * scale)
+    assert moved == pytest.approx(modes.slide @ (want[:n] - state[:n]), rel=1e-8, abs=1e-14)
+
+
+def test_exact_step_closed_forms():
+    om, a = 2 * pi * 150, 5 * G_N
+    drive = BaseSine(a, om)
+    rigid, resonant, dead = (propagator(basis(*m), drive, 64) for m in ((0.0, 0.0), (om, 0.0), (W, 3.0)))
+    dt, t = rigid.dt, om * rigid.dt
+    np.testing.assert_allclose(np.concatenate([rigid.free[:, 0], rigid.push[:, 0]]), [1, dt, 0, 1, dt**2 / 2, dt],
+                               rtol=1e-12, atol=1e-18)
+    added = rigid.tables(drive, 0, 1)[0]
+    np.testing.assert_allclose(added[:2], [-a * (t - np.sin(t)) / om**2, -a * (1 - np.cos(t)) / om], rtol=1e-11)
+    added = resonant.tables(drive, 0, 1)[0]
+    np.testing.assert_allclose(added[:2], [-a * (np.sin(t) - t * np.cos(t)) / (2 * om**2),
+                                           -a * t * np.sin(t) / (2 * om)], rtol=1e-11)
+    fast, slow = -W * (3 + np.sqrt(8)), -W * (3 - np.sqrt(8))
+    e, g = np.exp(fast * dt), np.exp(slow * dt)
+    want = np.array([fast * g - slow * e, e - g, fast * slow * (g - e), fast * e - slow * g]) / (fast - slow)
+    np.testing.assert_allclose(dead.free[:, 0], want, rtol=1e-11)
+
+
+def test_exact_two_half_steps_are_one():
+    drive = BaseSine(5 * G_N, W)
+    for modes in (basis([W, 0.0, W], [0.003, 0.0, 1.5], (1.0, 0.5, 0.2), (1.0, 0.0, 0.0)), coupled()):
+        one, half = propagator(modes, drive, 50), propagator(modes, drive, 100)
+        state = 1e-5 * np.arange(1.0, 2 * modes.omega.size + 1)
+        whole = by_step(modes, one, drive, 3, state, 5.0)
+        first = by_step(modes, half, drive, 6, state, 5.0)
+        second = by_step(modes, half, drive, 7, first[0], 5.0)
+        np.testing.assert_allclose(second[0], whole[0], rtol=1e-11, atol=1e-17)
+        for k in (1, 2, 3):
+            assert first[k] + second[k] == pytest.approx(whole[k], rel=1e-10, abs=1e-18)
+
+
+def test_exact_a_periodic_table_repeats():
+    drive = BaseSine(5 * G_N, W)
+    prop = propagator(coupled(), drive, 60)
+    np.testing.assert_allclose(prop.tables(drive, 60, 60), prop.tables(drive, 0, 60), rtol=0, atol=1e-12)
+
+
+def test_exact_recorded_line_and_levels():
+    """A straight recorded signal pushes a rigid mode by a t^3/6; a level scales the sine's own table."""
+    rigid = basis(0.0, 0.0, mass=1.0)
+    line = Recorded(np.array([0.0, 10.0]), np.array([0.0, 30.0]), 0.5)
+    prop = propagator(rigid, line, 5)
+    added = prop.tables(line, 0, 1)[0]
+    np.testing.assert_allclose(added[:2], [-3 * 0.1**3 / 6, -3 * 0.1**2 / 2], rtol=1e-12)
+    sine, two = BaseSine(4.0, W), levels([4.0, 6.0], W, 3)
+    prop = propagator(coupled(), sine, 20)
+    own = prop.tables(sine, 0, 20)
+    np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(prop.tables(two, 60, 20)[:, :6], 1.5 * own[:, :6], rtol=0, atol=1e-13)

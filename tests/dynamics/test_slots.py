@@ -1,0 +1,166 @@
+"""Many interfaces and nonlinear springs in one march: against single contacts, closed forms and DOP853."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
+
+from patchfem.core import BaseSine, ModalBasis, Start
+from patchfem.dynamics.drives import release
+from patchfem.friction.law import Bonds
+from patchfem.simulate_march import coulomb_model, jenkins_model, march, points_model, rate_model
+from patchfem.simulate_slots import SlotsModel, bonds, coulomb, cubic, elastic_plastic, interlock, rate
+
+OMEGA = 2 * np.pi * 143
+DRIVE = BaseSine(49.0, OMEGA)
+
+
+def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
+    """Unit masses in a row, springs (i + 1,) from the base to the first and on to the next; the last one end free."""
+    n = len(stiffness)
+    k = np.zeros((n, n))
+    for i, s in enumerate(stiffness):
+        k[i, i] += s
+        if i:
+            k[i - 1, i - 1] += s
+            k[i - 1, i] -= s
+            k[i, i - 1] -= s
+    square, shape = np.linalg.eigh(k)
+    omega = np.sqrt(np.maximum(square, 0.0))
+    faces = np.eye(n) if faces is None else np.asarray(faces, float)
+    rows = faces @ shape
+    return ModalBasis(tuple(map(str, range(n))), omega, np.full(n, zeta), rows[0], base * shape.T @ np.ones(n),
+                      shape[0], mass, None, rows, shapes=shape)
+
+
+def one(omega=OMEGA, zeta=0.003):
+    unit = np.ones(1)
+    return ModalBasis(("axial",), omega * unit, zeta * unit, unit, unit, unit, 1.0)
+
+
+LAW = Bonds(0.4, 2e-6, ratio=0.6, rest_growth=0.3, slip_growth=0.4e-6, rest_speed=1e-5, breakaway=0.1)
+PAIRS = {
+    "coulomb": (coulomb_model(39.0, 30.0), lambda: coulomb(0, 39.0, 30.0)),
+    "elastic-plastic": (jenkins_model([39.0 / 2e-6], [2e-6]), lambda: elastic_plastic(0, 39.0, 2e-6)),
+    "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds(0, LAW, 98.0)),
+    "tanh": (rate_model(39.0, 1e-3), lambda: rate(0, 39.0, 1e-3)),
+}
+
+
+@pytest.mark.parametrize("law", PAIRS)
+def test_exact_one_element_is_the_contact_of_its_own_loop(law):
+    model, element = PAIRS[law]
+    alone = march(one(), DRIVE, model, 6, 100, window=6)
+    turns = march(one(), DRIVE, SlotsModel(None, (element(),), np.ones((1, 1)), 49.0), 6, 100, window=6)
+    as_patch = march(one(), DRIVE, SlotsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0), 6, 100,
+                     window=6)
+    scale = np.abs(alone.response.slide).max()
+    for other in (turns, as_patch):
+        assert other.outcome is None
+        assert other.response.slide == pytest.approx(alone.response.slide, abs=1e-8 * scale)
+        same = np.abs(other.window.force - alone.window.force) <= 1e-5 * 39.0
+        assert np.mean(same) >= (0.7 if law == "coulomb" else 1.0)  # its reaction in stick is read otherwise
+        assert other.ledger["friction"] == pytest.approx(alone.ledger["friction"], rel=1e-7)
+        assert other.response.extra["ledger"][0, -1] == pytest.approx(alone.response.extra["ledger"][0, -1], rel=1e-7)
+        near = np.abs(other.window.acceleration - alone.window.acceleration) <= 2e-4
+        assert np.mean(near) >= (0.7 if law == "coulomb" else 1.0)
+
+
+@pytest.mark.parametrize("element, period", [
+    (cubic(0, 1.0), 4 * ellipk(0.5)), (interlock(0, 1.0, 2 * np.pi), 4 * ellipk(np.sin(0.5)**2)),
+], ids=["duffing", "pendulum"])
+def test_exact_potential_springs_keep_their_energy_and_find_their_period(element, period):
+    """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
+    start, errors = Start(np.array([1.0]), np.zeros(1)), []
+    for steps in (20, 100, 500):
+        model = SlotsModel(None, (element,), np.ones((1, 1)), 1.0)
+        got = march(one(0.0, 0.0), release(2 * np.pi), model, 30, steps, window=30, start=start)
+        assert got.outcome is None
+        assert got.ledger["work_in"] == pytest.approx(got.ledger["stored"], rel=1e-9)
+        r = got.response
+        cross = np.flatnonzero((r.slide[:-1] > 0) & (r.slide[1:] <= 0))
+        times = r.time[cross] - r.slide[cross] * np.diff(r.time)[cross] / np.diff(r.slide)[cross]
+        errors.append(abs(np.diff(times).mean() / period - 1))
+        assert errors[-1] < 5 / steps**2
+    assert np.log(errors[0] / errors[2]) / np.log(25) == pytest.approx(2.0, abs=0.1)
+
+
+def by_dop853(modes, drive, elements, duration, at):
+    """Elastic-plastic elements as (port row, k, limit length): modal coordinates at times (k,)."""
+    n = modes.omega.size
+    rows = np.array([row for row, _, _ in elements])
+    k, most = (np.array(part) for part in zip(*[(k, most) for _, k, most in elements]))
+
+    def rate_of(t, y):
+        z, v, s = y[:n], y[n:2 * n], y[2 * n:]
+        slip = rows @ v
+        push = -modes.base * drive.values(np.array([t]))[0] - rows.T @ (k * np.clip(s, -most, most)) / modes.mass
+        held = (np.abs(s) >= most) & (s * slip > 0)
+        return [*v, *(push - modes.dampers @ v - modes.omega**2 * z), *np.where(held, 0.0, slip)]
+
+    done = solve_ivp(rate_of, (0, duration), np.zeros(2 * n + len(elements)), "DOP853", rtol=1e-9, atol=1e-12,
+                     t_eval=at, max_step=duration / 4000)
+    return done.y[:n].T
+
+
+def test_order_three_masses_with_three_unlike_interfaces():
+    """Interfaces 1-0, 2-1 and 3-2 of elastic-plastic friction on a free-free chain: order two, against DOP853."""
+    modes = chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
+    drive = BaseSine(1.0, 1.3)
+    laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
+    truth = by_dop853(modes, drive, [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)], 4 * drive.period,
+                      np.linspace(0, 4 * drive.period, 101))
+    model = SlotsModel(None, tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)), modes.interfaces, 1.0)
+    errors = []
+    for steps in (100, 200, 400, 800):
+        got = march(modes, drive, model, 4, steps, window=4)
+        assert got.outcome is None
+        z = got.response.modal[::steps // 25]
+        errors.append(np.abs(z - truth).max())
+        book = got.ledger
+        miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
+        assert abs(miss) <= 1e-10 * (book["power"] + book["peak_stored"])
+    assert errors[-1] < 2e-5 * np.abs(truth).max()
+    assert np.log2(errors[0] / errors[-1]) / 3 == pytest.approx(2.0, abs=0.25)
+
+
+def test_exact_two_alike_interfaces_stop_together():
+    """Two unit masses, alike in everything, move as one and stick in the same steps; a rigid common motion besides."""
+    modes = chain([1.0, 0.0])
+    both = ModalBasis(("1", "2"), np.ones(2), np.full(2, 0.003), np.array([1.0, 0]), np.ones(2), np.array([1.0, 0]),
+                      1.0, None, np.eye(2))
+    model = SlotsModel(None, (coulomb(0, 0.8, 0.8), coulomb(1, 0.8, 0.8)), np.eye(2), 1.0)
+    got = march(both, BaseSine(1.0, 1.0), model, 30, 200)
+    alone = march(one(1.0), BaseSine(1.0, 1.0), coulomb_model(0.8, 0.8), 30, 200)
+    assert np.array_equal(got.response.extra["slides"][0], got.response.extra["slides"][1])
+    assert got.response.slide == pytest.approx(alone.response.slide, abs=1e-12)
+    assert modes.omega[0] == 0.0
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 10_000))
+def test_always_energy_closes_and_friction_only_takes(seed):
+    """Random chains of 2-4 masses with mixed laws and springs: balance at round-off, no law above its limit."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 5))
+    faces = np.eye(n) if rng.random() < 0.5 else np.eye(n) - np.eye(n, k=-1)
+    modes = chain(rng.uniform(0.0, 5.0, n) * (rng.random(n) > 0.2), zeta=rng.uniform(0, 0.1), faces=faces)
+    limit, length = rng.uniform(0.05, 2.0, n), 10 ** rng.uniform(-3, 0, n)
+    kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
+    makers = {"coulomb": lambda p: coulomb(p, limit[p], limit[p]), "ep": lambda p: elastic_plastic(p, limit[p],
+                                                                                                 length[p]),
+              "bonds": lambda p: bonds(p, Bonds(0.5, length[p]), 2 * limit[p]),
+              "tanh": lambda p: rate(p, limit[p], length[p])}
+    elements = [makers[kind](p) for p, kind in enumerate(kinds)]
+    elements += [cubic(0, rng.uniform(0, 3)), interlock(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5))]
+    got = march(modes, BaseSine(1.0, rng.uniform(0.3, 3.0)), SlotsModel(None, tuple(elements), modes.interfaces, 1.0),
+                5, int(rng.integers(20, 120)))
+    assert got.outcome is None, got.message
+    book = got.ledger
+    miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
+    assert abs(miss) <= 1e-9 * (book["power"] + book["peak_stored"])
+    assert np.diff(got.response.extra["ledger"][2]).min() >= 0
+    forces = np.abs(got.response.extra["forces"][:n]).max(axis=1)
+    assert np.all(forces <= limit * (1 + 1e-9))
