@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from .contact.press_kernels import locate, path_mean, press_state, pull
-from .dynamics.kernels import note, sample, stored
+from .dynamics.kernels import accelerations, free_slide, move, note, sample, stored
 from .friction.kernels import LEAN
 from .simulate_rub_kernels import (
     COULOMB,
@@ -25,83 +25,40 @@ from .simulate_rub_kernels import (
 )
 
 
-class Body(NamedTuple):
-    """omega, damp = 2 zeta omega, base, output (n,); rows (3, n): slide, heave and pitch; beta (3, 3): what a constant
-    force in a step takes from them; arm [m]: half the length of the patch."""
+class Ports(NamedTuple):
+    """rows (3, n): slide, heave and pitch per coordinate; beta (3, 3): what constant forces in a step take from them;
+    arm [m]: half the length of the patch."""
 
-    omega: np.ndarray
-    damp: np.ndarray
-    base: np.ndarray
-    output: np.ndarray
     rows: np.ndarray
     beta: np.ndarray
     arm: float
 
 
 @njit(error_model="numpy", **LEAN)
-def free_rows(state, step, rows, s, c, out):
-    """Increments of slide, heave and pitch (3,) over a step without forces of the contact."""
-    out[:] = 0.0
-    for i in range(state.shape[0]):
-        move = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 3] * s + step[i, 0, 4] * c \
-            - state[i, 0]
-        for r in range(3):
-            out[r] += rows[r, i] * move
-
-
-@njit(error_model="numpy", **LEAN)
-def pushed(rows, i, force, mass):
-    """Acceleration of mode i under the forces (3,) on slide, heave and pitch."""
-    return -(rows[0, i] * force[0] + rows[1, i] * force[1] + rows[2, i] * force[2]) / mass
-
-
-@njit(error_model="numpy", **LEAN)
-def moved(state, step, rows, mass, force, s, c):
-    """Advance the modes in place by one step under constant forces (3,)."""
-    for i in range(state.shape[0]):
-        f = pushed(rows, i, force, mass)
-        z = step[i, 0, 0] * state[i, 0] + step[i, 0, 1] * state[i, 1] + step[i, 0, 2] * f \
-            + step[i, 0, 3] * s + step[i, 0, 4] * c
-        v = step[i, 1, 0] * state[i, 0] + step[i, 1, 1] * state[i, 1] + step[i, 1, 2] * f \
-            + step[i, 1, 3] * s + step[i, 1, 4] * c
-        state[i, 0] = z
-        state[i, 1] = v
-
-
-@njit(error_model="numpy", **LEAN)
-def spent(state, gauss, body, mass, drive, force, s, c, sines, dt, weights, out):
-    """Add to `out` (3,) the work of the base [J], the viscous loss [J] and the integral of |power in| [J]."""
-    for k in range(weights.size):
-        power, loss = 0.0, 0.0
-        for i in range(state.shape[0]):
-            v = gauss[k, i, 1, 0] * state[i, 0] + gauss[k, i, 1, 1] * state[i, 1] \
-                + gauss[k, i, 1, 2] * pushed(body.rows, i, force, mass) + gauss[k, i, 1, 3] * s + gauss[k, i, 1, 4] * c
-            power -= mass * body.base[i] * drive * sines[k] * v
-            loss += mass * body.damp[i] * v * v
-        share = weights[k] * dt / 2
-        out[0] += share * power
-        out[1] += share * loss
-        out[2] += share * abs(power)
-
-
-@njit(error_model="numpy", **LEAN)
 def place_of(state, rows, r):
     """Slide, heave or pitch of the modes."""
     out = 0.0
-    for i in range(state.shape[0]):
-        out += rows[r, i] * state[i, 0]
+    for i in range(state.shape[1]):
+        out += rows[r, i] * state[0, i]
     return out
 
 
 @njit(error_model="numpy", **LEAN)
-def press_step(book, k0, begin, f1, f2, beta, arm, stiff, move, out):
+def pushed(rows, force, mass, accel):
+    """Modal accelerations (n,) under the forces (3,) that resist slide, heave and pitch."""
+    for i in range(accel.size):
+        accel[i] = -(rows[0, i] * force[0] + rows[1, i] * force[1] + rows[2, i] * force[2]) / mass
+
+
+@njit(error_model="numpy", **LEAN)
+def press_step(book, k0, begin, f1, f2, beta, arm, turn, out):
     """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
-    free motion. Returns (piece at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
+    guess in `turn` (2,). Returns (piece at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
 
     The slopes have a convex potential, so the answer is unique; inside one piece one step finds it.
     """
     b11, b12, b21, b22 = beta[1, 1], beta[1, 2], beta[2, 1], beta[2, 2]
-    dh, dt = move[0], move[1]
+    dh, dt = turn[0], turn[1]
     old_h, old_t, step_h, step_t, part, best = dh, dt, 0.0, 0.0, 1.0, np.inf
     k = k0
     for count in range(1, 100):
@@ -112,7 +69,7 @@ def press_step(book, k0, begin, f1, f2, beta, arm, stiff, move, out):
         r1, r2 = dh - f1 + p1, dt - f2 + p2
         size = abs(r1) + arm * abs(r2)
         noise = 4e-16 * (abs(dh) + abs(f1) + abs(p1) + arm * (abs(dt) + abs(f2) + abs(p2)))
-        move[0], move[1] = dh, dt
+        turn[0], turn[1] = dh, dt
         if size <= noise:
             return k, count, 0.0
         if size < best * (1 - 0.1 * part) or best == np.inf:
@@ -124,35 +81,37 @@ def press_step(book, k0, begin, f1, f2, beta, arm, stiff, move, out):
         else:
             part *= 0.5
             if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
-                move[0], move[1] = old_h, old_t
+                turn[0], turn[1] = old_h, old_t
                 k = path_mean(book, k0, begin[0], begin[1], old_h, old_t, out)
-                return k, count, best / (b11 + b22 / (arm * arm) + 2 / stiff)
+                return k, count, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
         dh, dt = old_h - part * step_h, old_t - part * step_t
-    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / stiff)
+    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
 
 
 @njit(error_model="numpy", cache=True)
-def march_wrench(first, steps, state, held, at_piece, body, prop, drive, mass, kind, rub, book, loads, goal, travel,
-                 ledger, rows, press):
-    """March `steps` steps from step number `first` of the drive.
+def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table, mass, kind, rub, book, loads, goal,
+                 travel, ledger, rows):
+    """March `steps` steps from row `first` of the table of the drive.
 
-    held (2,): last friction force, mean force of the step before; at_piece (1,) slot of the present piece; rub:
+    held (2,): last friction force, mean force of the step before; at_piece (1,): slot of the present piece; rub:
     `simulate_rub_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the steps, empty where the contact says it;
-    ledger and rows as in `simulate_kernels.march`; press (steps + 1, 5): load, moment, energy of the preloaded contact,
-    heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no contact set fits.
+    ledger as in `simulate_kernels.march`; rows (steps + 1, 2 n + 11) as there, then load, moment, energy of the
+    preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
+    contact set fits.
     """
-    step, gauss, sine, sine_gauss, weights, dt, _ = prop
-    n = body.omega.size
-    around = sine.shape[0] - 1
-    free, force, move, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
-    beta = body.beta
+    omega, damp, slide, base, output, damping = modes
+    free_map, push, dense, reach, loss, dense_loss, dt, _ = prop
+    n, around, beta = omega.size, table.shape[0], ports.beta
+    free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
+    accel, spare = np.empty(n), np.empty((2, n))
     given = loads.size > 0
     apart = given or (beta[1, 1] == 0 and beta[2, 2] == 0)
     mixed = not apart and (beta[0, 1] != 0 or beta[0, 2] != 0)
-    stiff, load, k = book.base[4], book.base[0], at_piece[0]
+    load, k = book.base[0], at_piece[0]
     for i in range(steps + 1):
-        q, v, reach = sample(rows[i], state, body.rows[0], body.output)
-        begin[0], begin[1] = place_of(state, body.rows, 1), place_of(state, body.rows, 2)
+        q, v, stroke = sample(rows[i], state, slide, output)
+        begin[0], begin[1] = place_of(state, ports.rows, 1), place_of(state, ports.rows, 2)
+        moment = book.base[1]
         if given:
             load = loads[i]
             rub.now[0] = load
@@ -162,47 +121,45 @@ def march_wrench(first, steps, state, held, at_piece, body, prop, drive, mass, k
                 return i, 4
             begin[2], begin[3], begin[4] = pull(book, k, begin[0], begin[1])
             load, moment, _ = press_state(book, k, -begin[0], begin[1], rub.now)
-            press[i, 1], press[i, 2] = moment, begin[2]
             load = max(load, 0.0)
-        press[i, 0], press[i, 3], press[i, 4] = load, begin[0], begin[1]
-        if kind == COULOMB or kind == RATE:
-            bound = load * max(rub.force[0], rub.force[1] if kind == COULOMB else 0.0)
-            held[0] = min(max(held[0], -bound), bound)
+        at_piece[0] = k
+        rows[i, 2 * n + 6], rows[i, 2 * n + 7], rows[i, 2 * n + 8] = load, moment, begin[2]
+        rows[i, 2 * n + 9], rows[i, 2 * n + 10] = begin[0], begin[1]
+        bound = load * (rub.force[0] if kind == COULOMB or kind == RATE else np.inf) if load > 0 else 0.0
+        held[0] = min(max(held[0], -bound), bound)
         now, energy, slip = rub_state(kind, rub, q, held[0])
-        status = note(rows[i], now, energy, slip, reach, travel,
-                      energy + begin[2] + stored(state, body.omega, mass), ledger)
+        status = note(rows[i, :2 * n + 6], now, energy, slip, stroke, travel, energy + begin[2]
+                      + stored(state, omega, mass), ledger)
         if status:
             return i, status
         if i == steps:
             break
         at = (first + i) % around
-        s, co = sine[at, 0], sine[at, 1]
-        free_rows(state, step, body.rows, s, co, free)
+        for r in range(3):
+            free[r] = free_slide(state, reach, r, table, at)
         for j in range(rub.now.size):
             rub.before[j] = rub.now[j]
-        guess, count, wrong, end = held[1], 0, 0.0, k
+        guess, count, wrong, end, bad = held[1], 0, 0.0, k, False
         low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
         dq, used = 0.0, 0.0
-        bad = False
         for outer in range(1, 81):
-            mean, after = load, load
+            mean = load
             if given:
-                after = loads[i + 1]
-                rub.now[0] = after
-                mean = 0.5 * (load + after)
+                rub.now[0] = loads[i + 1]
+                mean = 0.5 * (load + loads[i + 1])
             elif not apart:
                 end, its, wrong = press_step(book, k, begin, free[1] - beta[1, 0] * guess, free[2] - beta[2, 0] * guess,
-                                             beta, body.arm, stiff, move, out)
+                                             beta, ports.arm, turn, out)
                 if end < 0:
                     return i, 4
                 force[1], force[2] = out[0], out[1]
                 count += its
                 mean = max(book.base[0] - out[0], 0.0)
                 if kind != COULOMB and kind != RATE:
-                    press_state(book, end, -(begin[0] + move[0]), begin[1] + move[1], rub.now)
+                    press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
             slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
             press_all(kind, rub)
-            dq, used, its = rub_solve(slides, beta[0, 0], rows[i, 2 * n + 1], dt, kind, rub, mean, goal, held[1])
+            dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
             count += abs(its)
             bad = its < 0 or wrong > goal
             miss = used - guess
@@ -231,38 +188,30 @@ def march_wrench(first, steps, state, held, at_piece, body, prop, drive, mass, k
         ledger[6] = max(ledger[6], count)
         ledger[7] += 1.0 if bad else 0.0
         ledger[8] += used * dq
-        spent(state, gauss, body, mass, drive, force, s, co, sine_gauss[at], dt, weights, ledger)
-        moved(state, step, body.rows, mass, force, s, co)
+        pushed(ports.rows, force, mass, accel)
+        move(state, free_map, push, loss, dense, dense_loss, table, at, accel, spare, ledger)
         rows[i, 2 * n + 4] = used
-        held[1] = used
+        held[0], held[1], k = used, used, end
         v1 = 0.0
         for j in range(n):
-            v1 += body.rows[0, j] * state[j, 1]
+            v1 += slide[j] * state[1, j]
         ledger[3] += rub_commit(dq, used, v, v1, dt, kind, rub)
-        held[0] = used
-        if not given and not apart:
-            load = max(book.base[0] - out[3], 0.0)
-            k = end
-            at_piece[0] = k
-        elif given:
+        if given:
             load = loads[i + 1]
+        elif not apart:
+            load = max(book.base[0] - out[3], 0.0)
+            force[1], force[2] = out[3], out[4]
         if kind == RATE:
             held[0] = rub.force[0] * load * np.tanh(v1 / rub.force[1])
         elif kind == COULOMB and dq != 0.0:
             held[0] = rub.force[1] * load * (1.0 if dq > 0 else -1.0)
         elif kind == COULOMB:
-            held[0] = stuck(state, body, mass, drive, sine[at + 1, 0], out[3] if not apart else 0.0,
-                            out[4] if not apart else 0.0)
+            force[0] = 0.0
+            pushed(ports.rows, force, mass, accel)
+            accelerations(state, omega, damp, damping, base, table[at, 8 * n + 2], accel, spare)
+            need, gain = 0.0, 0.0
+            for j in range(n):
+                need += slide[j] * spare[0, j]
+                gain += slide[j] * slide[j] / mass
+            held[0] = need / gain if gain > 0 else 0.0
     return steps, 0
-
-
-@njit(error_model="numpy", **LEAN)
-def stuck(state, body, mass, drive, s, pulled, turned):
-    """Friction force at which the slide does not accelerate."""
-    need, gain, rows = 0.0, 0.0, body.rows
-    for i in range(state.shape[0]):
-        free = -body.base[i] * drive * s - body.damp[i] * state[i, 1] - body.omega[i] ** 2 * state[i, 0] \
-            - (rows[1, i] * pulled + rows[2, i] * turned) / mass
-        need += rows[0, i] * free
-        gain += rows[0, i] * rows[0, i] / mass
-    return need / gain if gain > 0 else 0.0

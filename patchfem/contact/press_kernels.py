@@ -15,6 +15,7 @@ from numba.core.options import DefaultOptions
 
 LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 FAST = {"reassoc", "contract", "arcp"}
+LEAST = FAST | {"nnan", "nsz"}  # for passes that look for the least value: without them none is vectorised
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
 NOISE = 1e-13  # of the largest term: what counts as nothing
 FLAW = 1e-8  # relative residual above which the tableau is made anew; below it one refinement reaches round-off
@@ -206,7 +207,7 @@ def find(book, name):
     return k
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=LEAST, **LEAN)
 def holds(book, k, d, t):
     """(whether no node of piece k fails at (d, t), forces and gaps below which a node fails)."""
     r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
@@ -269,7 +270,7 @@ def pull(book, k, h, turn):
     return q[0] + d * (q[1] + 0.5 * by_d) + turn * (q[2] + 0.5 * by_t), -(q[1] + by_d), q[2] + by_t
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=LEAST, **LEAN)
 def reach(book, k, d, t, dd, dt, force, gap):
     """Share of the increment (dd, dt) from (d, t) at which the first node of piece k falls to its bound."""
     r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
