@@ -120,7 +120,8 @@ def _histories(result: Result) -> tuple:
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
     if kind == "rig":
         out |= dict(zip(LEDGER, r.extra["ledger"])) if "ledger" in r.extra else {}
-        out |= {"friction_force": r.force, "normal_load": np.full(r.time.size, result.measures["normal_load"].value)}
+        still = np.full(r.time.size, result.measures["normal_load"].value)
+        out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
     modes = [mode.name for mode in result.plan.scene.structure.mode]
     return out, (modes, r.modal)
 

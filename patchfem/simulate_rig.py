@@ -23,6 +23,7 @@ from .response.measures import (
     window_ends,
 )
 from .simulate_acting import acting
+from .simulate_wrench_scene import acts, with_wrench
 from .structure.modes import basis
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
@@ -63,7 +64,7 @@ class Raw:
 
 def modes_of(scene) -> ModalBasis:
     """Modes of [structure]."""
-    return basis(scene.structure.mode, scene.structure.moving_mass)
+    return with_wrench(scene, basis(scene.structure.mode, scene.structure.moving_mass))
 
 
 def drive_of(scene):
@@ -93,15 +94,16 @@ def choose(scene, per_point: bool = False) -> Settings:
     """Engine and numerical settings from the scene; PatchfemError for a method that cannot do it."""
     accuracy, f, contact = scene.accuracy, scene.friction, scene.contact
     shear = contact.gives_way if contact is not None else ""
-    closed = f is None or (f.law in ("coulomb", "convolution") and not shear)
+    closed = f is None or (f.law in ("coulomb", "convolution") and not shear and not acts(scene))
     side = "upper"
     if contact is not None:
         from .simulate_plan import shape_side
 
         side = shape_side(contact)
     if accuracy.method == "exact" and not closed:
-        raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'"
-                            f"{f' with {shear}' if shear else ''}; use method = \"march\"")
+        beside = f" with {shear}" if shear else " under a load that changes" if acts(scene) else ""
+        raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'{beside}; use "
+                            "method = \"march\"")
     drive = drive_of(scene)
     closed = closed and isinstance(drive, BaseSine) and scene.structure.stiffening is None
     engine = "exact" if closed and accuracy.method != "march" else "march"
@@ -110,6 +112,8 @@ def choose(scene, per_point: bool = False) -> Settings:
     cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
     fastest = max(simulate_drive.fastest(drive), *(m.frequency * drive.period for m in scene.structure.mode))
+    if scene.normal is not None and scene.normal.amplitude:
+        fastest = max(fastest, scene.normal.frequency * drive.period)
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
@@ -151,6 +155,10 @@ def contact_model(scene, settings: Settings, patch, drive):
     f, contact = scene.friction, scene.contact
     if f is None:
         return hub.coulomb_model(0.0, 0.0)
+    if acts(scene):
+        from .simulate_wrench_scene import model_of
+
+        return model_of(scene, modes_of(scene), patch, speed_of(scene, drive))
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
     shear = contact.gives_way if contact is not None else ""

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import simulate_wrench as wrench
 from .core import ModalBasis, PatchfemError, frozen_array
 from .simulate_acting import acting
 from .simulate_load import load_at, varies
@@ -26,8 +25,9 @@ def with_wrench(scene, modes: ModalBasis) -> ModalBasis:
                    pitch=frozen_array(pitch) if pitch.any() else None)
 
 
-def rubbing_of(scene, speed: float) -> wrench.Rubbing:
-    """The law of [friction] under a load that changes; `speed` [m/s] as in `simulate_rig.law_of`."""
+def rubbing_of(scene, speed: float):
+    """The simulate_wrench.Rubbing of [friction]; `speed` [m/s] as in `simulate_rig.law_of`."""
+    from . import simulate_wrench as wrench
     from .simulate_rig import law_of
 
     f = acting(scene).friction
@@ -46,13 +46,16 @@ def atlas_of(scene, patch):
     """The atlas of the patch of a scene, None under [normal]."""
     if patch is None:
         return None
+    from . import simulate_wrench as wrench
     from .simulate_patch import spring_of
 
     return wrench.atlas_of(patch, spring_of(scene.contact))
 
 
-def model_of(scene, modes: ModalBasis, patch, speed: float) -> wrench.WrenchModel:
-    """The model of a rig whose load changes; patch: the solved Patch or None for [normal]."""
+def model_of(scene, modes: ModalBasis, patch, speed: float):
+    """The simulate_wrench.WrenchModel of a rig whose load changes; patch: the solved Patch or None for [normal]."""
+    from . import simulate_wrench as wrench
+
     load = None if patch is not None else lambda t: load_at(scene, t)
     return wrench.wrench_model(with_wrench(scene, modes), rubbing_of(scene, speed), atlas_of(scene, patch), load)
 
@@ -81,6 +84,8 @@ def frames_of(scene, patch, raw) -> dict:
 
 def _shear(law, shot, nodal) -> tuple:
     """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
+    from . import simulate_wrench as wrench
+
     top, bottom, _ = shot["memory"]
     if law.kind == wrench.PLASTIC:
         return law.static * top, law.length * np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
