@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
-    "contact.holder.tangential_stiffness": "",
     "structure.mode.lateral": "",
     "structure.mode.yaw": "",
     "structure.bonded": "",

@@ -120,7 +120,8 @@ def _sizes(scene) -> tuple:
         unknowns["modes"] = len(scene.structure.mode)
         first = scene.structure.mode[0]
         chain["mode"] = scene.structure.moving_mass * (2 * pi * first.frequency)**2
-    chain["holder"] = "rigid"
+    holder = contact.holder if contact is not None else None
+    chain["holder"] = holder.tangential_stiffness or "rigid" if holder is not None else "rigid"
     if contact is not None and contact.shear is not None:
         chain["pieces_shear"] = block_shear(contact)
     else:

@@ -279,7 +279,6 @@ def test_refuses_another_shape_of_table(text, says):
 
 
 UNBUILT = [
-    (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
     (RIG, ["friction.breakaway=0.1", "friction.order=2"], "friction.breakaway"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "contact.strips.count=4"], "contact.strips"),
     (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}"], "structure.mode.second.normal"),
