@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .compiled import load as compiled
-from .contact.atlas import Atlas
+from .contact.atlas import Atlas, sides
 from .core import ModalBasis, Outcome, PatchfemError, Response
 from .simulate_march import GOAL, ContactModel, Run
 
@@ -252,7 +252,7 @@ def _one_point(load: float) -> dict:
             "energy": np.zeros((1, 6)), "names": np.zeros(1, np.int64), "heads": np.full(2, -1, np.int64),
             "link": np.full(1, -1, np.int64), "node": np.zeros(1, np.int64), "wanted": np.zeros(1, bool),
             "base": np.array([load, 0.0, 0.0, 1.0, 1.0]), "side": np.zeros((2, 3, 1)), "row": np.zeros(4),
-            "meta": np.zeros(5, np.int64)}
+            "meta": np.zeros(5, np.int64), **sides(1)}
 
 
 def march(modes: ModalBasis, drive, atlas: Atlas | None, law: Rubbing, cycles: float, steps_per_cycle: int,

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from .contact.press_kernels import locate, path_mean, press_state, pull
+from .contact.press_kernels import locate, press_state, pull
+from .contact.press_path_kernels import path_mean
 from .dynamics.kernels import accelerations, free_slide, move, note, sample, stored
 from .friction.kernels import LEAN
 from .simulate_rub_kernels import (
@@ -104,7 +105,7 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
     n, around, beta = omega.size, table.shape[0], ports.beta
     free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
     accel, spare = np.empty(n), np.empty((2, n))
-    given = loads.size > 0
+    given, pointed = loads.size > 0, not (kind == COULOMB or kind == RATE)
     apart = given or (beta[1, 1] == 0 and beta[2, 2] == 0)
     mixed = not apart and (beta[0, 1] != 0 or beta[0, 2] != 0)
     load, k = book.base[0], at_piece[0]
@@ -120,12 +121,13 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
             if k < 0:
                 return i, 4
             begin[2], begin[3], begin[4] = pull(book, k, begin[0], begin[1])
-            load, moment, _ = press_state(book, k, -begin[0], begin[1], rub.now)
-            load = max(load, 0.0)
+            load, moment = max(book.base[0] - begin[3], 0.0), book.base[1] - begin[4]
+            if pointed or i == steps:
+                press_state(book, k, -begin[0], begin[1], rub.now)
         at_piece[0] = k
         rows[i, 2 * n + 6], rows[i, 2 * n + 7], rows[i, 2 * n + 8] = load, moment, begin[2]
         rows[i, 2 * n + 9], rows[i, 2 * n + 10] = begin[0], begin[1]
-        bound = load * (rub.force[0] if kind == COULOMB or kind == RATE else np.inf) if load > 0 else 0.0
+        bound = load * (np.inf if pointed else rub.force[0]) if load > 0 else 0.0
         held[0] = min(max(held[0], -bound), bound)
         now, energy, slip = rub_state(kind, rub, q, held[0])
         status = note(rows[i, :2 * n + 6], now, energy, slip, stroke, travel, energy + begin[2]
@@ -137,7 +139,7 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
         at = (first + i) % around
         for r in range(3):
             free[r] = free_slide(state, reach, r, table, at)
-        for j in range(rub.now.size):
+        for j in range(rub.now.size if pointed else 0):
             rub.before[j] = rub.now[j]
         guess, count, wrong, end, bad = held[1], 0, 0.0, k, False
         low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
@@ -155,7 +157,7 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
                 force[1], force[2] = out[0], out[1]
                 count += its
                 mean = max(book.base[0] - out[0], 0.0)
-                if kind != COULOMB and kind != RATE:
+                if pointed:
                     press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
             slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
             press_all(kind, rub)

@@ -17,6 +17,7 @@ from .unilateral import solve_forces
 NOISE = 1e-13  # of the largest term: what counts as nothing
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
 ROOM = 64e6  # bytes of kept pieces
+SIDES = 16  # most sides of a polygon, as in `polygon_kernels`
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -134,17 +135,24 @@ class Atlas:
     def arrays(self, room: float = ROOM) -> dict:
         """Arrays of `press_kernels.Book` with nothing but the set of the reference state in `wanted`."""
         m = self.x.size
-        count = int(max(16, min(room / (25 * m + 80), 100_000)))
+        count = int(max(16, min(room / (25 * m + 400), 100_000)))
         names = np.random.default_rng(5).integers(-2**63, 2**63, m, dtype=np.int64)
         return {"c": self.c.copy(), "x": self.x.copy(), "b": self.opening.copy(), "tableau": np.zeros((m, m + 3)),
                 "here": np.zeros(m, bool), "rows": np.zeros((count, 3, m)), "on": np.zeros((count, m), bool),
                 "energy": np.zeros((count, 6)), "names": np.zeros(count, np.int64),
-                "heads": np.full(1 << int(count).bit_length(), -1, np.int64), "link": np.full(count, -1, np.int64),
+                "heads": np.full(1 << int(count).bit_length(), -1, np.int64), "link": np.zeros(count, np.int64),
                 "node": names, "wanted": self.reference.on.copy(),
                 "base": np.array([self.load, self.moment, self.energy, self.size, self.reference.energy[3]]),
                 "side": np.zeros((2, 3, m)), "row": np.zeros(m + 3),
-                "meta": np.zeros(5, np.int64)}
+                "meta": np.zeros(5, np.int64), **sides(count)}
 
     def name(self, arrays: dict) -> int:
         """Name of the reference set in these arrays."""
         return int(np.bitwise_xor.reduce(arrays["node"][self.reference.on], initial=0))
+
+
+def sides(count: int) -> dict:
+    """Arrays of the polygons of `count` pieces."""
+    return {"sides": np.zeros(count, np.int64), "edge": np.zeros((count, SIDES), np.int64),
+            "beside": np.zeros((count, SIDES), np.int64), "limit": np.zeros((count, 2)),
+            "corner": np.zeros((2, 3, 4 * SIDES))}

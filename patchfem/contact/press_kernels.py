@@ -11,13 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numba.core.options import DefaultOptions
 
-LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+from .polygon_kernels import LEAN, NOISE, outline, within
+
 FAST = {"reassoc", "contract", "arcp"}
 LEAST = FAST | {"nnan", "nsz"}  # for passes that look for the least value: without them none is vectorised
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
-NOISE = 1e-13  # of the largest term: what counts as nothing
 FLAW = 1e-8  # relative residual above which the tableau is made anew; below it one refinement reaches round-off
 COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)
 
@@ -29,7 +28,9 @@ class Book(NamedTuple):
     rows (k, 3, m): force or gap per (1, d, t) of every piece; on (k, m); energy (k, 6): of the preloaded contact, the
     coefficients of 1, d, t, d^2/2, d t, t^2/2; names (k,), heads, link: hash chains; node (m,) names; base (5,): force,
     moment and energy of the reference state, size of its openings, its dN/d(delta); wanted (m,), side (2, 3, m),
-    row (m + 3,): scratch; meta: COUNT .. RENEWED.
+    row (m + 3,): scratch; meta: COUNT .. RENEWED. Where a piece is a polygon of few sides: sides (k,) their number, 0
+    where the rows have to be asked; edge (k, SIDES) their nodes; beside (k, SIDES) slots of the pieces there, -1; limit
+    (k, 2) forces and gaps below which a node fails; corner (2, 3, 4 SIDES): scratch.
     """
 
     c: np.ndarray
@@ -49,6 +50,11 @@ class Book(NamedTuple):
     side: np.ndarray
     row: np.ndarray
     meta: np.ndarray
+    sides: np.ndarray
+    edge: np.ndarray
+    beside: np.ndarray
+    limit: np.ndarray
+    corner: np.ndarray
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -168,6 +174,7 @@ def store(book, name):
     at = name & bucket
     book.link[slot] = book.heads[at]
     book.heads[at] = slot
+    outline(book, slot)
     return slot
 
 
@@ -243,6 +250,8 @@ def locate(book, k, d, t):
     """Slot of the piece that holds at (d, t), searched from piece k; -1 where none was found. On a known set 0.5 us
     for 400 nodes, a node more or less 0.3 ms."""
     for count in range(BLOCKS + 10 * book.x.size):
+        if within(book, k, d, t):
+            return k
         good, force, gap = holds(book, k, d, t)
         if good:
             return k
@@ -268,59 +277,6 @@ def pull(book, k, h, turn):
     q, d = book.energy[k], -h
     by_d, by_t = q[3] * d + q[4] * turn, q[4] * d + q[5] * turn
     return q[0] + d * (q[1] + 0.5 * by_d) + turn * (q[2] + 0.5 * by_t), -(q[1] + by_d), q[2] + by_t
-
-
-@njit(error_model="numpy", fastmath=LEAST, **LEAN)
-def reach(book, k, d, t, dd, dt, force, gap):
-    """Share of the increment (dd, dt) from (d, t) at which the first node of piece k falls to its bound."""
-    r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
-    out = np.inf
-    for i in range(on.size):
-        rate = r1[i] * dd + r2[i] * dt
-        here = r0[i] + r1[i] * d + r2[i] * t - (force if on[i] else gap)
-        if rate < 0:
-            out = min(out, max(here, 0.0) / -rate)
-    return out
-
-
-@njit(error_model="numpy", **LEAN)
-def path_mean(book, k, h, turn, dh, dt, out):
-    """Mean slopes of the energy of the preloaded contact along a straight increment of heave and turn from piece k on,
-    piece by piece. Returns the slot at the end, -1 where none was found.
-
-    out (9,): mean slopes (2,), energy and slopes (2,) at the end, derivatives of the mean by (dh, dt) (2, 2). The mean
-    times the increment is the difference of the energies, and it is itself the gradient of a convex function.
-    """
-    out[:] = 0.0
-    at, small = 0.0, 1e-10
-    for _ in range(20 * book.x.size + 100):
-        good, force, gap = holds(book, k, -(h + dh), turn + dt)
-        end = 1.0
-        if not good:
-            _, f, g = holds(book, k, -(h + at * dh), turn + at * dt)
-            share = reach(book, k, -(h + at * dh), turn + at * dt, -dh, dt, min(force, f), min(gap, g))
-            end = min(at + max(share, 0.0), 1.0)
-        _, a1, a2 = pull(book, k, h + at * dh, turn + at * dt)
-        energy, b1, b2 = pull(book, k, h + end * dh, turn + end * dt)
-        q, part, bend = book.energy[k], 0.5 * (end - at), 0.5 * (end * end - at * at)
-        out[0] += part * (a1 + b1)
-        out[1] += part * (a2 + b2)
-        out[5] += bend * q[3]
-        out[6] -= bend * q[4]
-        out[8] += bend * q[5]
-        at = end
-        if at >= 1.0:
-            out[2], out[3], out[4], out[7] = energy, b1, b2, out[6]
-            return k
-        beyond = min(at + small, 1.0)
-        following = locate(book, k, -(h + beyond * dh), turn + beyond * dt)
-        if following < 0:
-            return following
-        small = 10 * small if following == k else 1e-10
-        if following == k:
-            at = beyond
-        k = following
-    return -1
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
