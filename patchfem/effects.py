@@ -23,7 +23,7 @@ EFFECTS = {
     "contact.upper": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
     "contact.lower": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
     "contact.approach": Effect("", "delta given, N = sum f"),
-    "contact.holder": Effect("", "sum f x = N offset + K theta"),
+    "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
     "contact.step": Effect("patchfem.contact.gaps", "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
     "contact.asperities.law=exponential": Effect("patchfem.contact.skin", "f = A p_0 exp(-s/u_0), s = g + theta x - "

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
-    "contact.holder.tangential_stiffness": "",
-    "structure.mode.normal": "",
-    "structure.mode.pitch": "",
     "structure.mode.lateral": "",
     "structure.mode.yaw": "",
     "wear": "",
@@ -57,9 +54,8 @@ def combinations(draft: Draft, kind: str) -> None:
     shear = contact.gives_way if contact is not None else ""
     if kind not in ("bench", "rig") or law is None:
         return
-    normal = draft.tables.normal
-    if kind == "rig" and normal is not None and normal.amplitude:
-        draft.say("normal.amplitude", "in a rig: use a bench, [slide], meanwhile; not yet built")
+    if kind == "rig" and (cause := _changing_load(draft)):
+        _under_changing_load(draft, law, shear, cause)
     if kind == "rig" and law.law == "nonlocal" and law.breakaway and law.order != 1:
         draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
     if shear:
@@ -70,6 +66,51 @@ def combinations(draft: Draft, kind: str) -> None:
             draft.say("contact.strips", f"beside {shear}: leave one of them out; not yet built")
         elif contact.strips is not None and law.law == "convolution":
             draft.say("contact.strips", "beside law 'convolution': leave it out; not yet built")
+
+
+def _changing_load(draft: Draft) -> str:
+    """The key by which the load of a rig changes, empty where it stays."""
+    normal, structure = draft.tables.normal, draft.tables.structure
+    if normal is not None and normal.amplitude:
+        return "normal.amplitude"
+    for index, mode in enumerate(structure.mode if structure is not None else ()):
+        for key in ("normal", "pitch"):
+            if getattr(mode, key, None):
+                return f"structure.mode.{index}.{key}"
+    return ""
+
+
+def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) -> None:
+    """Say what a load that changes in a run cannot stand beside."""
+    contact, structure = draft.tables.contact, draft.tables.structure
+    beside = f"beside {cause}" if cause == "normal.amplitude" else f"beside a mode's {cause.rpartition('.')[2]}"
+    if contact is None and cause != "normal.amplitude":
+        draft.say(cause, "one rigid point leaves no room for heave or pitch: name [contact] in place of [normal]")
+    accuracy = draft.tables.accuracy
+    if accuracy is not None and accuracy.method == "exact" and law.law == "coulomb" and not shear:
+        draft.say("accuracy.method", f"no exact solution exists {beside}; use 'march' or leave method out")
+    if law.law == "convolution":
+        draft.say("friction.law", f"'convolution' {beside}: use another law; not yet built")
+    elif law.law == "nonlocal" and (law.reading == "report" or law.order not in (1, None) or law.breakaway):
+        key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
+        draft.say(f"friction.{key}", f"{beside}: use reading = \"stretch\" with order = 1 and no breakaway; not yet "
+                                     "built")  # fmt: skip
+    if shear:
+        draft.say(cause, f"beside {shear}: leave one of them out; not yet built")
+    if structure is not None and structure.stiffening is not None:
+        draft.say("structure.stiffening", f"{beside}: leave one of them out; not yet built")
+    if structure is not None and structure.bonded is not None and structure.bonded.wavelength is not None:
+        draft.say("structure.bonded.wavelength", f"{beside}: leave one of them out; not yet built")
+    if contact is None:
+        return
+    if contact.strips is not None:
+        draft.say("contact.strips", f"{beside}: leave one of them out; not yet built")
+    if contact.asperities is not None and contact.asperities.law not in ("linear", None):
+        draft.say("contact.asperities.law", f"'{contact.asperities.law}' {beside}: use 'linear'; not yet built")
+    for name in ("tilt", "crown", "step", "profile"):
+        shape = getattr(contact, name)
+        if shape is not None and shape.on == "lower":
+            draft.say(f"contact.{name}.on", f"'lower' {beside}: put the shapes on the upper piece; not yet built")
 
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:

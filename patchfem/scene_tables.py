@@ -166,7 +166,10 @@ class Contact(Table):
         if self.shear is not None:
             return "[contact.shear]"
         soft = self.asperities is not None and self.asperities.tangential_ratio is not None
-        return "contact.asperities.tangential_ratio" if soft else ""
+        if soft:
+            return "contact.asperities.tangential_ratio"
+        held = self.holder is not None and self.holder.tangential_stiffness is not None
+        return "contact.holder.tangential_stiffness" if held else ""
 
 
 class Normal(Table):

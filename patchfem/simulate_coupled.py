@@ -20,7 +20,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     warnings = [*warnings, *notes_of(scene)]
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
     lumps = scene.friction is not None and scene.friction.law != "convolution"
-    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point:
+    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not rig.acts(scene):
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
@@ -121,7 +121,11 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
 
     out = []
     few = replace(settings, steps=max(1, settings.steps // 4))
-    if coarse[0] is not None and scene.contact.gives_way:
+    if coarse[0] is not None and rig.acts(scene):
+        rough = rig.run_march(scene, few, modes, drive, coarse[0])
+        out.append(change(quarter.values, rough.values))
+        seconds["error"] += rough.seconds
+    elif coarse[0] is not None and scene.contact.gives_way:
         rough = rig.run_march(scene, few, modes, drive, coarse[0])
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
@@ -139,6 +143,10 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
     from . import simulate_rig as rig
 
     sigma, f = patch.pressure.sigma_n, scene.friction
+    if rig.acts(scene):
+        from .simulate_wrench_scene import frames_of as wrench_frames
+
+        return wrench_frames(scene, patch, raw)
     if settings.engine == "exact" or not raw.snapshots:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // settings.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)

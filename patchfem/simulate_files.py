@@ -120,7 +120,8 @@ def _histories(result: Result) -> tuple:
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
     if kind == "rig":
         out |= dict(zip(LEDGER, r.extra["ledger"])) if "ledger" in r.extra else {}
-        out |= {"friction_force": r.force, "normal_load": np.full(r.time.size, result.measures["normal_load"].value)}
+        still = np.full(r.time.size, result.measures["normal_load"].value)
+        out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
     from .simulate_structure import modes_of, motions
 
     modes = modes_of(result.plan.scene)

@@ -21,7 +21,8 @@ class Patch:
     """One solved patch; forces, areas and stiffnesses are of all pairs together.
 
     pieces: compliance of the pieces and of their skin, linearised at the operating point where the skin is smooth;
-    giving: (m, m) [m/N] the tangential part that the scene names, without [contact.shear] that of the skin alone; gap
+    giving: (m, m) [m/N] the tangential part that the scene names: of the skin, the pieces' with [contact.shear], the
+    same on every entry of a holder's spring; gap
     (m,) [m] of the unloaded surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in
     strips, whose means over the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None
     where it is rigid in shear; notes: sentences for the warnings.
@@ -92,6 +93,8 @@ def pressed(scene, pair: Pair, worn=None) -> Patch:
     giving = pieces.tangential
     if contact.shear is None:
         giving = frozen_array(giving - pair.compliance.tangential)
+    if contact.holder is not None and contact.holder.tangential_stiffness:
+        giving = frozen_array(giving + 1 / contact.holder.tangential_stiffness)
     ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
     if strips is not None:
         notes = (*notes, strips.note)

@@ -123,7 +123,8 @@ def _sizes(scene) -> tuple:
         chain["mode"] = mode_stiffness(scene)
         if scene.structure.bonded is not None:
             chain["bonded"] = scene.structure.bonded.stiffness
-    chain["holder"] = "rigid"
+    holder = contact.holder if contact is not None else None
+    chain["holder"] = holder.tangential_stiffness or "rigid" if holder is not None else "rigid"
     if contact is not None and contact.shear is not None:
         chain["pieces_shear"] = block_shear(contact)
     else:

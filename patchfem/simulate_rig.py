@@ -23,6 +23,7 @@ from .response.measures import (
 )
 from .simulate_acting import acting
 from .simulate_structure import highest_frequency, mode_stiffness
+from .simulate_wrench_scene import acts
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 COMPARED = ("duhamel", "newmark", "euler")
@@ -113,6 +114,8 @@ def choose(scene, per_point: bool = False) -> Settings:
     cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
     fastest = max(simulate_drive.fastest(drive), highest_frequency(scene) * drive.period)
+    if scene.normal is not None and scene.normal.amplitude:
+        fastest = max(fastest, scene.normal.frequency * drive.period)
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
@@ -155,6 +158,8 @@ def no_closed_form(scene, drive, shear: str) -> str:
         return f"for law '{odd[0]}'{f' with {shear}' if shear else ''}"
     if shear and laws:
         return f"with {shear}"
+    if acts(scene):
+        return "under a load that changes"
     if not drive.segments:
         return f"under a drive of waveform '{scene.drive.waveform}'"
     if structure.stiffening is not None:
@@ -194,6 +199,10 @@ def contact_model(scene, settings: Settings, patch, drive):
     f, contact = scene.friction, scene.contact
     if f is None:
         return hub.coulomb_model(0.0, 0.0)
+    if acts(scene):
+        from .simulate_wrench_scene import model_of
+
+        return model_of(scene, modes_of(scene), patch, speed_of(scene, drive))
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
     shear = contact.gives_way if contact is not None else ""

@@ -279,10 +279,13 @@ def test_refuses_another_shape_of_table(text, says):
 
 
 UNBUILT = [
-    (PATCH, ["contact.holder.tangential_stiffness=5e6 N/m"], "contact.holder.tangential_stiffness"),
     (RIG, ["friction.breakaway=0.1", "friction.order=2"], "friction.breakaway"),
-    (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz"], "normal.amplitude"),
-    (RIG, ["structure.mode.second.pitch=2 rad/m"], "structure.mode.second.pitch"),
+    (RIG, ["structure.mode.second.pitch=2 rad/m", "contact.strips.count=4"], "contact.strips"),
+    (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}"], "structure.mode.second.normal"),
+    (RIG, ["structure.mode.second.normal=0.1", "friction.order=0"], "friction.order"),
+    (RIG, ["structure.mode.axial.pitch=1 rad/m", "contact.tilt.on=lower"], "contact.tilt.on"),
+    (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz",
+                                             "friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
     (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10"], "wear"),
     (RIG, ["accuracy.method=newmark"], "accuracy.method"),
     (RIG, ["accuracy.harmonics=5"], "accuracy.harmonics"),

@@ -59,6 +59,11 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: no point carries friction")
     points = np.flatnonzero(limit > 0)
     force = limit[points]
+    if local_length == 0 and np.ptp(tangential) == 0:  # a spring before rigid points: they all slip at once
+        stiffness = 1 / tangential[0, 0]
+        at = [force.sum() / stiffness]
+        return JenkinsSet(frozen_array([stiffness]), frozen_array(at), frozen_array(points, np.int64),
+                          frozen_array(force), frozen_array(force[:, None] / at), 0)
     c = tangential[np.ix_(points, points)] + np.diag(local_length / force)
     inverse = np.linalg.inv(c)
     stick = np.ones(force.size, bool)
@@ -158,6 +163,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     """
     index = np.flatnonzero(limit > 0)
     root = np.sqrt(limit[index])
+    even = np.ptp(tangential) == 0  # a spring before points of one rigid piece: one mode is all of it
     with one_thread():
         values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
     values, vectors = values[::-1], vectors[:, ::-1]
@@ -165,6 +171,9 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     if jump >= 1:
         raise PatchfemError(f"contact.shear with friction.kinetic below static: the patch could jump by itself "
                             f"({jump:.3g} >= 1); raise friction.bond_length or friction.kinetic")
+    if even:
+        return ShearModes(frozen_array(index, np.int64), frozen_array(np.ones((index.size, 1))),
+                          frozen_array([1 / tangential[0, 0]]), 0.0)
     count = min(count, index.size)
     shape = vectors / root[:, None]
     elastic = 2 * np.abs(shape @ (values * (shape.T @ limit[index]))).max()

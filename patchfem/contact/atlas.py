@@ -1,0 +1,158 @@
+"""The normal contact as a piecewise linear map of the holder's motion: approach delta and rotation theta.
+
+The unilateral contact of `unilateral`, w = g + theta x - delta + C f >= 0, f >= 0, f . w = 0, is affine in (delta,
+theta) as long as its set of touching nodes stays; the plane falls into convex polygons, one for each set. Counted from
+a solved reference state: d = delta - delta0, t = theta - theta0. The energy E = f . C f/2 is convex and has the slopes
+dE/d(delta) = N, dE/d(theta) = -M, M = sum f x, across the borders as well, so the forces give back what they took.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ..core import NotConverged, PatchfemError, frozen_array
+from .unilateral import solve_forces
+
+NOISE = 1e-13  # of the largest term: what counts as nothing
+BLOCKS = 12  # sets tried with all failing nodes flipped at once
+ROOM = 64e6  # bytes of kept pieces
+SIDES = 16  # most sides of a polygon, as in `polygon_kernels`
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Piece:
+    """One contact set `on` (m,): force where it touches and gap where it does not, rows (3, m) per (1, d, t); energy
+    (6,): of the preloaded contact, E - E0 - N0 d + M0 t, the coefficients of 1, d, t, d^2/2, d t, t^2/2."""
+
+    on: np.ndarray
+    rows: np.ndarray
+    energy: np.ndarray
+
+    def values(self, d: float, t: float) -> np.ndarray:
+        """(m,) forces [N] on the set and gaps [m] off it."""
+        return self.rows[0] + d * self.rows[1] + t * self.rows[2]
+
+    def forces(self, d: float, t: float) -> np.ndarray:
+        """(m,) nodal forces [N]."""
+        return np.where(self.on, np.maximum(self.values(d, t), 0.0), 0.0)
+
+    @property
+    def tangent(self) -> np.ndarray:
+        """(2, 2): change of N [N] and M [N m] (rows) per approach [m] and rotation [rad]; exact within the piece."""
+        _, _, _, dd, dt, tt = self.energy
+        return np.array([[dd, dt], [-dt, -tt]])
+
+    def share(self, d: float, t: float, dd: float, dt: float) -> float:
+        """Share of an increment (dd, dt) from (d, t) in the piece up to which it holds, and its tangent with it; inf
+        where it never ends."""
+        here, rate = self.values(d, t), dd * self.rows[1] + dt * self.rows[2]
+        falls = rate < 0
+        return float((np.maximum(here[falls], 0.0) / -rate[falls]).min(initial=np.inf))
+
+
+class Atlas:
+    """Pieces of a pair of bodies around a solved state, made when first asked for and kept.
+
+    c (m, m) [m/N], x (m,) [m], opening (m,) [m]: g + theta0 x - delta0 of the state, < 0 where the bodies would
+    overlap without forces; on (m,) bool: its contact set. load N0 [N], moment M0 [N m].
+    """
+
+    def __init__(self, c, x, opening, on):
+        self.c, self.x, self.opening = frozen_array(c), frozen_array(x), frozen_array(opening)
+        self.pieces, self.load, self.moment, self.energy = {}, 0.0, 0.0, 0.0
+        self.size = float(np.abs(self.opening).max())
+        self.reference = self._made(np.asarray(on, bool))
+        self.reference = found = self.at(0.0, 0.0)
+        force = found.forces(0.0, 0.0)
+        self.load, self.moment, self.energy = float(force.sum()), float(force @ self.x), float(found.energy[0])
+        self.size += float(np.abs(self.c @ force).max())
+        if not self.load > 0:
+            raise PatchfemError("contact: the motion starts from a contact under load; raise contact.load")
+        self.pieces = {}
+        self.reference = self.piece(found.on)
+
+    def piece(self, on: np.ndarray) -> Piece:
+        """The piece of a contact set (m,) bool."""
+        key = on.tobytes()
+        if key not in self.pieces:
+            if len(self.pieces) * 3 * on.size * 8 > ROOM:
+                self.pieces.pop(next(iter(self.pieces)))
+            self.pieces[key] = self._made(on)
+        return self.pieces[key]
+
+    def _made(self, on) -> Piece:
+        index = np.flatnonzero(on)
+        right = np.stack([self.opening, -np.ones(self.x.size), self.x], axis=1)
+        force = np.zeros_like(right)
+        if index.size:
+            low = cho_factor(self.c[np.ix_(index, index)], lower=True)
+            for _ in range(2):
+                force[index] -= cho_solve(low, (right + self.c @ force)[index])
+        rows = np.where(on[:, None], force, right + self.c @ force).T
+        square = -(force.T @ right)
+        square = (square + square.T) / 2
+        energy = np.array([square[0, 0] / 2 - self.energy, square[0, 1] - self.load, square[0, 2] + self.moment,
+                           square[1, 1], square[1, 2], square[2, 2]])
+        return Piece(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
+
+    def at(self, d: float, t: float, start: Piece | None = None) -> Piece:
+        """The piece that holds at (d, t) [m, rad], searched from `start`; NotConverged where none was found."""
+        piece = self.reference if start is None else start
+        for count in range(BLOCKS + 10 * self.x.size):
+            value = piece.values(d, t)
+            terms = np.abs(piece.rows[0]) + np.abs(d * piece.rows[1]) + np.abs(t * piece.rows[2])
+            least = np.where(piece.on, NOISE * terms[piece.on].max(initial=0.0),
+                             NOISE * (self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()))
+            fails = value < -least
+            if not fails.any():
+                return piece
+            if count >= BLOCKS:
+                fails &= np.cumsum(fails) == 1
+            piece = self.piece(piece.on != fails)
+        force, _, _ = solve_forces(self.c, self.x, self.opening - d + t * self.x, np.zeros(0))
+        piece = self.piece(force > 0)
+        if self.flaw(piece, d, t) > 1e-12:
+            raise NotConverged("contact: no contact set fits the motion; raise the load or check the mesh")
+        return piece
+
+    def flaw(self, piece: Piece, d: float, t: float) -> float:
+        """Largest violation of contact at (d, t), from the definition: gaps in the size of the openings, pulls in the
+        load."""
+        force = np.where(piece.on, piece.values(d, t), 0.0)
+        opening = self.opening - d + t * self.x + self.c @ force
+        size = self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()
+        pulls = max(-force.min(initial=0.0), 0.0) / max(np.abs(force).sum(), 1e-300)
+        return float(max(np.abs(opening[piece.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
+
+    def resultant(self, d: float, t: float, start: Piece | None = None) -> tuple:
+        """(N [N], M [N m], energy of the preloaded contact [J]) at (d, t)."""
+        q = self.at(d, t, start).energy
+        by_d, by_t = q[3] * d + q[4] * t, q[4] * d + q[5] * t
+        return (float(self.load + q[1] + by_d), float(self.moment - q[2] - by_t),
+                float(q[0] + d * (q[1] + by_d / 2) + t * (q[2] + by_t / 2)))
+
+    def arrays(self, room: float = ROOM) -> dict:
+        """Arrays of `press_kernels.Book` with nothing but the set of the reference state in `wanted`."""
+        m = self.x.size
+        count = int(max(16, min(room / (25 * m + 400), 100_000)))
+        names = np.random.default_rng(5).integers(-2**63, 2**63, m, dtype=np.int64)
+        return {"c": self.c.copy(), "x": self.x.copy(), "b": self.opening.copy(), "tableau": np.zeros((m, m + 3)),
+                "here": np.zeros(m, bool), "rows": np.zeros((count, 3, m)), "on": np.zeros((count, m), bool),
+                "energy": np.zeros((count, 6)), "names": np.zeros(count, np.int64),
+                "heads": np.full(1 << int(count).bit_length(), -1, np.int64), "link": np.zeros(count, np.int64),
+                "node": names, "wanted": self.reference.on.copy(),
+                "base": np.array([self.load, self.moment, self.energy, self.size, self.reference.energy[3]]),
+                "side": np.zeros((2, 3, m)), "row": np.zeros(m + 3),
+                "meta": np.zeros(5, np.int64), **sides(count)}
+
+    def name(self, arrays: dict) -> int:
+        """Name of the reference set in these arrays."""
+        return int(np.bitwise_xor.reduce(arrays["node"][self.reference.on], initial=0))
+
+
+def sides(count: int) -> dict:
+    """Arrays of the polygons of `count` pieces."""
+    return {"sides": np.zeros(count, np.int64), "edge": np.zeros((count, SIDES), np.int64),
+            "beside": np.zeros((count, SIDES), np.int64), "limit": np.zeros((count, 2)),
+            "corner": np.zeros((2, 3, 4 * SIDES))}

@@ -1,0 +1,117 @@
+"""Compiled polygons of the contact sets: a piece holds where none of its few sides is passed.
+
+Every node of a set bounds by a line the motions (d, t) at which the set holds; few of these lines are sides of the
+polygon that they leave. `book` is a `press_kernels.Book`.
+"""
+
+import numpy as np
+from numba import njit
+from numba.core.options import DefaultOptions
+
+LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+NOISE = 1e-13  # of the largest term: what counts as nothing
+SIDES, BOX = 16, 100.0  # most sides of a polygon; half its largest width, in the closing of the reference state
+
+
+@njit(error_model="numpy", **LEAN)
+def units(book):
+    """Sizes of a closing [m] and of a turn [rad] that matter."""
+    arm = max(abs(book.x[0]), abs(book.x[-1]))
+    return book.base[3], book.base[3] / arm if arm > 0 else 1.0
+
+
+@njit(error_model="numpy", **LEAN)
+def outline(book, slot):
+    """The sides of a piece: a box, cut by the line of every node at which it fails (Sutherland, Hodgman 1974); first
+    of the nodes at the ends of the contact, which leave little to the others."""
+    unit_d, unit_t = units(book)
+    r0, r1, r2, on = book.rows[slot, 0], book.rows[slot, 1], book.rows[slot, 2], book.on[slot]
+    top = 0.0
+    for i in range(on.size):
+        if on[i]:
+            top = max(top, abs(r0[i]) + abs(r1[i]) * unit_d + abs(r2[i]) * unit_t)
+    book.limit[slot, 0], book.limit[slot, 1] = -4 * NOISE * top, -4 * NOISE * unit_d
+    old, new = book.corner[0], book.corner[1]
+    count = 4
+    for k in range(4):  # corner k: place, and the node whose line leads on to the next corner
+        old[0, k], old[1, k], old[2, k] = BOX * (-1 if k in (0, 3) else 1), BOX * (-1 if k < 2 else 1), -1.0
+    book.sides[slot] = 0
+    for turn in range(2 * on.size):
+        i = turn % on.size
+        edge = i == 0 or i == on.size - 1 or on[i] != on[i - 1] or on[i] != on[i + 1]
+        if edge != (turn < on.size):
+            continue
+        c0 = r0[i] - (book.limit[slot, 0] if on[i] else book.limit[slot, 1])
+        c1, c2 = r1[i] * unit_d, r2[i] * unit_t
+        least = np.inf
+        for k in range(count):
+            least = min(least, c0 + c1 * old[0, k] + c2 * old[1, k])
+        if least >= 0:
+            continue
+        many = 0
+        for k in range(count):
+            follower = k + 1 if k + 1 < count else 0
+            a = c0 + c1 * old[0, k] + c2 * old[1, k]
+            b = c0 + c1 * old[0, follower] + c2 * old[1, follower]
+            if many + 2 > new.shape[1]:
+                return
+            if a >= 0:
+                new[0, many], new[1, many], new[2, many] = old[0, k], old[1, k], old[2, k]
+                many += 1
+            if (a >= 0) != (b >= 0):
+                part = a / (a - b)
+                new[0, many] = old[0, k] + part * (old[0, follower] - old[0, k])
+                new[1, many] = old[1, k] + part * (old[1, follower] - old[1, k])
+                new[2, many] = i if a >= 0 else old[2, k]
+                many += 1
+        old, new, count = new, old, many
+        if count == 0:
+            return
+    sides = 0
+    for k in range(count):
+        if old[2, k] >= 0:
+            if sides == SIDES:
+                return
+            book.edge[slot, sides], book.beside[slot, sides] = int(old[2, k]), -1
+            sides += 1
+    book.sides[slot] = sides
+
+
+@njit(error_model="numpy", **LEAN)
+def boxed(book, d, t):
+    """Whether a place lies in the box of the polygons."""
+    unit_d, unit_t = units(book)
+    return abs(d) <= BOX * unit_d and abs(t) <= BOX * unit_t
+
+
+@njit(error_model="numpy", **LEAN)
+def margin(book, k, side, d, t):
+    """What the node of a side of piece k has left at (d, t) before it fails."""
+    i = book.edge[k, side]
+    least = book.limit[k, 0] if book.on[k, i] else book.limit[k, 1]
+    return book.rows[k, 0, i] + book.rows[k, 1, i] * d + book.rows[k, 2, i] * t - least
+
+
+@njit(error_model="numpy", **LEAN)
+def within(book, k, d, t):
+    """Whether the sides of piece k say that it holds at (d, t); False also where there are none to ask."""
+    if book.sides[k] == 0 or not boxed(book, d, t):
+        return False
+    for side in range(book.sides[k]):
+        if margin(book, k, side, d, t) < 0:
+            return False
+    return True
+
+
+@njit(error_model="numpy", **LEAN)
+def way_out(book, k, d, t, dd, dt):
+    """(share of the increment (dd, dt) at which piece k ends, side there), side -1 where its sides cannot say."""
+    out, found = np.inf, -1
+    if book.sides[k] == 0 or not (boxed(book, d, t) and boxed(book, d + dd, t + dt)):
+        return out, found
+    for side in range(book.sides[k]):
+        here = margin(book, k, side, d, t)
+        rate = margin(book, k, side, d + dd, t + dt) - here
+        if rate < 0 and max(here, 0.0) < -rate * out:
+            out, found = max(here, 0.0) / -rate, side
+    return out, found

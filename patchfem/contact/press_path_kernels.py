@@ -1,0 +1,80 @@
+"""Compiled path mean of the normal contact's forces, from piece to piece along a straight increment."""
+
+import numpy as np
+from numba import njit
+
+from .polygon_kernels import LEAN, way_out, within
+from .press_kernels import LEAST, holds, locate, pull
+
+
+@njit(error_model="numpy", fastmath=LEAST, **LEAN)
+def reach(book, k, d, t, dd, dt, force, gap):
+    """Share of the increment (dd, dt) from (d, t) at which the first node of piece k falls to its bound."""
+    r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
+    out = np.inf
+    for i in range(on.size):
+        rate = r1[i] * dd + r2[i] * dt
+        here = r0[i] + r1[i] * d + r2[i] * t - (force if on[i] else gap)
+        if rate < 0:
+            out = min(out, max(here, 0.0) / -rate)
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def across(book, k, side, d, t):
+    """Slot of the piece beyond a side of piece k (-1: of any) that holds at (d, t), -1 where none was found."""
+    if side >= 0:
+        following = book.beside[k, side]
+        name = book.names[k] ^ book.node[book.edge[k, side]]
+        if following >= 0 and book.names[following] == name and within(book, following, d, t):
+            return following
+        following = locate(book, k, d, t)
+        if following >= 0 and book.names[following] == name and following != k:
+            book.beside[k, side] = following
+        return following
+    return locate(book, k, d, t)
+
+
+@njit(error_model="numpy", **LEAN)
+def path_mean(book, k, h, turn, dh, dt, out):
+    """Mean slopes of the energy of the preloaded contact along a straight increment of heave and turn from piece k on,
+    piece by piece. Returns the slot at the end, -1 where none was found.
+
+    out (9,): mean slopes (2,), energy and slopes (2,) at the end, derivatives of the mean by (dh, dt) (2, 2). The mean
+    times the increment is the difference of the energies, and it is itself the gradient of a convex function.
+    """
+    out[:] = 0.0
+    at, small = 0.0, 1e-10
+    for _ in range(20 * book.x.size + 100):
+        end, side = 1.0, -1
+        if not within(book, k, -(h + dh), turn + dt):
+            d, t = -(h + at * dh), turn + at * dt
+            share, side = way_out(book, k, d, t, -(1 - at) * dh, (1 - at) * dt)
+            end = min(at + max(share, 0.0) * (1 - at), 1.0)
+            if side < 0:
+                good, force, gap = holds(book, k, -(h + dh), turn + dt)
+                if not good:
+                    _, f, g = holds(book, k, d, t)
+                    share = reach(book, k, d, t, -dh, dt, min(force, f), min(gap, g))
+                    end = min(at + max(share, 0.0), 1.0)
+        _, a1, a2 = pull(book, k, h + at * dh, turn + at * dt)
+        energy, b1, b2 = pull(book, k, h + end * dh, turn + end * dt)
+        q, part, bend = book.energy[k], 0.5 * (end - at), 0.5 * (end * end - at * at)
+        out[0] += part * (a1 + b1)
+        out[1] += part * (a2 + b2)
+        out[5] += bend * q[3]
+        out[6] -= bend * q[4]
+        out[8] += bend * q[5]
+        at = end
+        if at >= 1.0:
+            out[2], out[3], out[4], out[7] = energy, b1, b2, out[6]
+            return k
+        beyond = min(at + small, 1.0)
+        following = across(book, k, side, -(h + beyond * dh), turn + beyond * dt)
+        if following < 0:
+            return following
+        small = 10 * small if following == k else 1e-10
+        if following == k:
+            at = beyond
+        k = following
+    return -1

@@ -1,0 +1,280 @@
+"""Modes under normal force, moment and friction: closed forms, energy, independent computations."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from patchfem import simulate_wrench as wrench
+from patchfem.compiled import load
+from patchfem.contact.atlas import Atlas
+from patchfem.contact.unilateral import solve_forces
+from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
+from patchfem.friction.law import Bonds
+from patchfem.friction.local import ElasticPlastic
+from patchfem.friction.recursion import Recursion, pressed
+from patchfem.response.measures import energy_balance
+
+MASS, LOAD, STILL = 0.884, 116.0, BaseSine(0.0, 2 * np.pi * 143)
+LAWS = {"coulomb": wrench.coulomb(0.3), "weaker": wrench.coulomb(0.3, 0.2), "tanh": wrench.rate(0.3, 1e-3),
+        "plastic": wrench.plastic(0.3, 1e-6), "bonds": wrench.bonds(Bonds(0.3, 1e-6)),
+        "growing": wrench.bonds(Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5))}
+
+
+def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
+    size = len(frequencies)
+    numbers = (np.array(v, float) for v in (slide, slide if base is None else base, slide))
+    return ModalBasis(tuple("abcd"[:size]), 2 * np.pi * np.array(frequencies, float), np.full(size, zeta), *numbers,
+                      MASS, normal=np.array(normal, float), pitch=np.array(pitch, float))
+
+
+def elastic(m: int = 21, crown: float = 0.0) -> Atlas:
+    """Springs of 5e7 N/m coupled like those of a half space, pressed by LOAD, flat or crowned."""
+    x = np.linspace(-5e-3, 5e-3, m)
+    c = 2e-8 * (np.exp(-np.abs(x[:, None] - x) / 2e-3) * 0.3 + np.eye(m))
+    gap = crown * (x / x[-1])**2
+    delta = brentq(lambda d: solve_forces(c, x, gap - d, np.zeros(0))[0].sum() - LOAD, 1e-9, 1e-5, xtol=1e-18)
+    force = solve_forces(c, x, gap - delta, np.zeros(0))[0]
+    return Atlas(c, x, gap - delta, force > 0)
+
+
+@cache
+def crowned() -> Atlas:
+    return elastic(21, 4e-7)
+
+
+def mechanical(response, basis) -> np.ndarray:
+    motion = 0.5 * basis.mass * (response.modal_rate**2 + (basis.omega * response.modal)**2).sum(axis=1)
+    return motion + response.extra["normal_energy"] + response.extra["ledger"][1]
+
+
+def balance(done, basis) -> float:
+    book = done.ledger
+    assert book["stored"] == pytest.approx(mechanical(done.response, basis)[-1], rel=1e-9, abs=1e-18)
+    return energy_balance(book)
+
+
+@pytest.mark.parametrize("row", [0, 1])
+def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
+    """z = A cos(sqrt(omega^2 + K r^2/m) t) on the flat full contact, K = K_n or K_rot; the error falls as dt^2."""
+    atlas, part = elastic(), [1.0, 300.0][row]
+    basis = modes([200.0], [0.0], [part * (row == 0)], [part * (row == 1)], base=[0.0])
+    stiff = np.linalg.inv(atlas.c)
+    k = stiff.sum() if row == 0 else atlas.x @ stiff @ atlas.x
+    omega = np.sqrt((400 * np.pi)**2 + k * part**2 / MASS)
+    assert wrench.contact_frequencies(basis, atlas) == pytest.approx([omega], rel=1e-12)
+    size = 1e-8 / part if row == 0 else 1e-8 / (part * atlas.x[-1])
+    errors = []
+    for steps in (200, 400, 800):
+        done = wrench.march(basis, BaseSine(0.0, 2000 * np.pi), atlas, LAWS["coulomb"], 1, steps, 1,
+                            start=Start([size], [0.0]))
+        response = done.response
+        errors.append(np.abs(response.modal[:, 0] - size * np.cos(omega * response.time)).max() / size)
+        force = LOAD - k * part * response.modal[:, 0] if row == 0 else -k * part * response.modal[:, 0]
+        assert response.extra[("normal_load", "normal_moment")[row]] == pytest.approx(force, rel=1e-9, abs=1e-12)
+        assert done.outcome is None and done.ledger["contact_sets"] == 1
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] <= 2e-2 and rates == pytest.approx([2, 2], abs=0.1)
+
+
+def test_exact_energy_stays_while_the_block_bounces():
+    """5000 steps of heave and pitch that leave the contact and land again: constant to 1e-12."""
+    basis = modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
+    done = wrench.march(basis, STILL, crowned(), LAWS["coulomb"], 10, 500, 10,
+                        start=Start([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]))
+    total, force = mechanical(done.response, basis), done.response.extra["normal_load"]
+    assert np.ptp(total) <= 1e-12 * total[0] and done.outcome is None
+    assert (force == 0).sum() > 500 and force.max() > 2 * LOAD
+    assert np.count_nonzero(np.diff((force > 0).astype(int)) == 1) > 20 and done.ledger["contact_sets"] > 15
+
+
+def test_exact_nodal_forces_are_those_of_the_unilateral_solve():
+    """At every frame of a ramp of tilt: the forces of a fresh solve at the approach and rotation of the moment."""
+    atlas, slow = crowned(), BaseSine(200.0, 2 * np.pi * 2)
+    basis = modes([40.0], [1.0], [0.0], [400.0], 0.5)
+    done = wrench.march(basis, slow, atlas, LAWS["plastic"], 1, 200, 1, frames=40)
+    sets = set()
+    for shot in done.snapshots:
+        gap = atlas.opening + shot["heave"] + shot["turn"] * atlas.x
+        want = solve_forces(atlas.c, atlas.x, gap, np.zeros(0))[0]
+        assert np.abs(shot["nodal"] - want).max() <= 1e-12 * LOAD
+        sets.add((want > 0).tobytes())
+    assert len(done.snapshots) == 40 and len(sets) >= 4 and done.outcome is None
+
+
+def brute_block(basis, drive, stiff, mu, start, cycles, steps):
+    """Slide of a Coulomb block under N = LOAD - stiff h(t), h in closed form: small steps by a formula of their own,
+    semi-implicit in the speed, friction as a projection."""
+    dt = drive.period / steps
+    t = (np.arange(cycles * steps) + 0.5) * dt
+    load = np.maximum(LOAD - stiff * start * np.cos(np.sqrt(basis.omega[1]**2 + stiff / MASS) * t), 0)
+    force = -drive.acceleration * np.sin(drive.omega * t)
+    limit, w2, d = mu * load / MASS * dt, basis.omega[0]**2, 2 * basis.zeta[0] * basis.omega[0]
+    q, v, out = 0.0, 0.0, np.empty(cycles * steps)
+    for i in range(t.size):
+        free = v + dt * (force[i] - w2 * (q + 0.5 * dt * v) - d * v)
+        v = max(free - limit[i], 0.0) + min(free + limit[i], 0.0)
+        q += dt * v
+        out[i] = q
+    return out
+
+
+def test_exact_coulomb_block_under_a_swinging_load():
+    """A block that sticks and slips while its heave swings the load to zero, against small steps of another scheme."""
+    atlas = elastic()
+    stiff = float(np.linalg.inv(atlas.c).sum())
+    basis = modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
+    basis = ModalBasis(basis.names, basis.omega, np.array([0.02, 0.0]), basis.slide, basis.base, basis.output, MASS,
+                       normal=basis.normal, pitch=basis.pitch)
+    drive, start = BaseSine(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
+    want = brute_block(basis, drive, stiff, 0.3, start, 2, 100_000)
+    done = wrench.march(basis, drive, atlas, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0]))
+    size = np.abs(want).max()
+    at = np.round(done.response.time * 100_000 / drive.period).astype(int)[1:] - 1
+    assert np.abs(done.response.slide[1:] - want[at]).max() <= 1e-3 * size
+    load = done.response.extra["normal_load"]
+    assert load.min() < 0.2 * LOAD and load.max() > 1.8 * LOAD
+    assert 0.02 < np.mean(np.diff(done.response.slide) == 0) < 0.9
+
+
+@pytest.mark.parametrize("name", ["tanh", "plastic"])
+def test_order_two_where_modes_carry_both(name):
+    """Slide, heave and pitch in every mode, sets that change: the error falls by four when the step is halved."""
+    basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
+    drive, ends = BaseSine(40.0, 2 * np.pi * 143), []
+    for steps in (1600, 3200, 6400, 12800):
+        done = wrench.march(basis, drive, crowned(), LAWS[name], 1, steps, 1)
+        ends.append(np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega]))
+        assert done.outcome is None
+    change = np.abs(np.diff(ends, axis=0)).max(axis=1)
+    assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()
+    assert np.log2(change[0] / change[2]) / 2 == pytest.approx(2, abs=0.35)
+
+
+def test_exact_no_friction_without_load():
+    """Lift-off and return: nothing holds the slide in flight, the bonds are gone, and the load comes back."""
+    basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
+    for name in ("coulomb", "plastic", "bonds"):
+        done = wrench.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), LAWS[name], 6, 400, 6,
+                            start=Start([0, 5e-7], [0, 0.0]))
+        r = done.response
+        apart = r.extra["normal_load"] == 0
+        assert 0.02 < apart.mean() < 0.95 and not r.force[apart].any() and not r.extra["ledger"][1][apart].any()
+        assert np.abs(r.force).max() > 0.1 * 0.3 * LOAD and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+
+
+@settings(max_examples=25)
+@given(st.sampled_from(sorted(LAWS)), st.integers(0, 10**6), st.sampled_from([60, 200]))
+def test_always_nothing_creates_energy(name, seed, steps):
+    """Random modes that carry all three, random starts and drives, coarse steps, bouncing: the balance closes, friction
+    and the changing load only lose, and no force exceeds mu N."""
+    rng = np.random.default_rng(seed)
+    n = rng.integers(1, 5)
+    basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
+                  rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)
+    drive = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
+    done = wrench.march(basis, drive, crowned(), LAWS[name], 3, steps, 3,
+                        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)))
+    r = done.response
+    assert done.outcome is None, done.message
+    assert balance(done, basis) <= 1e-11
+    _, held, spent, created = r.extra["ledger"]
+    assert created[-1] == 0 and (np.diff(spent) >= -1e-14 * done.ledger["peak_stored"]).all()
+    held, spent = held[-1], spent[-1]
+    assert done.ledger["friction"] == pytest.approx(spent, abs=1e-9 * (spent + held) + 1e-18)
+    assert (np.abs(r.force) <= 0.3 * r.extra["normal_load"] + 1e-9 * LOAD).all()
+
+
+def test_exact_twins_of_the_points():
+    """Compiled points under a changing load against the laws of a bench."""
+    kernels, rng = load("simulate_rub_kernels"), np.random.default_rng(3)
+    law, other = Bonds(0.3, 1e-6, initial=0.4), ElasticPlastic(0.3, 1e-6)
+    bonds, springs = Recursion(law), other.start(np.array([2.0]))
+    state = bonds.start(np.array([2.0]))
+    one = np.array([0.8, 0.0, 0.0])
+    two, at = (0.0, 2.0), 2.0
+    for _ in range(200):
+        after = max(rng.normal() + 1.5, 0.0)
+        dq = rng.normal() * 1e-6
+        one = np.array(kernels.press_point(*one, at, after, 0.4, 1e-6))
+        assert one == pytest.approx(pressed(law, state.bonds, np.array([at]), np.array([after]))[:, 0], rel=1e-13)
+        state = bonds.press(state, np.array([at]), np.array([after])).state
+        two = kernels.press_springs(*two, after)
+        springs = other.press(springs, np.array([at]), np.array([after])).state
+        assert two == pytest.approx(springs[:, 0], rel=1e-13)
+        if after > 0:
+            mean = kernels.spring_mean(*two, after, dq, 1e-6)
+            near = kernels.spring_mean(*two, after, dq * (1 + 1e-6), 1e-6)
+            moved = other.step(springs, dq, np.array([after]), np.array([after]), 0.0)
+            assert 0.3 * mean[0] == pytest.approx(moved.mean[0], rel=1e-12, abs=1e-15)
+            assert mean[1] == pytest.approx((near[0] - mean[0]) / (dq * 1e-6), rel=1e-3, abs=1e-3)
+            two = kernels.spring_step(*two, after, dq, 1e-6)
+            springs = moved.state
+            assert two == pytest.approx(springs[:, 0], rel=1e-12)
+            moved = bonds.step(state, dq, np.array([after]), np.array([after]), 0.0)
+            state = moved.state
+            one = state.bonds[:, 0]
+        at = after
+
+
+def test_exact_a_prescribed_load_is_a_bench_load_in_a_rig():
+    """One mode under N(t) = max(0, 100 + 150 cos) N against a plain step solve with the law of a bench."""
+    basis = modes([143.0], [1.0], [0.0], [0.0], 0.01)
+    drive, steps = BaseSine(60.0, 2 * np.pi * 143), 200
+
+    def weight(t):
+        return np.maximum(100 + 150 * np.cos(2 * np.pi * 90 * t + 0.3), 0.0)
+
+    done = wrench.march(basis, drive, None, LAWS["bonds"], 4, steps, 4, load=weight)
+    from patchfem.dynamics.propagator import propagator
+
+    p, law = propagator(basis, drive, steps), Recursion(Bonds(0.3, 1e-6))
+    times, table, beta = np.arange(4 * steps + 1) * p.dt, p.tables(drive, 0, steps), p.beta[0, 0]
+    loads, z, v = weight(times), 0.0, 0.0
+    state, slides, forces = law.start(loads[:1]), [0.0], [0.0]
+    for i in range(4 * steps):
+        middle = (loads[i:i + 1] + loads[i + 1:i + 2]) / 2
+        ready = law.press(state, loads[i:i + 1], middle).state
+        row = table[i % steps]
+        rest = p.free[0, 0] * z + p.free[1, 0] * v + row[0], p.free[2, 0] * z + p.free[3, 0] * v + row[1]
+        free = rest[0] - z
+
+        def miss(dq, ready=ready, middle=middle, free=free):
+            return dq - free + beta * law.step(ready, dq, middle, middle, p.dt).mean[0]
+
+        dq = brentq(miss, free - 2e2 * beta, free + 2e2 * beta, xtol=1e-25, rtol=1e-15)
+        moved = law.step(ready, dq, middle, middle, p.dt)
+        state = law.press(moved.state, middle, loads[i + 1:i + 2]).state
+        accel = -(free - dq) / beta / MASS
+        z, v = rest[0] + p.push[0, 0] * accel, rest[1] + p.push[1, 0] * accel
+        slides.append(z)
+        forces.append(law.traction(state)[0])
+    assert done.response.slide == pytest.approx(np.array(slides), abs=1e-11 * np.abs(slides).max())
+    assert done.response.force == pytest.approx(np.array(forces), abs=1e-7)
+    assert done.response.extra["normal_load"] == pytest.approx(loads, rel=1e-14) and (loads == 0).any()
+    assert balance(done, basis) <= 1e-12
+
+
+def test_exact_strips_slide_by_yaw():
+    """A piece that turns by +yaw about z moves a point at +y back by y yaw, and mu sum f y is its moment."""
+    basis = modes([100.0], [1.0], [0.0], [0.0])
+    turning = ModalBasis(basis.names, basis.omega, basis.zeta, basis.slide, basis.base, basis.output, MASS,
+                         yaw=np.array([2.0]))
+    offsets = np.array([-1e-3, 0.0, 1e-3])
+    rows = wrench.strip_rows(turning, offsets)
+    assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
+    friction = np.array([1.0, 2.0, 5.0])  # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
+    assert -(rows[:, 0] - 1) @ friction == pytest.approx(2.0 * (offsets @ friction))
+
+
+def test_refuses_heave_on_one_rigid_point():
+    with pytest.raises(PatchfemError, match=r"\[contact\] in place of \[normal\]"):
+        wrench.march(modes([100.0], [1.0], [1.0], [0.0]), STILL, None, LAWS["coulomb"], 1, 100, load=np.ones_like)
+
+
+def test_refuses_laws_that_do_not_know_a_changing_load():
+    with pytest.raises(PatchfemError, match="not yet built"):
+        wrench.bonds(Bonds(0.3, 1e-6, 0.0))

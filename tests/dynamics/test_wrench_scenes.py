@@ -1,0 +1,78 @@
+"""Scenes whose contact acts on the modes with its whole wrench, and rigs under a load that swings."""
+
+import numpy as np
+import pytest
+from scene_texts import BENCH, RIG, STRUCTURE, only
+
+from patchfem.contact.unilateral import solve_forces
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_files import _histories
+from patchfem.simulate_wrench import atlas_of
+
+PITCH = RIG.replace("slide = 0.1", "slide = 0.1\npitch = \"40 rad/m\"").replace("cycles = 200", "cycles = 12")
+FEW = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200"]
+POINT = STRUCTURE + BENCH.split("[slide]")[0]
+SWING = ["normal.amplitude=60 N", "normal.frequency=50 Hz"]
+
+
+def result_of(text, *sets, estimate=False):
+    return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
+
+
+@pytest.mark.parametrize("law", ['"nonlocal"\nbond_length = "1 um"', '"coulomb"',
+                                 '"elastic-plastic"\nbond_length = "1 um"',
+                                 '"tanh"\nreference_speed = "1 mm/s"'])
+def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
+    """Balance <= 1e-10; every frame is the unilateral solution at its gap: forces and gaps exclude each other."""
+    text = PITCH.replace('"nonlocal"', law).replace('static = 0.30\nbond_length = "1 um"', "static = 0.30")
+    found = result_of(text, *FEW)
+    assert found.measures["energy_balance"].value <= 1e-10 and found.measures["energy_created"].value == 0
+    fields, patch = found.fields, found.patch
+    load = found.response.extra["normal_load"]
+    sums = fields["normal_stress"] @ patch.pieces.interface.weight
+    assert sums[0] == pytest.approx(patch.pressure.load) and np.ptp(sums) > 0
+    assert load.min() - 1e-9 <= sums.min() and sums.max() <= load.max() + 1e-9
+    assert (fields["gap"] >= 0).all() and not (fields["gap"] * fields["normal_stress"]).any()
+    assert (np.abs(fields["shear_stress"]) <= 0.3 * fields["normal_stress"] + 1e-6).all()
+    histories, _ = _histories(found)
+    assert histories["normal_load"] is load and np.ptp(load) > 1e-3 * load[0]
+
+
+def test_exact_no_pitch_is_the_plain_rig():
+    """A pitch that the drive cannot reach: the motion is that of the scene without it."""
+    quiet = PITCH.replace("slide = 0.1\n", "slide = 0.0\nbase = 0.0\n")
+    quiet = quiet.replace("slide = 0.8", "slide = 0.8\nbase = 0.9")
+    moved, plain = (result_of(text, *FEW) for text in (quiet, quiet.replace('pitch = "40 rad/m"\n', "")))
+    assert moved.response.slide == pytest.approx(plain.response.slide, abs=1e-9 * np.abs(plain.response.slide).max())
+    assert moved.response.extra["normal_load"] == pytest.approx(115.65, abs=0.01)
+
+
+def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
+    """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
+    sets = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
+    patch = result_of(PITCH, *FEW, *sets, "drive.cycles=1").patch
+    atlas, x, turn, spring = atlas_of(patch, 2e4), patch.x, 2e-6, 2e4
+    piece = atlas.at(0.0, turn)
+    force = piece.forces(0.0, turn)
+    own = turn + (force @ x - patch.pressure.moment) / spring
+    before = patch.pressure.sigma_n * patch.pieces.interface.weight
+    gap = patch.pressure.gap - patch.pieces.normal @ before + own * x
+    want = solve_forces(patch.pieces.normal, x, gap, np.zeros(0))[0]
+    assert np.abs(force - want).max() <= 1e-11 * patch.pressure.load and own < 0.9 * turn
+
+
+def test_exact_a_rig_under_a_swinging_load():
+    """normal_load follows its formula, the balance closes, and friction keeps below mu N."""
+    found = result_of(POINT, *SWING, estimate=True)
+    time, load = found.response.time, found.response.extra["normal_load"]
+    assert load == pytest.approx(26 * 4.4482216152605 + 60 * np.cos(2 * np.pi * 50 * time), abs=1e-9)
+    assert found.measures["energy_balance"].value <= 1e-12
+    assert (np.abs(found.response.force) <= 0.3 * load + 1e-9).all()
+    assert all(m.error is not None for name, m in found.measures.items() if not name.endswith("steady"))
+
+
+def test_refuses_heave_and_pitch_beside_a_point():
+    message = only(POINT, "structure.mode.axial.normal=0.1")
+    assert message.startswith("--set: structure.mode.axial.normal: ") and "name [contact] in place of" in message
+    assert "no exact solution exists beside normal.amplitude" in only(POINT, *SWING, "accuracy.method=exact")
