@@ -76,6 +76,8 @@ EFFECTS = {
                                       "fixed point (3.10)"),
     "accuracy.method=newmark": Effect("patchfem.dynamics.newmark", "average acceleration, stuck below a speed"),
     "accuracy.method=euler": Effect("patchfem.dynamics.euler", "explicit Euler"),
+    "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic", "x = Re sum X_k exp(i k w t); Coulomb: the map of "
+                                       "events over a period"),
     "measured": Effect("", "overlay of measured rows"),
 }
 
@@ -83,7 +85,7 @@ EFFECTS = {
 EFFECTS |= {f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
             for name, effect in EFFECTS.items() if name.startswith(("friction.law=", "friction.reading="))}
 
-NOT_YET_BUILT = ("wear", "accuracy.method=harmonic")
+NOT_YET_BUILT = ("wear",)
 
 
 def absent(named) -> list:

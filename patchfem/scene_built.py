@@ -18,8 +18,6 @@ NOT_YET_BUILT: dict[str, str] = {
     "structure.mode.lateral": "",
     "structure.mode.yaw": "",
     "wear": "",
-    "accuracy.method=harmonic": "auto, exact or march",
-    "accuracy.harmonics": "",
 }
 
 

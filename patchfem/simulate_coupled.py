@@ -35,6 +35,13 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
             other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, None, rough)
             errors, seconds["error"] = [change(raw.values, other.values)], other.seconds
         found = with_errors(raw.values, *errors, least=1e-9)
+    elif settings.engine == "harmonic":
+        from .simulate_steady import curve_measures, steady
+
+        load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
+        raw, errors, more = steady(scene, settings, modes, drive, patch, load, say)
+        seconds["march"] = raw.seconds
+        found, extra = with_errors(raw.values, errors) | curve_measures(more), extra | more
     else:
         rig.refuse_costly(scene, settings, drive)
         raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
