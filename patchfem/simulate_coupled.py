@@ -44,6 +44,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         raw, errors, more = steady(scene, settings, modes, drive, patch, load, say)
         seconds["march"] = raw.seconds
         found, extra = with_errors(raw.values, errors) | curve_measures(more), extra | more
+        drive = extra.pop("at", drive)
     else:
         rig.refuse_costly(scene, settings, drive)
         raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
@@ -65,7 +66,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         fields = _rig_fields(scene, settings, patch, raw, drive)
-    extra["book"] = raw.book
+    extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *warming(scene, patch, raw.response, raw.book["friction"])]
     if scene.friction is not None and scene.friction.law == "tanh":
         warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "

@@ -211,9 +211,7 @@ def report_data(result: Result) -> dict:
         if not slow:
             data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
-            from .simulate_rig import drive_of
-
-            data["loop"] |= {"period": drive_of(scene).period}
+            data["loop"] |= {"period": result.extra["period"]}
     if scene.measured is not None:
         from .response.measured import read_table
 

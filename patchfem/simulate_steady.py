@@ -30,7 +30,7 @@ def refuse(scene, drive) -> None:
 
 def steady(scene, settings, modes, drive, patch, load: float, say=None):
     """(simulate_rig.Raw, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on
-    a curve over a sweep or over levels."""
+    a curve over a sweep or over levels, whose sine is extra["at"]."""
     refuse(scene, drive)
     from .simulate_rig import no_closed_form
 
@@ -43,9 +43,9 @@ def steady(scene, settings, modes, drive, patch, load: float, say=None):
         finder = _Balance(scene, settings, modes, drive, patch, say)
     if sine is not None:
         return finder.point(sine)
-    curve, best = finder.curve(drive)
-    raw, errors, extra = finder.point(best)
-    return raw, errors, extra | {"curve": curve}
+    curve, best, near = finder.curve(drive)
+    raw, errors, extra = finder.point(best, near)
+    return raw, errors, extra | {"curve": curve, "at": best}
 
 
 def drives_of(drive, count: int) -> list:
@@ -71,12 +71,12 @@ class _Events:
 
         return steady(self.modes, drive, *self.forces, start=start)
 
-    def point(self, drive) -> tuple:
-        """The steady motion as a run of the exact engine that begins in it."""
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion, found from the start `near`, as a run of the exact engine that begins in it."""
         from .simulate_exact import run_exact
 
         begin = perf_counter()
-        found = self.found(drive)
+        found = self.found(drive, near)
         few = replace(self.settings, cycles=2.0, window=1)
         raw = run_exact(self.scene, few, self.modes, drive, self.load, found.start)
         outcome = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}.get(found.regime, Outcome.STEADY)
@@ -85,13 +85,13 @@ class _Events:
         return raw, {name: abs(v) * (1e-9 + found.residual) for name, v in raw.values.items()}, extra
 
     def curve(self, drive) -> tuple:
-        """(curve as arrays by name, the sine of its largest amplitude)."""
+        """(curve as arrays by name, the sine of its largest amplitude, None: the motion there is the only one)."""
         drives = drives_of(drive, POINTS)
         rows = [self._row(one) for one in drives]
         names = ("frequency", "level", "amplitude", "regime", "multiplier")
         curve = {name: np.array(column) for name, column in zip(names, zip(*rows))}
         finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
-        return curve, drives[int(np.argmax(finite))]
+        return curve, drives[int(np.argmax(finite))], None
 
     def _row(self, drive) -> tuple:
         found = self.found(drive)
@@ -124,14 +124,16 @@ class _Balance:
         self.scene, self.settings, self.modes, self.patch = scene, settings, modes, patch
         self.group, self.tolerance = Group(modes, parts), scene.accuracy.tolerance
 
-    def point(self, drive) -> tuple:
-        """The steady motion, its measures read off one cycle; errors from half the harmonics and the balance's own."""
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle;
+        errors from half the harmonics and the balance's own."""
         from .simulate_harmonic import point, with_stability
         from .simulate_rig import Raw
 
         begin = perf_counter()
-        found = point(self.modes, drive, self.group, self.scene.accuracy.harmonics, self.tolerance)
-        fewer = point(self.modes, drive, self.group, max(1, found.harmonics // 2), self.tolerance)
+        found = point(self.modes, drive, self.group, self.scene.accuracy.harmonics, self.tolerance,
+                      start=near)
+        fewer = point(self.modes, drive, self.group, max(1, found.harmonics // 2), self.tolerance, start=near and found)
         stable = with_stability(found, self.modes)
         values, response, book = self._measured(found, drive)
         rough = self._measured(fewer, drive)[0]
@@ -177,7 +179,7 @@ class _Balance:
         return values | {"normal_load": bears}, response, book
 
     def curve(self, drive) -> tuple:
-        """(curve as arrays by name through its folds, the sine of its largest amplitude)."""
+        """(curve as arrays by name through its folds, the sine of its largest amplitude, the point there)."""
         from .simulate_harmonic import levels, response
 
         if hasattr(drive, "low"):
@@ -196,7 +198,7 @@ class _Balance:
                  "multiplier": np.array([np.abs(p.multipliers).max(initial=0.0) for p in branch.points]),
                  "folds": np.array(branch.folds)}
         best = branch.points[int(np.argmax(amplitude))]
-        return curve, BaseSine(best.level, best.omega, drive.moving)
+        return curve, BaseSine(best.level, best.omega, drive.moving), best
 
 
 def _cycle_book(found, modes, drive) -> dict:

@@ -10,7 +10,8 @@ import numpy as np
 
 LEAST_PERIODS = 1.5  # of the ring in a stick; below them frequency and decay cannot be told apart
 LEAST_SAMPLES = 16
-MOST_SAMPLES, MOST_STICKS, MOST_TERMS = 600, 40, 3
+MOST_SAMPLES, MOST_STICKS, MOST_TERMS = 600, 20, 3
+PER_PERIOD = 24  # samples of a ring that are enough
 FAINT = 1e-6  # of the largest value of the signal, below which nothing rings
 MISSED = 0.1  # share of the ring that a fit may leave over
 WIDEST = 0.5  # largest damping ratio of what is called a ring
@@ -37,10 +38,14 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     size = max(size or 0.0, float(np.abs(value).max(initial=0.0)))
     if time.size < LEAST_SAMPLES or size == 0:
         return None
-    span, columns = time[-1], _forced(time, omega)
-    rest = value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]
+    columns = _forced(time, omega)
+    rest = _apart(columns, value)[0]
     if np.abs(rest).max() <= FAINT * size:
         return None
+    if time.size > MOST_SAMPLES:  # of a long stick the first part: later less is left of the ring
+        stride = max(1, int(2 * np.pi / _highest(time, rest) / (time[1] - time[0]) / PER_PERIOD))
+        time, value, columns, rest = (part[::stride][:MOST_SAMPLES] for part in (time, value, columns, rest))
+    span = time[-1]
     found = _grown(time, value, columns, rest)
     if found is None:
         return None
@@ -92,9 +97,6 @@ def _even(time, value) -> tuple:
     if on.sum() < LEAST_SAMPLES:
         return np.empty(0), np.empty(0)
     time, value = time[on], value[on]
-    thin = -(-time.size // MOST_SAMPLES)
-    if thin > 1:  # the first part of a long stick: what rings has decayed later
-        time, value = time[:MOST_SAMPLES], value[:MOST_SAMPLES]
     return time - time[0], value
 
 
@@ -113,55 +115,87 @@ def _columns(time, forced, poles) -> np.ndarray:
     return np.concatenate(parts, axis=1)
 
 
+def _apart(columns, value) -> tuple:
+    """(what columns (k, c) leave of value (k,), orthonormal basis of the columns that count, their numbers (c,))."""
+    u, sizes, turned = np.linalg.svd(columns, full_matrices=False)
+    u = u[:, sizes > 1e-12 * sizes[0]]
+    inside = u.T @ value
+    return value - u @ inside, u, turned[:inside.size].T @ (inside / sizes[:inside.size])
+
+
 def _share(time, value, forced, poles) -> tuple:
     """(what is left over (k,), the sinusoids [(k,)])."""
-    columns = _columns(time, forced, poles)
-    numbers = np.linalg.lstsq(columns, value, rcond=1e-12)[0]
-    n = forced.shape[1]
-    shares = [columns[:, n + 2 * k:n + 2 * k + 2] @ numbers[n + 2 * k:n + 2 * k + 2] for k in range(len(poles) // 2)]
-    return value - columns @ numbers, shares
+    columns, n = _columns(time, forced, poles), forced.shape[1]
+    left, _, numbers = _apart(columns, value)
+    return left, [columns[:, n + 2 * k:n + 2 * k + 2] @ numbers[n + 2 * k:n + 2 * k + 2]
+                  for k in range(len(poles) // 2)]
 
 
 def _grown(time, value, forced, rest) -> tuple | None:
     """(poles (2 r,) frequency [rad/s] and decay [1/s] in turn, their standard errors), one sinusoid after the other
-    until little is left."""
-    poles, scale, best = np.empty(0), np.sqrt(np.mean(rest**2)), None
+    while each halves what is left."""
+    scale = last = np.sqrt(np.mean(rest**2))
+    best = None
     for _ in range(MOST_TERMS):
-        starts = _starts(time, value, forced, poles, rest)
-        tries = [_refined(time, value, forced, np.append(poles, start)) for start in starts]
-        best = min(tries, key=lambda one: one[2])
-        poles = best[0]
-        rest = _share(time, value, forced, poles)[0]
-        if best[2] < 1e-3 * scale or time.size < 8 * (len(poles) + 2):
+        poles = best[0] if best is not None else np.empty(0)
+        tries = [_refined(time, value, forced, np.append(poles, start))
+                 for start in _starts(time, value, forced, poles, rest)]
+        new = min(tries, key=lambda one: one[2])
+        if not np.isfinite(new[2]) or new[2] > last / 2:
+            break
+        best, last = new, new[2]
+        rest = _share(time, value, forced, best[0])[0]
+        if last < 1e-6 * scale or time.size < 8 * (len(best[0]) + 2):
             break
     return best[:2] if best is not None else None
 
 
+def _highest(time, rest) -> float:
+    """Frequency [rad/s] of the highest line of `rest` (k,)."""
+    window, size = np.hanning(time.size + 2)[1:-1], 4 * time.size
+    lines = np.abs(np.fft.rfft(rest * window, size))
+    lines[:2] = 0.0
+    return 2 * np.pi * int(np.argmax(lines)) / (size * (time[1] - time[0]))
+
+
 def _starts(time, value, forced, poles, rest) -> list:
     """Starting values: around the highest line of what is left, the best of them by projection, with two decays."""
-    step, span = time[1], time[-1]
-    window = np.hanning(time.size + 2)[1:-1]
-    lines = np.abs(np.fft.rfft(rest * window, 8 * time.size))
-    lines[:4] = 0.0
-    top = 2 * np.pi * np.fft.rfftfreq(8 * time.size, step)[int(np.argmax(lines))]
-    near = [own for own in top + np.linspace(-1.5, 1.5, 13) * 2 * np.pi / span if own > np.pi / span]
+    span, top = time[-1], _highest(time, rest)
+    near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
     sizes = [np.sum(_share(time, value, forced, np.append(poles, (own, 0.5 / span)))[0]**2) for own in near]
     own = near[int(np.argmin(sizes))] if near else top
     return [np.array([own, decay / span]) for decay in (0.1, 2.0)]
 
 
 def _refined(time, value, forced, poles) -> tuple:
-    """(poles, their standard errors, rms of what is left) by least squares of the projected residual."""
-    from scipy.optimize import least_squares
+    """(poles, their standard errors, rms of what is left) by Levenberg and Marquardt on the projected residual, with
+    the Jacobian of Kaufman (1975)."""
+    scale, damping = np.abs(poles) + 1 / time[-1], 1e-3
+    left, slopes = _slopes(time, value, forced, poles, scale)
+    for _ in range(60):
+        normal, pull, size = slopes.T @ slopes, slopes.T @ left, left @ left
+        step = -np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-300), pull, rcond=None)[0]
+        tried = poles + scale * step
+        new = _slopes(time, value, forced, tried, scale)
+        if new[0] @ new[0] <= size:
+            poles, (left, slopes), damping = tried, new, damping / 10
+            if np.abs(step).max() < 1e-13:
+                break
+        elif damping > 1e9 or np.abs(step).max() < 1e-15:
+            break
+        else:
+            damping *= 10
+    rms = float(np.sqrt(np.mean(left**2)))
+    return poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes.T @ slopes)), 0)) * rms * scale, rms
 
-    scale = np.abs(poles) + 1 / time[-1]
-    size = max(float(np.abs(value).max()), 1e-300)
 
-    def left(x):
-        return _share(time, value, forced, x * scale)[0] / size
-
-    found = least_squares(left, poles / scale, method="lm", max_nfev=60 * poles.size, xtol=1e-13, ftol=1e-13,
-                          gtol=1e-15)
-    rms = float(np.sqrt(np.mean(found.fun**2)))
-    covariance = np.linalg.pinv(found.jac.T @ found.jac) * rms**2
-    return found.x * scale, np.sqrt(np.maximum(np.diag(covariance), 0)) * scale, rms * size
+def _slopes(time, value, forced, poles, scale) -> tuple:
+    """(projected residual (k,), its derivative by poles/scale (k, 2 r))."""
+    columns, n = _columns(time, forced, poles), forced.shape[1]
+    left, basis, numbers = _apart(columns, value)
+    out = []
+    for k in range(len(poles) // 2):
+        part, (a, b) = columns[:, n + 2 * k:n + 2 * k + 2], numbers[n + 2 * k:n + 2 * k + 2]
+        out += [time * (b * part[:, 0] - a * part[:, 1]), -time * (a * part[:, 0] + b * part[:, 1])]
+    slopes = np.stack(out, axis=1) * scale
+    return left, basis @ (basis.T @ slopes) - slopes
