@@ -326,7 +326,9 @@ def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -
     weight = np.full(w.time.size, 1.0)
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
-    work = part.work * drive.period / span if span > 0 else 0.0
+    alone = "slides" not in w.extra or w.extra["slides"].shape[1] == 1
+    work = part.work if alone else float(part.step_force @ np.diff(w.slide))  # of the first interface, not of all
+    work *= drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
     if simulate_drive.whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,

@@ -1,0 +1,205 @@
+"""Rigs of masses with one and two interfaces through the command line: files, events, exact against march."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+
+from patchfem.response.events import MEANINGS
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+
+FIG16 = f"""\
+[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 2]
+stiffness = "1 N/m"
+[[structure.interface]]
+between = [2, 0]
+law = "coulomb"
+static = 0.3
+load = "10 N"
+[drive]
+kind = "force"
+mass = 1
+force = "1 N"
+frequency = "{1.14 / (2 * np.pi)!r} Hz"
+duration = "400 s"
+"""
+INTERFACE = """\
+[[structure.interface]]
+between = [{0}, {1}]
+law = "coulomb"
+static = 0.3
+load = "{2} N"
+"""
+SIDE_BY_SIDE = """\
+[structure]
+masses = ["0.884 kg", "0.884 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "713 N/mm"
+[[structure.spring]]
+between = [2, 0]
+stiffness = "713 N/mm"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "30 N s/m"
+[[structure.damper]]
+between = [2, 0]
+coefficient = "30 N s/m"
+""" + INTERFACE.format(1, 0, 115) + INTERFACE.format(2, 0, 115)
+DRIVE = """\
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "6 g"
+cycles = 60
+"""
+ONE = f"""\
+[normal]
+load = "115 N"
+[friction]
+law = "coulomb"
+static = 0.3
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "{float(np.sqrt(713e3 / 0.884)) / (2 * np.pi)!r} Hz"
+damping = {30 / (2 * float(np.sqrt(713e3 * 0.884)))!r}
+slide = 1.0
+"""
+CHAIN = """\
+[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "4 N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "0.3 N s/m"
+""" + INTERFACE.format(1, 0, 0.5) + INTERFACE.format(2, 1, 1.2) + """\
+[drive]
+kind = "base"
+acceleration = "1 m/s^2"
+frequency = "0.1 Hz"
+cycles = 60
+"""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """(scene text, *words) -> (summary, dataset) of a run through the command line, each once."""
+    base, kept = tmp_path_factory.mktemp("interfaces"), {}
+
+    def of(text, *words):
+        if (text, words) not in kept:
+            path = base / f"scene{len(kept)}.toml"
+            path.write_text(text, "utf-8")
+            answer = cli("run", path, "-o", base / path.stem, "--json", *words)
+            assert answer.code == 0, answer.err
+            with xr.open_dataset(base / path.stem / "result.nc") as data:
+                kept[text, words] = json.loads(answer.out), data.load()
+        return kept[text, words]
+    return of
+
+
+def test_exact_figure_16_of_the_report(written):
+    """Mass 2 stays where it is until 8.0797, and the force never passes 3 (numbers of a 40-digit computation)."""
+    summary, data = written(FIG16)
+    slide = data.relative_displacement.sel(interface="2-0")
+    late = data.time > 8.079711463905416 + 1e-9
+    assert np.abs(slide.values[~late.values]).max() < 1e-15 and np.abs(slide.values[late.values]).max() > 0.5
+    assert np.abs(data.friction_force).max() <= 3 * (1 + 1e-12)
+    stops = data.event_kind.values == MEANINGS.index("stop")
+    assert data.event_time.values[0] == pytest.approx(8.079711463905416, abs=1e-11)
+    assert data.event_time.values[stops][:3] == pytest.approx(
+        [10.00410372419476, 12.96534318337974, 15.73725378200728], abs=1e-11)
+    assert data.event_slide.values[stops][:3] == pytest.approx(
+        [0.8994115234033145, -0.5914209838254593, 0.8835834423211487], abs=1e-11)
+    assert float(slide[-1]) == pytest.approx(-0.37952939486, abs=1e-9) and float(data.time[-1]) == pytest.approx(400)
+    assert data.output_displacement.dims == ("time",) and summary["outcome"] in ("steady", "transient")
+
+
+def test_exact_figure_16_marched(written):
+    """The march agrees within its errors, and sees the events of its last cycles where the exact engine has them."""
+    exact, events = written(FIG16)
+    march, seen = written(FIG16, "--set", "accuracy.method=march", "--set", "accuracy.steps_per_cycle=2000")
+    for name in ("relative_displacement_amplitude", "slip_amplitude", "friction_force_peak", "loop_area"):
+        mine, theirs = exact["measures"][name], march["measures"][name]
+        assert abs(mine["value"] - theirs["value"]) <= theirs["error"] + mine["error"] + theirs["floor"], name
+    late = events.event_time.values > seen.event_time.values[0] - 0.1
+    assert "samples" in seen.event_time.source and "engine" in events.event_time.source
+    assert seen.event_kind.values[1:].tolist() == events.event_kind.values[late][1:].tolist()
+    # seen at 1e-2 of the peak speed, not at rest
+    assert seen.event_time.values[1:] == pytest.approx(events.event_time.values[late][1:], abs=0.1)
+
+
+@pytest.mark.parametrize("method", ["exact", "march"])
+def test_exact_two_alike_masses_side_by_side_are_one_twice(written, method):
+    words = ("--set", f"accuracy.method={method}", "--set", "accuracy.steps_per_cycle=400")
+    words = words[:2] if method == "exact" else words
+    pair, data = written(SIDE_BY_SIDE + DRIVE, *words)
+    one, alone = written(ONE + DRIVE, *words)
+    names = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")
+    for name in names:
+        mine, first, second = (of["measures"][key] for of, key in ((one, name), (pair, name), (pair, f"{name}_2")))
+        assert first["value"] == pytest.approx(mine["value"], rel=1e-8), name
+        near = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8  # of the second by its samples
+        assert second["value"] == pytest.approx(mine["value"], rel=near), name
+        assert second["unit"] == mine["unit"] and second["floor"] == mine["floor"]
+        assert second["error"] >= 0
+    assert data.interface.values.tolist() == ["1-0", "2-0"]
+    for name in ("relative_displacement", "relative_velocity", "friction_force", "normal_load"):
+        assert data[name].dims == ("interface", "time")
+        top = float(np.abs(data[name]).max())
+        assert np.abs(data[name][0] - data[name][1]).max() <= 1e-9 * top, name
+    for number in (1, 2):
+        mine = data.event_interface.values == number
+        assert data.event_kind.values[mine].tolist() == alone.event_kind.values.tolist()
+        assert data.event_time.values[mine] == pytest.approx(alone.event_time.values, abs=1e-10)
+
+
+def test_exact_two_interfaces_in_a_chain_marched(written):
+    """Each of another load, one of them between the masses: every measure within its error of the exact engine."""
+    exact, data = written(CHAIN)
+    march, _ = written(CHAIN, "--set", "accuracy.method=march")
+    assert data.interface.values.tolist() == ["1-0", "2-1"]
+    tested = [name for name in exact["measures"] if name.removesuffix("_2") in (
+        "relative_displacement_amplitude", "slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")]
+    assert len(tested) == 9
+    for name in tested:
+        mine, theirs = exact["measures"][name], march["measures"][name]
+        reversals = 0.03 * name.startswith("stick")  # a march counts what is slow as stuck
+        assert abs(mine["value"] - theirs["value"]) <= theirs["error"] + theirs["floor"] + reversals, name
+    slides = data.relative_displacement.values
+    assert slides[0] == pytest.approx(data.modal_coordinate.values[:, 0], abs=1e-12)
+    assert slides[1] == pytest.approx(np.diff(data.modal_coordinate.values, axis=1)[:, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["duhamel", "newmark", "euler"])
+def test_exact_comparison_methods_know_every_interface(method):
+    """At 4000 steps a cycle the slip of both interfaces is that of the exact engine to a few per cent."""
+    words = ["drive.cycles=20", f"accuracy.method={method}", "accuracy.steps_per_cycle=4000"]
+    words += ["accuracy.stick_speed=1e-5 m/s"] if method == "newmark" else []
+    mine = run(plan(loads(CHAIN, sets=words)), estimate=False)
+    exact = run(plan(loads(CHAIN, sets=["drive.cycles=20"])), estimate=False)
+    for name in ("slip_amplitude", "slip_amplitude_2", "loop_area_2"):
+        assert mine.measures[name].value == pytest.approx(exact.measures[name].value, rel=0.03), name
+
+
+def test_exact_only_the_second_interface_slips():
+    """The first one loaded a hundredfold holds: the run is not stuck, by either engine."""
+    text = CHAIN.replace('"0.5 N"', '"50 N"')
+    for words in ((), ("accuracy.method=march",)):
+        found = run(plan(loads(text, sets=["drive.cycles=20", *words])), estimate=False)
+        assert found.outcome != "stuck" and found.measures["slip_amplitude"].value < 1e-12
+        assert found.measures["slip_amplitude_2"].value > 0.01
+        assert found.measures["stick_fraction"].value == pytest.approx(1)
