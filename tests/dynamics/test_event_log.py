@@ -1,0 +1,109 @@
+"""Lists of events: of the fast engine against the general one, of levels against one run, the last ones kept."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.core import BaseSine, ModalBasis, Start
+from patchfem.dynamics import event_list, histories, sdof
+from patchfem.dynamics.drives import Piecewise, levels
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_events import of_log
+
+RIG = """\
+[normal]
+load = "26 lbf"
+[friction]
+law = "coulomb"
+static = 0.3
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+waveform = "levels"
+frequency = "143 Hz"
+levels = ["3 g", "5 g", "6 g", "4 g"]
+cycles = 25
+"""
+
+
+def one_mode(zeta=0.003, slide=1.0):
+    return ModalBasis(("a",), np.array([1.0]), np.array([zeta]), np.array([slide]), np.ones(1), np.ones(1), 1.0)
+
+
+def alike(a, b, near=1e-9):
+    assert a.count == b.count and len(a.time) == len(b.time)
+    assert a.what.tolist() == b.what.tolist() and a.interface.tolist() == b.interface.tolist()
+    assert a.time == pytest.approx(b.time, abs=near) and a.slide == pytest.approx(b.slide, abs=near)
+    assert np.abs(np.exp(1j * a.phase) - np.exp(1j * b.phase)).max(initial=0.0) < 10 * near
+
+
+@settings(max_examples=12)
+@given(st.sampled_from([0.003, 0.3]), st.floats(0.3, 0.95), st.sampled_from([1.0, 0.6]), st.sampled_from([1.0, -0.7]),
+       st.floats(0.4, 1.6), st.sampled_from([0.0, 1.3, -0.4]))
+def test_always_the_fast_engine_lists_what_the_general_one_does(zeta, limit, ratio, slide, omega, speed):
+    modes, drive = one_mode(zeta, slide), BaseSine(1.0, omega)
+    force, start = limit / abs(slide), Start(np.array([0.3]), np.array([speed]))
+    fast = sdof.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
+    slow = histories.simulate(modes, drive, force, ratio * force, 12, 2, start=start).log
+    assert fast.count > 5
+    alike(fast, slow, 1e-7)
+
+
+def test_exact_borders_of_levels_are_listed_by_both():
+    modes, drive = one_mode(0.05), levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
+    fast, slow = (engine.simulate(modes, drive, 0.6, 0.6, 12, 2).log for engine in (sdof, histories))
+    alike(fast, slow, 1e-8)
+    border = fast.what == event_list.BORDER
+    assert fast.time[border] == pytest.approx(2 * np.pi / 0.9 * np.array([3, 6, 9]))
+
+
+def test_exact_levels_of_a_scene_are_those_of_one_run():
+    """The scene runs level after level; the list is that of one run through all segments."""
+    scene = loads(RIG)
+    found = run(plan(scene), estimate=False).extra["events"]
+    from patchfem.simulate_rig import drive_of, modes_of
+
+    drive = drive_of(scene)
+    assert isinstance(drive, Piecewise)
+    limit = 0.3 * scene.normal.load
+    whole = of_log(sdof.simulate(modes_of(scene), drive, limit, limit, 100, 10).log)
+    assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()
+    assert found.time == pytest.approx(whole.time, abs=1e-10)
+    assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)
+
+
+def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
+    modes, drive = one_mode(), BaseSine(1.0, 1.0)
+    every = sdof.simulate(modes, drive, 0.8, 0.8, 40, 2).log
+    monkeypatch.setattr(sdof, "CHUNK", 16)
+    monkeypatch.setattr(sdof, "ROOM", 50)
+    monkeypatch.setattr(event_list, "ROOM", 50)
+    for engine in (sdof, histories):
+        few = engine.simulate(modes, drive, 0.8, 0.8, 40, 2).log
+        assert few.count == every.count > 150 and len(few.time) == 50
+        assert few.time == pytest.approx(every.time[-50:]) and few.what.tolist() == every.what[-50:].tolist()
+
+
+def test_exact_the_list_ends_where_the_travel_does():
+    modes, drive = one_mode(0.0), BaseSine(1.0, 1.0)
+    for engine in (sdof, histories):
+        done = engine.simulate(modes, drive, 0.3, 0.3, 100, 2, travel=5.0)
+        assert done.log.time[-1] <= done.response.time[-1] and done.log.count == len(done.log.time) > 4
+
+
+def test_exact_events_of_the_drive_at_the_onset():
+    """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
+    log = sdof.simulate(one_mode(), BaseSine(1.0, 1.0), 0.8, 0.8, 200, 2).log
+    found = of_log(log)
+    release, stop = (found.kind == 1) | (found.kind == 2), found.kind == 0
+    assert log.phase[np.flatnonzero(release)[-10:]] % np.pi == pytest.approx(0.538622, abs=1e-6)
+    assert found.time[stop][-10:] - found.time[release][-10:] == pytest.approx(2.472613, abs=1e-6)
+    assert np.abs(found.slide[stop][-10:]) == pytest.approx(0.28704671337871602595, abs=1e-12)

@@ -1,0 +1,90 @@
+"""The table of events: seen in samples, cut at its length, and the stick intervals between events."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.response import events
+from patchfem.response.events import Events, detected, states, sticks, stuck_time, table
+
+
+def stick_slip(period=1.0, cycles=3, steps=800, rest=0.25):
+    """(time, slip): a cosine way to and fro with a rest of `rest` of the period at either end."""
+    time = np.linspace(0, cycles * period, cycles * steps + 1)
+    phase, half = time / period % 1.0, 0.5 - rest
+    rise = 0.5 - 0.5 * np.cos(np.pi * np.clip(phase / half, 0, 1))
+    fall = 0.5 - 0.5 * np.cos(np.pi * np.clip((phase - 0.5) / half, 0, 1))
+    return time, rise - fall
+
+
+def test_exact_stops_and_releases_of_a_known_motion():
+    """Speed sin(pi t/half): it passes 1e-2 of its peak asin(0.01)/pi of the stroke from either end."""
+    time, slip = stick_slip()
+    found = detected(time, slip[:, None], 2 * slip[:, None], 1.0)
+    early = 0.25 * np.arcsin(0.01) / np.pi
+    wanted = [t for c in range(3) for t in (c + early, c + 0.25 - early, c + 0.5 + early, c + 0.75 - early)][1:]
+    kinds = [events.RELEASE_UP, events.STOP, events.RELEASE_DOWN, events.STOP] * 3
+    late = found.time.size - len(wanted)  # the first release may fall before the first sample
+    assert late in (0, 1) and found.kind.tolist()[late:] == kinds[1:]
+    assert found.time[late:] == pytest.approx(wanted, abs=1 / 800)
+    assert found.slide == pytest.approx(2 * np.interp(found.time, time, slip), abs=1e-12)
+    assert set(found.interface) == {1} and found.count == found.time.size
+
+
+def test_exact_reversals_without_a_stop():
+    """A sine sampled so coarsely that no sample falls into its slow parts."""
+    time = np.linspace(0, 4, 4 * 20 + 1) + 0.01
+    found = detected(time, np.sin(2 * np.pi * time)[:, None], np.sin(2 * np.pi * time)[:, None], 1.0)
+    assert found.kind.tolist() == [events.REVERSAL_DOWN, events.REVERSAL_UP] * 4
+    assert found.time == pytest.approx(0.25 + 0.5 * np.arange(8), abs=0.01)
+
+
+def test_exact_a_slip_below_the_bound_is_no_event():
+    time, slip = stick_slip()
+    assert detected(time, 1e-9 * slip[:, None], slip[:, None], 1.0, held=1e-8).time.size == 0
+    assert detected(time, 0 * slip[:, None], slip[:, None], 1.0).time.size == 0
+
+
+def test_exact_borders_of_the_drive_and_two_interfaces_in_order():
+    time, slip = stick_slip()
+    found = detected(time, np.stack([slip, np.roll(slip, 100)], axis=1), np.stack([slip, slip], axis=1), 1.0,
+                     borders=(1.5, 7.0))
+    assert np.all(np.diff(found.time) >= 0) and set(found.interface) == {0, 1, 2}
+    border = found.kind == events.BORDER
+    assert found.time[border].tolist() == [1.5] and found.interface[border].tolist() == [0]
+    assert np.isnan(found.slide[border]).all() and np.isfinite(found.slide[~border]).all()
+
+
+def test_exact_only_the_last_events_are_kept_and_all_are_counted(monkeypatch):
+    monkeypatch.setattr(events, "MOST", 5)
+    found = table([(float(k), 1, events.STOP, 0.0) for k in range(12)])
+    assert found.time.tolist() == [7, 8, 9, 10, 11] and found.count == 12
+
+
+@given(st.floats(0.05, 0.4), st.floats(0, 1.3), st.floats(1.6, 3))
+def test_always_stuck_time_and_time_of_slip_fill_the_window(rest, begin, end):
+    time, slip = stick_slip(rest=rest)
+    found = detected(time, slip[:, None], slip[:, None], 1.0)
+    held = stuck_time(found, 1, begin, end, True)
+    middle = (time[1:] + time[:-1]) / 2
+    inside = np.clip(np.minimum(time[1:], end) - np.maximum(time[:-1], begin), 0, None)
+    plain = inside[(states(time, slip, 1.0)[1] == 0) & (middle > 0)].sum()
+    assert held == pytest.approx(plain, abs=8 / 800)
+    spans = sticks(found, begin, end, [True])
+    assert all(b > a for a, b in spans) and sum(b - a for a, b in spans) == pytest.approx(held)
+
+
+def test_exact_sticks_are_cut_where_another_interface_changes():
+    """The first one sticks from 1 to 9; the second slips from 0 to 2 and from 6 to 7: stuck together 2..6 and 7..9."""
+    rows = [(1, 1, events.STOP), (2, 2, events.STOP), (6, 2, events.RELEASE_UP), (7, 2, events.STOP),
+            (9, 1, events.RELEASE_DOWN), (9.5, 1, events.STOP)]
+    found = Events(*(np.array(column) for column in zip(*rows)), np.zeros(6), 6)
+    assert sticks(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
+    assert stuck_time(found, 1, 0.0, 10.0, True) == pytest.approx(8.5)
+    assert stuck_time(found, 2, 0.0, 10.0, True) == pytest.approx(7.0)
+
+
+def test_exact_an_interface_without_events_sticks_or_slides_all_the_time():
+    none = table([])
+    assert sticks(none, 1.0, 3.0, [False]) == [(1.0, 3.0)] and sticks(none, 1.0, 3.0, [True]) == []
