@@ -1,0 +1,172 @@
+"""Pictures and tables of curves and levels: what they say, that their lines are what was computed, and the file."""
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+
+from patchfem.core import Outcome
+from patchfem.export import curves, netcdf, report
+
+FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
+          "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
+          "regime": np.array(["stable"] * 4 + ["unstable"] * 3 + ["stable"] * 2),
+          "multiplier": np.linspace(0.2, 1.5, 9), "folds": np.array([13.0, 11.5])}
+POINT = '[normal]\nload = "26 lbf"\n'
+MODE = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+"""
+SWEEP = """\
+[drive]
+kind = "base"
+waveform = "sweep"
+from = "{0} Hz"
+to = "{1} Hz"
+rate = "10 Hz/s"
+acceleration = "{2} g"
+[accuracy]
+method = "harmonic"
+tolerance = 1e-2
+"""
+COULOMB = POINT + '[friction]\nlaw = "coulomb"\nstatic = 0.3\n' + MODE
+STIFFENED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n' + MODE \
+    + '[structure.stiffening]\ncubic = "1e11 N/m^3"\n'
+LEVELS = COULOMB + """\
+[drive]
+kind = "base"
+waveform = "levels"
+frequency = "143 Hz"
+levels = ["3 g", "5 g", "6 g", "5 g", "4 g", "3 g"]
+cycles = 100
+"""
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """scene text -> (folder of its results, dataset), each once."""
+    base, kept = tmp_path_factory.mktemp("curves"), {}
+
+    def of(text):
+        if text not in kept:
+            path = base / f"scene{len(kept)}.toml"
+            path.write_text(text, "utf-8")
+            answer = cli("run", path, "-o", base / path.stem, "-q")
+            assert answer.code == 0, answer.err
+            with xr.open_dataset(base / path.stem / "result.nc") as data:
+                kept[text] = base / path.stem, data.load()
+        return kept[text]
+    return of
+
+
+def test_exact_spans_of_a_curve():
+    assert curves.spans(FOLDED) == [("stable", 0, 4), ("unstable", 4, 7), ("stable", 7, 9)]
+
+
+def test_exact_a_picture_of_a_folded_curve():
+    text = curves.curve(FOLDED)
+    for word in ("stable", "unstable", "fold", "drive frequency [Hz]", "half peak-to-peak [um]"):
+        assert f">{word}<" in text, word
+    assert "stroke-dasharray" in text and curves.curve(FOLDED) == text
+    said = curves.caption(FOLDED)
+    assert "9 points" in said and "stable, unstable" in said and "2 folds" in said and "drive frequency" in said
+
+
+def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
+    found = {"frequency": np.full(4, 10.0), "level": 9.80665 * np.arange(1.0, 5),
+             "amplitude": np.array([1e-6, 2e-6, 3e-6, np.nan]),
+             "regime": np.array(["stuck", "2 stops", "sliding", "unbounded"]), "multiplier": np.zeros(4)}
+    assert curves.axis_of(found)[0] == pytest.approx([1, 2, 3, 4]) and curves.axis_of(found)[1:] == ("drive level", "g")
+    assert "no bounded motion" in curves.caption(found) and ">unbounded<" in curves.curve(found)
+
+
+def test_exact_the_regime_in_words():
+    assert curves.regime(None) == ""
+    assert "dies out" in curves.regime({"regime": "2 stops", "multiplier": 0.2})
+    assert "does not die out" in curves.regime({"regime": "unstable", "multiplier": 1.2})
+    assert curves.regime({"regime": "stuck", "multiplier": 0.0}) == \
+        " Regime: stuck; largest Floquet multiplier 0."
+
+
+def test_exact_a_curve_in_the_file():
+    data = netcdf.with_curve(xr.Dataset(), FOLDED)
+    names = data.curve_regime.attrs["flag_meanings"].split()
+    assert [names[k] for k in data.curve_regime.values] == FOLDED["regime"].tolist()
+    for name in ("frequency", "level", "amplitude", "multiplier"):
+        assert data[f"curve_{name}"].values.tolist() == FOLDED[name].tolist()
+        assert data[f"curve_{name}"].dims == ("curve_point",) and data[f"curve_{name}"].attrs["units"]
+    assert data.curve_fold.values.tolist() == [13.0, 11.5] and data.curve_fold.attrs["units"] == "Hz"
+
+
+def test_exact_the_regimes_over_a_sweep_of_a_coulomb_rig(written):
+    """Stuck while mu N/m stays above a; the page shows the curve and says the regime of the largest motion."""
+    folder, data = written(COULOMB + SWEEP.format(130, 155, 5))
+    page = (folder / "report.html").read_text()
+    assert "Steady motion at the output" in page and "121 points" in page and "Floquet multiplier" in page
+    assert data.curve_point.size == 121 and data.attrs["regime"] == "sliding"
+    names = np.array(data.curve_regime.attrs["flag_meanings"].split())[data.curve_regime.values]
+    assert names[0] == "sliding" and names[-1] == "2_stops" and 0 < data.attrs["largest_multiplier"] < 1
+    top = float(data.curve_amplitude.max())
+    assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=1e-6)
+
+
+def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
+    """Of three motions at one frequency the measures are of the largest, which the curve found."""
+    folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))
+    page = (folder / "report.html").read_text()
+    assert ">fold<" in page and data.curve_fold.size == 2
+    top = float(data.curve_amplitude.max())
+    assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=2e-3)
+    # backbone: omega^2 + 3/4 (k3/m) x^2 where the largest motion is
+    at = float(data.curve_frequency[int(np.argmax(data.curve_amplitude.values))])
+    assert at == pytest.approx(np.sqrt(143**2 + 0.75 * 1e11 / 0.884 * top**2 / (2 * np.pi)**2), rel=5e-3)
+    names = np.array(data.curve_regime.attrs["flag_meanings"].split())[data.curve_regime.values]
+    first, last = np.sort(data.curve_fold.values)
+    inside = names == "unstable"
+    assert inside.any() and np.all((data.curve_frequency.values[inside] > first - 0.5)
+                                   & (data.curve_frequency.values[inside] < last + 0.5))
+    assert np.all(data.curve_multiplier.values[inside] > 1)
+    assert np.all(data.curve_multiplier.values[~inside] <= 1 + 1e-6)
+
+
+def test_exact_levels_on_the_page(written):
+    """A row per level in its order, stuck below 4 g, and a line per step of the test."""
+    folder, data = written(LEVELS)
+    page = (folder / "report.html").read_text()
+    rows = re.findall(r"<tr><td class=n>(\d)</td><td class=n>(\d) g</td>(.*?)<td>(\w+)</td></tr>", page)
+    assert [(int(n), int(g), word) for n, g, _, word in rows] == [
+        (1, 3, "stuck"), (2, 5, "slips"), (3, 6, "slips"), (4, 5, "slips"),
+        (5, 4, "slips"), (6, 3, "stuck")]
+    assert "Level by level" in page and ">raised<" in page and ">lowered<" in page
+    assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))
+
+
+def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
+    rows = [{"drive": d, "stuck": d < 2, "values": {"relative_displacement_amplitude": a}, "errors": {}}
+            for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))]
+    seen = []
+    from matplotlib.axes import Axes
+
+    plain = Axes.annotate
+
+    def told(self, text, xy, xytext, **more):
+        seen.append((xytext[0] < xy[0], xytext[1] < xy[1]))
+        return plain(self, text, xy=xy, xytext=xytext, **more)
+
+    monkeypatch.setattr(Axes, "annotate", told)
+    curves.levels(rows)
+    assert seen == [(True, True), (True, True), (False, False)]
+
+
+def test_exact_a_page_without_curve_or_levels_has_neither():
+    data = {"name": "a", "scene": "", "resolved": "", "sentence": Outcome.DONE.sentence, "engine": "", "fields": {},
+            "x": None, "versions": {}, "summary": {"patchfem": "0", "title": "", "kind": "patch", "outcome": "done",
+            "measures": {}, "effects": [], "not_in_scene": [], "warnings": [], "seconds": {}}}  # fmt: skip
+    assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)
