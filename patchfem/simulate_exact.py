@@ -126,16 +126,28 @@ def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tupl
 def _joined(parts, each: float):
     """Runs of `each` [s] one after the other as one EventRun; its window and loop are those of the last."""
     shift = [k * each for k in range(len(parts))]
-    last = parts[-1]
-    columns = {name: np.concatenate([getattr(p.response, name) for p in parts])
+    last, rows = parts[-1], [slice(None, -1)] * (len(parts) - 1) + [slice(None)]  # where one ends the next begins
+
+    def column(of):
+        return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])
+
+    columns = {name: column(lambda p, name=name: getattr(p.response, name))
                for name in type(last.response).__dataclass_fields__ if name not in ("time", "extra")}
-    time = np.concatenate([p.response.time + t for p, t in zip(parts, shift)])
-    extra = {name: np.concatenate([p.response.extra[name] for p in parts]) for name in last.response.extra}
+    time = np.concatenate([_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)])
+    extra = {name: column(lambda p, name=name: p.response.extra[name]) for name in last.response.extra}
     response = replace(last.response, time=time, extra=extra, **columns)
-    window = replace(last.window, time=last.window.time + shift[-1])
+    window = replace(last.window, time=_later(last.window.time, shift[-1]))
     ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
     ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
     return replace(last, response=response, window=window, ledger=ledger,
                    log=simulate_events.joined_logs([p.log for p in parts], shift),
                    amplitudes=np.concatenate([p.amplitudes for p in parts]),
                    phasors=np.concatenate([p.phasors for p in parts]), events=sum(p.events for p in parts))
+
+
+def _later(time, shift: float):
+    """Times moved by `shift` [s], the two sides of an event still apart."""
+    moved = time + shift
+    before = np.flatnonzero(moved[1:] <= moved[:-1])
+    moved[before] = np.nextafter(moved[before], -np.inf)
+    return moved

@@ -158,12 +158,11 @@ class _Book:
         book = dict(zip(("work_in", "viscous", "power", "friction"), map(float, self.ledger)))
         book |= {"stored": stored - self.begun, "peak_stored": max(self.peak, stored)}
         first = max(0.0, self.end - self.window * period)
-        number = max(LEAST, round((self.end - first) / period * SAMPLES) + 1)
-        events = recent.time[recent.first & (recent.time > first) & (recent.time < self.end)]
-        times = np.unique(np.concatenate([np.linspace(first, self.end, number), events,
-                                          np.nextafter(events, -np.inf)]))
-        wide = batches.sample(recent, times, self.modes, self.drive, self.live)
-        early = [_part(r, r.time < first) for r in self.early]
+        begin = min(first, max(0.0, self.end - 2 * period))  # two cycles are kept whole
+        wide, early = self._wide(recent, first, self.end), [_part(r, r.time < begin) for r in self.early]
+        if begin < first:
+            before = self._wide(recent, begin, first)
+            early.append(_part(before, before.time < first))
         full = _chain([*[r for r in early if r.time.size], wide])
         held = self._inside(recent, first)
         loop, mine = batches.loop_of(held, self.modes, self.live), bool(len(self.live) and self.live[0] == 0)
@@ -174,6 +173,13 @@ class _Book:
         return EventRun(full, wide, np.stack([self.low, self.high], axis=1)[done], self.phasors[done], book,
                         self.outcome, self.events, loop, stick, starts, self._peak_acceleration(held),
                         self.end / period, log)
+
+    def _wide(self, recent, first: float, end: float) -> Response:
+        """Uniform samples from `first` to `end` and both sides of every event."""
+        number = max(LEAST, round((end - first) / self.drive.period * SAMPLES) + 1)
+        events = recent.time[recent.first & (recent.time > first) & (recent.time < end)]
+        times = np.unique(np.concatenate([np.linspace(first, end, number), events, np.nextafter(events, -np.inf)]))
+        return batches.sample(recent, times, self.modes, self.drive, self.live)
 
     def _inside(self, recent, first: float):
         """The pieces of the window, the first one cut at its border."""

@@ -185,7 +185,7 @@ class _Run:
         scene, mass, end = self.scene, self.scene.modes.mass, self.end
         first = max(0.0, end - self.window * self.period)
         wide = self.sample(first, end)
-        full = self._with_corners(wide, first)
+        full = self._with_corners(self._with_cycle(wide, first), max(0.0, end - max(2, self.window) * self.period))
         rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > first)]
         low, high = np.maximum(rows[:, 0], first) - rows[:, 0], np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0]
         owner, tau, weight = panels(low, high, scene.fastest)
@@ -217,6 +217,12 @@ class _Run:
         tau = np.clip(time - rows[owner, 0], 0.0, rows[owner, 2])
         return response(time, *states(tau, rows, owner, scene), force(tau, rows, owner, scene), scene)
 
+    def _with_cycle(self, wide: Response, first: float) -> Response:
+        """The cycle before a window of one, so that two are kept whole."""
+        if self.window > 1 or first <= 0:
+            return wide
+        return _chained(self.sample(max(0.0, first - self.period), first), wide)
+
     def _with_corners(self, wide: Response, first: float) -> Response:
         rows = np.concatenate(self.corners)[:CORNERS]
         rows = rows[rows[:, 0] < first]
@@ -225,6 +231,12 @@ class _Run:
         tau, owner = np.zeros(len(rows)), np.arange(len(rows))
         early = response(rows[:, 0].copy(), *states(tau, rows, owner, self.scene),
                          force(tau, rows, owner, self.scene), self.scene)
-        names = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
-                 "base_acceleration", "force", "slip")
-        return Response(*(np.concatenate([getattr(early, k), getattr(wide, k)]) for k in names))
+        return _chained(early, wide)
+
+
+def _chained(early: Response, late: Response) -> Response:
+    """Two parts of a run, the samples of the first that the second begins with left out."""
+    names = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
+             "base_acceleration", "force", "slip")
+    kept = early.time < late.time[0]
+    return Response(*(np.concatenate([getattr(early, k)[kept], getattr(late, k)]) for k in names))

@@ -1,0 +1,174 @@
+"""What a run keeps of its motion, and how it is said to have ended, for every engine and drive."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import G_N, Outcome
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_rig import drive_of
+
+POINT = '[normal]\nload = "26 lbf"\n'
+MODE = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+"""
+SECOND = """\
+[[structure.mode]]
+name = "second"
+frequency = "990 Hz"
+damping = 0.01
+slide = 0.4
+base = 0.0
+output = 0.3
+"""
+COULOMB = POINT + '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+PLASTIC = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "3 um"\n'
+BONDS = PLASTIC.replace("elastic-plastic", "nonlocal")
+TANH = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'
+SINE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "6 g"\ncycles = 30\n'
+LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = ["3 g", "6 g"]\ncycles = 15\n'
+RELEASE = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "0.1 s"\n'
+SHORT = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "1 ms"\n'
+STEP = '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\nduration = "0.1 s"\n'
+SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "135 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n' \
+    'acceleration = "6 g"\n'
+FILE = '[drive]\nkind = "base"\nwaveform = "file"\nfile = "signal.csv"\n'
+ENGINES = {"exact": COULOMB + MODE, "exact two modes": COULOMB + MODE + SECOND, "march coulomb": COULOMB + MODE,
+           "march plastic": PLASTIC + MODE, "march bonds": BONDS + MODE + SECOND, "march tanh": TANH + MODE,
+           "duhamel": COULOMB + MODE, "newmark": COULOMB + MODE, "euler": COULOMB + MODE}
+DRIVES = {"sine": SINE, "levels": LEVELS, "release": RELEASE, "short release": SHORT, "step": STEP, "sweep": SWEEP,
+          "file": FILE}
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """(engine, drive) -> (scene, Result), each once."""
+    folder, kept = tmp_path_factory.mktemp("histories"), {}
+    time = np.linspace(0, 0.1, 800)
+    value = 6 * G_N * np.sin(2 * np.pi * (130 * time + 100 * time**2))
+    rows = "\n".join(f"{t:.9g},{a:.9g}" for t, a in zip(time, value))
+    (folder / "signal.csv").write_text("time [s],acceleration [m/s^2]\n" + rows + "\n", "utf-8")
+
+    def of(engine, drive):
+        if (engine, drive) not in kept:
+            words = []
+            if engine.startswith("march"):
+                words = ["accuracy.method=march"]
+            elif not engine.startswith("exact"):
+                words = [f"accuracy.method={engine}"]
+            if engine == "newmark":
+                words += ["accuracy.stick_speed=1e-6 m/s"]
+            path = folder / "scene.toml"
+            path.write_text(ENGINES[engine] + DRIVES[drive], "utf-8")
+            from patchfem.scene import load
+
+            scene = load(path, words)
+            kept[engine, drive] = scene, run(plan(scene), estimate=False)
+        return kept[engine, drive]
+    return of
+
+
+CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES
+         if not (engine.startswith("exact") and drive in ("sweep", "file"))]
+
+
+@pytest.mark.parametrize(("engine", "drive"), CASES)
+def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, engine, drive):
+    scene, result = done(engine, drive)
+    r, sine = result.response, drive_of(scene)
+    end = result.window.time[-1]
+    assert np.all(np.diff(r.time) > 0) and r.time[0] == 0 and r.time[-1] == end
+    assert r.time.size >= 100
+    begin = max(0.0, end - 2 * sine.period)
+    late = r.time[r.time >= begin * (1 - 1e-9)]
+    assert late.size >= 100 * (end - begin) / sine.period
+    assert late[0] - begin < 1e-6 * sine.period and np.diff(late).max() <= sine.period / 100 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize(("engine", "drive"), CASES)
+def test_always_every_reversal_is_kept(done, engine, drive):
+    """Seen by the extremes: between two kept samples before the window the output goes one way, so that the rate there
+    keeps its sign but for the sample of the reversal itself."""
+    _, result = done(engine, drive)
+    r = result.response
+    early = r.time < result.window.time[0]
+    if early.sum() < 3:
+        return
+    y, rate = r.output[early], r.output_rate[early]
+    step = np.diff(y)
+    size = np.abs(r.output_rate).max()
+    moving = np.abs(step) > 1e-9 * np.abs(r.output).max()
+    inner = moving & (np.abs(rate[:-1]) > 0.06 * size) & (np.abs(rate[1:]) > 0.06 * size)
+    assert np.all(np.sign(rate[:-1])[inner] == np.sign(step)[inner])
+    assert np.all(np.sign(rate[1:])[inner] == np.sign(step)[inner])
+
+
+@pytest.mark.parametrize("engine", ["exact", "exact two modes", "march coulomb", "march plastic", "march bonds"])
+def test_always_every_stop_and_release_is_kept(done, engine):
+    """Of the exact engine each event of its list; of a march, those of a run whose window is the whole run."""
+    scene, result = done(engine, "sine")
+    r, events = result.response, result.extra["events"]
+    gaps = np.array([np.abs(r.time - t).min() for t in events.time])
+    if engine.startswith("exact"):
+        assert gaps.max() <= 1e-12
+        return
+    step = result.extra["steps_per_cycle"]
+    from patchfem.response.events import detected
+    from patchfem.simulate_events import slips_of
+
+    short = loads(ENGINES[engine] + SINE.replace("cycles = 30", "cycles = 5"),
+                  sets=["accuracy.method=march", f"accuracy.steps_per_cycle={step}"])
+    whole = run(plan(short), estimate=False)
+    # the first cycles are kept whole in the short run: the same steps of the same motion
+    slips, slides = slips_of(whole.response)
+    seen = detected(whole.response.time[-2 * step - 1:], slips[-2 * step - 1:], slides[-2 * step - 1:],
+                    drive_of(scene).period)
+    stops = seen.time[np.isin(seen.kind, (0, 1, 2))]
+    assert stops.size >= 4
+    apart = np.array([np.abs(r.time - t).min() for t in stops])
+    assert apart.max() <= 1.6 * drive_of(scene).period / step
+
+
+def test_exact_how_runs_end():
+    """A release of a rubbing block sticks; without friction it comes to rest or has not yet; a sweep never is steady
+    and never grows, whatever its amplitude does; nothing moves under a drive too small."""
+    wanted = {
+        (COULOMB + MODE + RELEASE): "stuck",
+        (MODE + RELEASE): "transient",
+        (MODE.replace("0.003", "0.3") + RELEASE): "steady",
+        (COULOMB + MODE + STEP.replace("0.1 s", "0.5 s")): "stuck",
+        (MODE.replace("0.003", "0.3") + STEP): "steady",
+        (COULOMB + MODE + SWEEP): "transient",
+        (MODE + SWEEP.replace("135 Hz", "100 Hz").replace('"150 Hz"', '"143 Hz"')): "transient",
+        (COULOMB + MODE + SWEEP.replace("6 g", "3 g")): "stuck",
+        (COULOMB + MODE + LEVELS): "transient",
+        (COULOMB + MODE + LEVELS.replace('"3 g", "6 g"', '"6 g", "3 g"').replace("15", "80")): "stuck",
+        (PLASTIC + MODE + RELEASE): "stuck",
+        (TANH + MODE + RELEASE.replace("0.1 s", "1 s")): "steady",
+    }
+    for text, outcome in wanted.items():
+        found = run(plan(loads(text)), estimate=False)
+        assert found.outcome == outcome, (text, found.outcome)
+        if found.outcome is Outcome.TRANSIENT and "sweep" in text:
+            assert any("changes to the end" in line for line in found.warnings)
+            assert "relative_displacement_amplitude_steady" not in found.measures
+
+
+def test_exact_a_rigid_block_under_a_steady_force_grows():
+    text = MODE.replace('"143 Hz"', '"0 Hz"') + STEP.replace("0.1 s", "20 s")
+    assert run(plan(loads(text)), estimate=False).outcome == "grows"
+
+
+def test_exact_levels_are_judged_by_their_last_one():
+    """The second level is settled though the first was far from it."""
+    text = PLASTIC + MODE.replace("0.003", "0.1") + LEVELS.replace("15", "40")
+    found = run(plan(loads(text)), estimate=False)
+    assert found.outcome == "steady"
+    assert run(plan(loads(text.replace('levels = ["3 g", "6 g"]', 'levels = ["6 g"]'))), estimate=False).measures[
+        "slip_amplitude"].value == pytest.approx(found.measures["slip_amplitude"].value, rel=1e-6)
