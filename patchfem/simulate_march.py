@@ -310,16 +310,18 @@ class Run:
 def _thinned(rows, run) -> np.ndarray:
     """Numbers of the samples of a cycle worth keeping: its first, every reversal of the output and of a slide, every
     stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
-    n = run.modes.omega.size
+    n, output = run.modes.omega.size, run.modes.output
     speeds, slips = run.watched(rows)
-    speeds = np.column_stack([speeds, rows[:, n:2 * n] @ run.modes.output])
-    still = np.abs(speeds) <= 1e-13 * np.abs(rows[:, n:2 * n]).max(initial=0.0)
-    way = np.where(still, 0.0, np.sign(speeds))
-    moved = np.abs(np.diff(slips, axis=0))
-    slipping = moved > np.maximum(STICK * moved.max(axis=0, initial=0.0), 1e-13 * np.abs(rows[:, :n]).max(initial=0.0))
-    turn = (way[1:] != way[:-1]).any(axis=1)
-    turn[1:] |= (slipping[1:] != slipping[:-1]).any(axis=1)
-    return np.unique(np.concatenate([[0], np.flatnonzero(turn)[:MOST_TURNS]]))
+    speeds = np.concatenate([speeds.T, (rows[:, n:2 * n] @ output)[None]])
+    low = 1e-13 * max(speeds.max(), -speeds.min())
+    way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
+    moved = np.abs(slips.T[:, 1:] - slips.T[:, :-1])
+    low = 1e-13 * np.abs(rows[:, :n] @ output).max()
+    slipping = moved > np.maximum(STICK * moved.max(axis=1), low)[:, None]
+    kept = (way[:, 1:] != way[:, :-1]).any(axis=0)
+    kept[1:] |= (slipping[:, 1:] != slipping[:, :-1]).any(axis=0)
+    kept[0] = True
+    return np.flatnonzero(kept)[:MOST_TURNS]
 
 def _extremes(rows, modes, dt) -> tuple:
     """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""
