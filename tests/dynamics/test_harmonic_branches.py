@@ -39,7 +39,17 @@ def test_exact_a_circle_and_its_folds():
     path = follow(circle, [0.6], 0.8, (-0.5, 2.0), True, 0.05, 0.05)
     assert path.ended == "start" and path.p[-1] == -0.5 and path.x[-1, 0] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
     assert path.x[:, 0]**2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
-    assert path.folds == (pytest.approx(1.0, abs=1e-5),) and not path.crossings
+    assert path.folds == (pytest.approx(1.0, abs=1e-8),) and not path.crossings
+
+
+def test_exact_a_lopsided_fold():
+    """p = x exp(-5 x^3): the fold at x^3 = 1/15 from points 0.1 apart on the arc."""
+    def curve(x, p):
+        e = np.exp(-5 * x[0]**3)
+        return x * e - p, np.array([[e * (1 - 15 * x[0]**3)]]), np.array([-1.0])
+
+    path = follow(curve, [0.1], 0.1 * np.exp(-0.005), (0.05, 1.0), True, 0.1, 0.1, scale=1.0)
+    assert path.ended == "start" and path.folds == (pytest.approx(15**(-1 / 3) * np.exp(-1 / 3), abs=5e-5),)
 
 
 def test_exact_a_pitchfork_is_a_crossing():
