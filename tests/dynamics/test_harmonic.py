@@ -13,7 +13,7 @@ from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic import Balance, newton, pack, unpack
 from patchfem.friction.law import Bonds
 from patchfem.friction.recursion import advance
-from patchfem.simulate_harmonic import periodic_response, point
+from patchfem.simulate_harmonic import cycle_energy, periodic_response, point
 from patchfem.simulate_harmonic_contact import Group
 from patchfem.simulate_harmonic_laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, analysis, synthesis
 from patchfem.simulate_harmonic_point import balance_of, group_of
@@ -231,6 +231,9 @@ def test_always_work_in_is_what_is_lost(omega):
     viscous = modes.mass * dt * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.dampers, r.modal_rate[:-1])
     slip = np.sum((r.force * r.slide_rate)[:-1]) * dt
     assert slip > 0.05 * base and base == pytest.approx(viscous + slip, rel=2e-4)
+    book = cycle_energy(found, modes)
+    assert [book[n] for n in ("work_in", "viscous", "friction")] == pytest.approx([base, viscous, slip], rel=2e-4)
+    assert book["balance"] < 1e-9
 
 
 def test_order_of_what_is_cut_off():
