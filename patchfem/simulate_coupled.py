@@ -20,7 +20,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     warnings = [*warnings, *notes_of(scene)]
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
     lumps = scene.friction is not None and scene.friction.law != "convolution"
-    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not rig.acts(scene):
+    moves = rig.acts(scene) or rig.yaws(scene)
+    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not moves:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":

@@ -22,6 +22,7 @@ from .response.measures import (
     window_ends,
 )
 from .simulate_acting import acting
+from .simulate_interfaces import yaws
 from .simulate_structure import highest_frequency, mode_stiffness
 from .simulate_wrench_scene import acts
 
@@ -160,6 +161,8 @@ def no_closed_form(scene, drive, shear: str) -> str:
         return f"with {shear}"
     if acts(scene):
         return "under a load that changes"
+    if yaws(scene):
+        return "with strips that yaw"
     if not drive.segments:
         return f"under a drive of waveform '{scene.drive.waveform}'"
     if structure.stiffening is not None:
@@ -259,7 +262,7 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     """One march at settings.steps per cycle."""
     from . import simulate_levels
     from . import simulate_march as hub
-    from .simulate_interfaces import model_of, other_measures
+    from .simulate_interfaces import joined, model_of, other_measures
     from .simulate_march import Mark
 
     travel, marks, start = scene.structure.travel or np.inf, simulate_levels.ends(scene), start_of(scene, modes)
@@ -269,9 +272,11 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     hub.warm_up(modes, drive, model, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
+    frames = 0 if yaws(scene) else frames  # strips have no common field of shear
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
                      progress, start, marks)
     seconds = perf_counter() - begin
+    done = joined(done, patch) if yaws(scene) else done
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
     held, rubbing = 0.0, None
@@ -283,8 +288,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         held *= scene.friction.law != "tanh"  # a law of the speed never holds
 
         def rubbing(part):
-            return _rubbing(scene, settings, modes, drive, patch, part) | other_measures(part.window, drive,
-                                                                                         settings.steps)
+            others = {} if yaws(scene) else other_measures(part.window, drive, settings.steps)
+            return _rubbing(scene, settings, modes, drive, patch, part) | others
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])

@@ -20,7 +20,7 @@ from .simulate_element_kernels import (
 )
 from .simulate_step_kernels import COULOMB, RATE, commit, contact_state, contact_step
 
-TURNS = 400  # of all elements in a step before it counts as failed
+TURNS = 4000  # of all elements in a step before it counts as failed
 NOBODY = -1  # kind of a patch that is not there
 
 

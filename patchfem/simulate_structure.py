@@ -18,16 +18,31 @@ def modes_of(scene) -> ModalBasis:
     on drive.mass (structure.output_mass unless given), at the output of [[structure.mode]] and of a file without a
     force of its own. PatchfemError names what a file lacks.
     """
-    found = _unbonded(scene)
+    found = _over_strips(scene, _unbonded(scene))
     bonded = scene.structure.bonded
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
     from .structure.bonded import bonded as fold
 
-    if len(found.interfaces) != 1:
+    if len(found.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
     return fold(found, bonded.stiffness, bonded.damping)
+
+
+def _over_strips(scene, found: ModalBasis) -> ModalBasis:
+    """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
+    from .simulate_interfaces import yaws
+
+    if not yaws(scene):
+        return found
+    from dataclasses import replace
+
+    from .core import frozen_array
+
+    count, width = scene.contact.strips.count, scene.contact.width
+    offsets = (np.arange(count) + 0.5) * (width / count) - width / 2
+    return replace(found, faces=frozen_array(found.slide - np.outer(offsets, found.yaw)))
 
 
 def _unbonded(scene) -> ModalBasis:

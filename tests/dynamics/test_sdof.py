@@ -329,8 +329,8 @@ def test_exact_ledger_by_parts_is_that_of_gauss_points():
 
 parameters = st.tuples(
     st.sampled_from([0.0, 0.003, 0.3, 1.0, 3.0]) | st.floats(0.0, 1.2), st.floats(-1.0, 1.0).map(np.exp),
-    st.sampled_from([0.0]) | st.floats(1e-3, 1.05), st.sampled_from([1.0]) | st.floats(0.3, 1.0), st.sampled_from([0.0, 1.0, 1.0, 1.0]),
-    st.sampled_from([1.0, -0.7]), st.sampled_from([1.0, -0.8]))
+    st.sampled_from([0.0]) | st.floats(1e-3, 1.05), st.sampled_from([1.0]) | st.floats(0.3, 1.0),
+    st.sampled_from([0.0, 1.0, 1.0, 1.0]), st.sampled_from([1.0, -0.7]), st.sampled_from([1.0, -0.8]))
 
 
 @settings(max_examples=10)
