@@ -27,7 +27,7 @@ def run_exact(scene, settings, modes, drive, load: float, start=None, progress=N
     share: of mu N that the law keeps."""
     from .simulate_rig import Raw
 
-    begin, forces = perf_counter(), _forces(scene, load, share)
+    begin, forces = perf_counter(), _forces(scene, modes, load, share)
     if simulate_levels.ends(scene):
         done, levels, slips = _levels(scene, settings, modes, drive, forces, start, progress, say)
     else:
@@ -40,10 +40,10 @@ def run_exact(scene, settings, modes, drive, load: float, start=None, progress=N
                done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log)
 
 
-def _forces(scene, load: float, share: float) -> tuple:
+def _forces(scene, modes, load: float, share: float) -> tuple:
     """(static, kinetic) friction [N] of every interface (i,)."""
     if scene.friction is None:
-        return np.zeros(1), np.zeros(1)
+        return (np.zeros(len(modes.interfaces)),) * 2
     if scene.structure.interface:
         pairs = [limits(scene, k, n) for k, n in enumerate(loads_of(scene))]
     else:

@@ -63,7 +63,7 @@ class _Events:
         from .simulate_exact import _forces
 
         self.scene, self.settings, self.modes, self.load, self.say = scene, settings, modes, load, say
-        self.forces = _forces(scene, load, 1.0)
+        self.forces = _forces(scene, modes, load, 1.0)
 
     def found(self, drive, start=None):
         """dynamics.steady_events.Steady."""

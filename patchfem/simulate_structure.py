@@ -3,11 +3,12 @@
 Where a number is wanted before anything runs (`plan`), the functions here give it for every description of the rig.
 """
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
 
-from .core import ModalBasis, PatchfemError, Start
+from .core import ModalBasis, PatchfemError, Start, frozen_array
 from .structure.modes import basis
 
 
@@ -19,6 +20,8 @@ def modes_of(scene) -> ModalBasis:
     force of its own. PatchfemError names what a file lacks.
     """
     found = _over_strips(scene, _unbonded(scene))
+    if found.faces is not None and not len(found.faces):
+        found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
     bonded = scene.structure.bonded
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
@@ -36,10 +39,6 @@ def _over_strips(scene, found: ModalBasis) -> ModalBasis:
 
     if not yaws(scene):
         return found
-    from dataclasses import replace
-
-    from .core import frozen_array
-
     count, width = scene.contact.strips.count, scene.contact.width
     offsets = (np.arange(count) + 0.5) * (width / count) - width / 2
     return replace(found, faces=frozen_array(found.slide - np.outer(offsets, found.yaw)))
@@ -52,10 +51,6 @@ def _unbonded(scene) -> ModalBasis:
         found = basis(structure.mode, structure.moving_mass)
         if not forced:
             return found
-        from dataclasses import replace
-
-        from .core import frozen_array
-
         return replace(found, base=frozen_array(-found.output))
     if structure.masses:
         from .structure import masses
