@@ -439,19 +439,20 @@ def test_always_the_first_stop(v0, g0, bc, bs, zeta, om):
         g0, bc = (0.0, abs(bc)) if g0 < 1e-6 else (g0, bc)
         if g0 == 0.0 and bc < 1e-6:
             return
-    end = slip_kernels.stop(v0, g0, bc, bs, o, 12.0)
+    end, shift, gain = slip_kernels.stop(v0, g0, bc, bs, o, 12.0)
     grid = np.linspace(0, 12.0 if end < 0 else end, 400)[1:-1]
     speed = np.array([slip_kernels.motion(float(t), v0, g0, bc, bs, o)[1] for t in grid])
     assert end != -2 and speed.min() > -1e-13
     if end >= 0:
-        assert abs(slip_kernels.motion(end, v0, g0, bc, bs, o)[1]) < 1e-12
+        there = slip_kernels.motion(end, v0, g0, bc, bs, o)
+        assert np.abs(np.array(there) - [shift, 0.0, gain]).max() < 1e-12 * (1 + end)
 
 
 @pytest.mark.parametrize("over", [1e-3, 1e-6, 1e-9, 1e-12, -1e-12, -1e-9, -1e-6, -1e-3])
 def test_exact_a_dip_of_the_speed_is_not_missed(over):
     """A rigid block whose speed v0 - (1 - cos om u) b/om comes down to `over` at om u = pi and goes up again."""
     om, b = 1.3, 0.7
-    end = slip_kernels.stop(2 * b / om + over, 0.0, -b, 0.0, slip_kernels.oscillator(0.0, 0.0, om), 20.0)
+    end = slip_kernels.stop(2 * b / om + over, 0.0, -b, 0.0, slip_kernels.oscillator(0.0, 0.0, om), 20.0)[0]
     if over > 0:
         assert end == -1.0
     else:
