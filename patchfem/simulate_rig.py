@@ -120,11 +120,26 @@ def choose(scene, per_point: bool = False) -> Settings:
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
+    if accuracy.steps_per_cycle is None and engine == "march":
+        steps = max(steps, unique_steps(scene, drive))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
     if engine in COMPARED:
         steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Settings(engine, steps, cycles, window, accuracy.shear_modes, per_point or side == "lower",
                     frozenset(pinned))
+
+
+def unique_steps(scene, drive) -> int:
+    """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
+    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
+    f = scene.friction
+    if f is None or f.law != "nonlocal" or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
+        return 0
+    from .simulate_plan import nominal_load
+
+    modes = modes_of(scene)
+    stiff = f.static * nominal_load(scene) / f.bond_length * (f.static / f.kinetic - 1)
+    return 2 * int(np.ceil(0.55 * drive.period * sqrt(stiff * float(np.sum(modes.slide**2)) / (2 * modes.mass))))
 
 
 def engine_of(scene, drive, side: str) -> str:
