@@ -172,6 +172,7 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
     a, p = np.asarray(amplitudes, float), np.asarray(phasors, complex)
     if a.size < 5 or not np.all(np.abs(p[-5:]) > 0):
         return None, None
+    a, p = a[-5:], p[-5:]
     shape = a / np.abs(p)
     ends = []
     for k in range(3):
