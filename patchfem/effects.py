@@ -58,6 +58,8 @@ EFFECTS = {
     "slide.kind=file": Effect("patchfem.response.paths", "q straight between the rows of a table", (), ("motion",)),
     "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
                         ("modes",)),
+    "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m", ("modes",)),
+    "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)", ("modes",)),
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
@@ -70,13 +72,20 @@ EFFECTS = {
     "accuracy.method=exact": Effect("patchfem.dynamics.events", "closed form between events"),
     "accuracy.method=march": Effect("patchfem.simulate_kernels", "exact propagator, path-mean force, Newton on the "
                                     "force residual"),
+    "accuracy.method=duhamel": Effect("patchfem.dynamics.duhamel", "Duhamel's integral with forces linear in the step, "
+                                      "fixed point (3.10)"),
+    "accuracy.method=newmark": Effect("patchfem.dynamics.newmark", "average acceleration, stuck below a speed"),
+    "accuracy.method=euler": Effect("patchfem.dynamics.euler", "explicit Euler"),
+    "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic", "x = Re sum X_k exp(i k w t); Coulomb: the map of "
+                                       "events over a period"),
     "measured": Effect("", "overlay of measured rows"),
 }
 
-NOT_YET_BUILT = (
-    "structure.bonded", "wear", "accuracy.method=duhamel",
-    "accuracy.method=newmark", "accuracy.method=euler", "accuracy.method=harmonic",
-)
+# an interface between two masses carries the keys of [friction] itself
+EFFECTS |= {f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
+            for name, effect in EFFECTS.items() if name.startswith(("friction.law=", "friction.reading="))}
+
+NOT_YET_BUILT = ("wear",)
 
 
 def absent(named) -> list:

@@ -110,6 +110,7 @@ def _files(found: Scene) -> list[tuple[str, str]]:
     profile = found.contact and found.contact.profile
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
              ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
+             ("structure.file", found.structure and found.structure.file),
              ("measured.file", found.measured and found.measured.file)]
     return [(key, file) for key, file in named if file]
 

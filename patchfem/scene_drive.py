@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from patchfem.scene_structure import drives_mass
+
 if TYPE_CHECKING:
     from patchfem.scene_rules import Draft
 
@@ -63,8 +65,12 @@ def _size(draft: Draft, drive: Any) -> None:
             draft.lacks("drive.acceleration", "or drive.displacement instead")
     if drive.kind == "force" and sized and not draft.given("drive.force"):
         draft.lacks("drive.force", "kind 'force' needs it")
-    if drive.kind == "free" and not displacement and not draft.given("structure.start"):
-        draft.lacks("drive.displacement", "kind 'free' needs it: released from there")
+    begins = draft.given("structure.start")
+    if drive.kind == "free" and not displacement and not begins:
+        draft.lacks("drive.displacement", "kind 'free' needs it: released from there; or [structure.start]")
+    if drive.kind == "free" and displacement and begins:
+        draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
+    drives_mass(draft)
     for key in drive_unused(drive):
         if draft.given(f"drive.{key}"):
             draft.remark(f"drive.{key} has no meaning for kind '{drive.kind}' and is not used")

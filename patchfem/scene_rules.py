@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from patchfem.scene_built import NOT_YET_BUILT
 from patchfem.scene_drive import check_drive, check_length
 from patchfem.scene_friction import check_spread, remark_temperature
+from patchfem.scene_structure import check_structure
 from patchfem.scene_tables import Friction, Tables
 from patchfem.scene_types import keys
 
@@ -55,7 +56,7 @@ class Draft(Protocol):
 
 def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (_contact, _load_line, _normal, _frictions, _slide, _structure, check_drive):
+    for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive):
         rule(draft)
     kind = _kind(draft)
     for rule in (_method, _quadrature, _sliding, check_length):
@@ -214,39 +215,6 @@ def _ageless(law: Friction) -> bool:
     return law.law in ageless or (law.law == "nonlocal" and law.rest_growth is None)
 
 
-def _structure(draft: Draft) -> None:
-    structure = draft.tables.structure
-    if structure is None:
-        return
-    forms = [key for key in ("mode", "masses", "file") if draft.given(f"structure.{key}")]
-    if len(forms) > 1:
-        draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
-    if not forms:
-        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted")
-    if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
-        draft.lacks("structure.moving_mass", "")
-    if "masses" not in forms:
-        for key in ("spring", "damper", "interface", "output_mass"):
-            if draft.given(f"structure.{key}"):
-                draft.lacks("structure.masses", f"structure.{key} needs them")
-    _modes(draft)
-
-
-def _modes(draft: Draft) -> None:
-    modes = draft.tables.structure.mode or ()
-    names: set[str] = set()
-    for index, mode in enumerate(modes):
-        if mode.name is not None and mode.name in names:
-            draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
-        names.add(mode.name)
-    bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
-             for index, mode in enumerate(modes)]  # fmt: skip
-    squares = [(base or 0.0) * (base or 0.0) for base in bases]
-    if sum(squares) > 1 + 1e-9:
-        at = f"structure.mode.{squares.index(max(squares))}"
-        key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
-        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is wanted (base is the share of "
-                       "the base motion; the first mode's is its slide unless given)")  # fmt: skip
 
 
 def _kind(draft: Draft) -> str:
@@ -283,6 +251,9 @@ def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[st
     if friction and "friction" not in has:
         others = ", ".join(f"[{name}]" for name in sorted(has))
         draft.lacks_table("friction", f"{others} without it are no kind of run")
+    if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
+        draft.lacks("structure.interface", "masses rub at interfaces between two of them: write "
+                                           "[[structure.interface]] with its law and load instead of [friction]")
     if friction and not pressed:
         draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
     if friction and not moves and "slide" not in has:

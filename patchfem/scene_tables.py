@@ -277,8 +277,15 @@ class Interface(Friction):
     load: Force
 
 
+class Start(Table):
+    """Displacements and velocities at t = 0, one per mode or mass."""
+
+    displacement: Annotated[tuple[quantity("length"), ...], Field(min_length=1)] | None = None
+    velocity: Annotated[tuple[quantity("velocity"), ...], Field(min_length=1)] | None = None
+
+
 class Structure(Table):
-    """The rig: modes, or masses with springs, or a file."""
+    """The rig: modes, or masses with springs, or a file; `..._at` name places in a file of measured modes."""
 
     moving_mass: Mass | None = None
     travel: Length | None = None
@@ -291,6 +298,13 @@ class Structure(Table):
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
     file: Text | None = None
+    slide_at: Text | None = None
+    output_at: Text | None = None
+    base_at: Text | None = None
+    force_at: Text | None = None
+    normal_at: Text | None = None
+    pitch_at: Text | None = None
+    start: Start | None = None
 
 
 class Drive(Table):

@@ -126,3 +126,13 @@ def refuse_rest(scene, modes: ModalBasis) -> None:
     if scene.drive.kind != "free" and not np.any(modes.base):
         raise PatchfemError(f"{scene.path}: structure.mode.base: the drive pushes no mode, so nothing moves; give the "
                             "base of a mode")
+
+
+def sinusoidal(drive) -> bool:
+    """Whether a drive ends as a sine: only then do phases and steady cycles mean anything."""
+    return bool(drive.segments) and drive.segments[-1].amplitude != 0
+
+
+def whole(span: float, drive) -> bool:
+    """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
+    return span > drive.period * (1 - 1e-6)

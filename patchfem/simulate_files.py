@@ -122,8 +122,10 @@ def _histories(result: Result) -> tuple:
         out |= dict(zip(LEDGER, r.extra["ledger"])) if "ledger" in r.extra else {}
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
-    modes = [mode.name for mode in result.plan.scene.structure.mode]
-    return out, (modes, r.modal)
+    from .simulate_structure import modes_of, motions
+
+    modes = modes_of(result.plan.scene)
+    return out, (list(modes.names), motions(modes, r.modal))
 
 
 def _write_netcdf(result: Result, path: Path, text: str) -> None:
@@ -134,7 +136,22 @@ def _write_netcdf(result: Result, path: Path, text: str) -> None:
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
     strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
-    write(dataset(histories, modal, fields, x, weight, strips), path, summary_of(result), text, versions())
+    levels = _levels(result.extra["levels"]) if "levels" in result.extra else None
+    write(dataset(histories, modal, fields, x, weight, strips, levels), path, summary_of(result), text, versions())
+
+
+def _levels(levels) -> dict:
+    """Columns of a run in levels: the drive, whether it held, every measure and its error."""
+    from .response.levels import KEPT
+    from .response.measures import UNITS
+
+    out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
+           "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
+    for name in KEPT:
+        if any(name in one.values for one in levels):
+            out[f"level_{name}"] = (UNITS[name], np.array([one.values.get(name, np.nan) for one in levels]))
+            out[f"level_{name}_error"] = (UNITS[name], np.array([one.errors.get(name, np.nan) for one in levels]))
+    return out
 
 
 def report_data(result: Result) -> dict:

@@ -1,126 +1,30 @@
 """From the results of the stages to the arrays of the compiled hub, and the march in pieces of one drive cycle."""
 
 from collections import deque
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .compiled import load_kernels
 from .core import BaseSine, Missing, ModalBasis, Outcome, Response
+from .simulate_models import (
+    ContactModel,
+    coulomb_model,
+    growth_numbers,
+    jenkins_model,
+    list_model,
+    place_model,
+    points_model,
+    rate_model,
+)
 
-RATE = 4  # kind of a force that follows the speed, as in simulate_kernels
+__all__ = ["ContactModel", "MarchResult", "Run", "coulomb_model", "growth_numbers", "jenkins_model", "list_model",
+           "march", "place_model", "points_model", "rate_model", "warm_up"]
+
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ContactModel:
-    """What the hub needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
-
-    kind as in simulate_kernels; limit: friction limit [N]; fields: keyword arrays of simulate_kernels.Contact; follow:
-    pressure stays on the lower piece; length: bond length for the stick criterion [m]; reduction: the JenkinsSet or
-    ShearModes behind the arrays.
-    """
-
-    kind: int
-    limit: float
-    fields: dict
-    follow: bool = False
-    length: float = 0.0
-    reduction: object = None
-
-    def build(self, hub):
-        """(Contact, Work) with arrays of their own."""
-        empty = {name: np.zeros((0, 0)) if name in ("psi", "bonds", "bondlist") else np.zeros(0)
-                 for name in hub.Contact._fields}
-        empty["growth"] = np.append(np.full(5, -1.0), 0.0)
-        arrays = {k: np.array(v, dtype=np.float64, order="C") for k, v in (empty | self.fields).items()}
-        contact = hub.Contact(**arrays)
-        r = contact.kappa.size
-        scale = np.ones(1 + r)
-        if r:
-            scale[1:] = self.limit / np.maximum(contact.psi.T @ (contact.weight * contact.source), 1e-300)
-            scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((contact.psi**2).mean(axis=0)))
-        work = hub.Work(np.zeros(1 + r), np.zeros(1 + r), np.zeros((1 + r, 1 + r)), np.zeros(contact.weight.size),
-                        np.zeros(1 + r), np.zeros(1 + r), scale, np.zeros((2, 1 + r)), np.full(1, self.length))
-        return contact, work
-
-
-def coulomb_model(static: float, kinetic: float) -> ContactModel:
-    """Rigid Coulomb contact with static and kinetic friction force [N]."""
-    return ContactModel(0, static, {"force": [static, kinetic, static]})
-
-
-def rate_model(limit: float, speed: float) -> ContactModel:
-    """Friction limit*tanh(v/speed) of eq. 2.4, limit [N], speed v_0 [m/s]."""
-    return ContactModel(RATE, limit, {"force": [limit, speed, limit]})
-
-
-def jenkins_model(stiffness, yield_slide) -> ContactModel:
-    """Parallel Jenkins elements (t,) [N/m], [m]."""
-    limit = float(np.dot(stiffness, yield_slide))
-    fields = {"force": [limit, limit, limit], "stretch": np.zeros(len(stiffness)), "stiffness": stiffness,
-              "limit": yield_slide}
-    return ContactModel(1, limit, fields)
-
-
-def growth_numbers(law) -> np.ndarray:
-    """(a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10, a_s = -1 for a constant bond length, and the breakaway share."""
-    if not law.grows:
-        return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
-    return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length,
-                     law.breakaway])
-
-
-def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
-    """Bond points (stretch reading, p = 1) on nodal areas (m,) [m2] under sigma (m,) [Pa].
-
-    shear: ShearModes of the contact set or None for a rigid slide; pattern: (x, sigma on x) when the pressure stays on
-    the lower piece, `area` and `sigma` then belong to the points of the upper one. ValueError for both together.
-    """
-    if shear is not None and pattern is not None:
-        raise ValueError("shear modes and a pressure that stays on the lower piece cannot be combined")
-    area, sigma = np.asarray(area, float), np.asarray(sigma, float)
-    places = np.zeros(0) if pattern is None else pattern[0]
-    if shear is not None:
-        area, sigma = area[shear.points], sigma[shear.points]
-    bonds = np.zeros((5 if law.breakaway else 4, area.size))
-    bonds[0] = law.initial * sigma
-    limit = law.static * float(area @ sigma)
-    fields = {"force": [limit, limit, limit], "weight": law.static * area / law.length, "bonds": bonds,
-              "source": sigma, "growth": growth_numbers(law)}
-    if shear is not None:
-        fields |= {"psi": shear.shape, "kappa": shear.stiffness, "b": np.zeros(shear.stiffness.size)}
-    if pattern is not None:
-        fields |= {"place": places, "x": pattern[0], "sigma": pattern[1]}
-    return ContactModel(2, limit, fields, pattern is not None, law.length)
-
-
-def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
-    """One shared bond list for a rigid slide: any order, either reading; limit = mu_s N [N].
-
-    reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
-    """
-    from .friction.bond_list import law_numbers, room, share_table
-
-    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bondlist": np.zeros((10, room(law, reach, merge))),
-              "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
-              "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law)}
-    return ContactModel(3, limit, fields, False, law.length)
-
-
-def place_model(law, limit: float, tail: float, nodes: int, width: float, ripe: float) -> ContactModel:
-    """The printed law of order 0, 1 or 2 by sums of exponentials over place; numbers as in friction.place_sum."""
-    from .friction.place_sum import place_sum
-
-    found = place_sum(law, tail, nodes, width, ripe)
-    flagged = found.numbers[:24].copy()
-    flagged[7] = 1.0
-    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bonds": found.cells, "bondlist": found.strips,
-              "now": found.numbers[30:36], "tally": np.zeros(12), "law": flagged, "table": found.numbers,
-              "growth": growth_numbers(law)}
-    return ContactModel(3, limit, fields, False, law.length)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -139,6 +43,20 @@ class MarchResult:
     window_work: float
     cycles_done: float
     message: str = ""
+    marks: tuple = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mark:
+    """The last window of cycles before a mark: its samples, step-mean forces, friction work [J], extremes of the output
+    per cycle (c, 2), the ledger there, and the march as it stood (`after`), to go on from."""
+
+    window: Response
+    step_force: np.ndarray
+    work: float
+    amplitudes: np.ndarray
+    ledger: dict
+    after: object = None
 
 
 def _response(rows, number, dt, modes, drive) -> Response:
@@ -179,12 +97,18 @@ def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -
     run.cycle(0, 0, [])
 
 
+def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None):
+    """A Run at its start."""
+    return _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(), start)
+
+
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
-          start=None) -> MarchResult:
+          start=None, marks=()) -> MarchResult:
     """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
 
-    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle. The outcome is set
+    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers of
+    whole cycles after which a Mark is kept besides. The outcome is set
     for travel and where a step missed its residual or the motion is not finite (not_converged, `message` says what);
     Missing when a bond list overflows.
     """
@@ -192,6 +116,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total, n = round(cycles * steps_per_cycle), modes.omega.size
     last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
+    asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
     size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
     while run.done < total and run.outcome is None:
         final = run.done + size >= total
@@ -204,18 +129,25 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         last.append((first, rows, work))
         extremes.append(_extremes(rows, modes, run.prop.dt))
         phasors.append(_phasor(rows, modes, first, steps_per_cycle))
+        if run.done in asked:
+            found.append(replace(_mark(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
         size = steps_per_cycle
         if progress is not None:
             progress(run.done / total)
     run.check()
-    end = list(last)[-window:]
-    rows, first = _joined(end)
+    end = _mark(run, list(last)[-window:], extremes)
     whole, start = _joined(list(last))
     number = np.concatenate([*kept_at, start + np.arange(len(whole))])
     full = run.response(np.concatenate([*kept, whole]), number)
-    last_rows = run.response(rows, first + np.arange(len(rows)))
-    return MarchResult(full, last_rows, rows[:-1, 2 * n + 4].copy(), np.array(extremes), np.array(phasors), run.book(),
-                       run.outcome, snapshots, sum(work for _, _, work in end), run.done / steps_per_cycle, run.message)
+    return MarchResult(full, end.window, end.step_force, end.amplitudes, np.array(phasors), end.ledger, run.outcome,
+                       snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
+
+
+def _mark(run, cycles, extremes) -> Mark:
+    """The Mark of the cycles (first step, rows, work) that end here."""
+    rows, first = _joined(cycles)
+    return Mark(run.response(rows, first + np.arange(len(rows))), rows[:-1, 2 * run.modes.omega.size + 4].copy(),
+                sum(work for _, _, work in cycles), np.array(extremes), run.book())
 
 
 def _joined(parts) -> tuple:
@@ -240,6 +172,26 @@ class Run:
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
         self.arrays, self.steps = modes_arrays(modes, hub), steps_arrays(self.prop, hub)
         self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+
+    def fork(self, drive):
+        """A copy that goes on by itself, under another drive."""
+        twin = copy(self)
+        twin.drive, twin.periodic = drive, None
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(twin, name, value.copy())
+        twin.contact, twin.work = (type(part)(*(array.copy() for array in part)) for part in (self.contact, self.work))
+        return twin
+
+    def slip_amplitude(self, cycles: int, window: int) -> float:
+        """Half the range of the irreversible slip [m] over the last `window` of `cycles` more cycles."""
+        column, rows = 2 * self.modes.omega.size + 3, deque(maxlen=window)
+        for _ in range(cycles):
+            rows.append(self.cycle(self.prop.steps, 0, [])[1][:, column])
+            if self.outcome is not None:
+                break
+        slip = np.concatenate(rows)
+        return float(slip.max() - slip.min()) / 2
 
     def table(self, count: int) -> tuple:
         """(table, row of the next step) for `count` steps from here."""

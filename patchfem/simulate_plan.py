@@ -117,9 +117,12 @@ def _sizes(scene) -> tuple:
             points = CHOSEN_POINTS
         unknowns |= {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
     if scene.structure is not None:
-        unknowns["modes"] = len(scene.structure.mode)
-        first = scene.structure.mode[0]
-        chain["mode"] = scene.structure.moving_mass * (2 * pi * first.frequency)**2
+        from .simulate_structure import frequencies, mode_stiffness
+
+        unknowns["modes"] = len(frequencies(scene))
+        chain["mode"] = mode_stiffness(scene)
+        if scene.structure.bonded is not None:
+            chain["bonded"] = scene.structure.bonded.stiffness
     holder = contact.holder if contact is not None else None
     chain["holder"] = holder.tangential_stiffness or "rigid" if holder is not None else "rigid"
     if contact is not None and contact.shear is not None:
@@ -182,12 +185,14 @@ def block_shear(contact) -> float:
 
 
 def _rig_cost(scene, per_point, unknowns) -> tuple:
+    from .simulate_interfaces import viewed
     from .simulate_rig import choose, drive_of, list_cost, quadrature_of
 
+    scene = viewed(scene)
     settings = choose(scene, per_point)
     drive = drive_of(scene)
     if settings.engine == "exact":
-        return "exact", int(4 * settings.cycles), 2e-4 * 4 * settings.cycles * len(scene.structure.mode)
+        return "exact", int(4 * settings.cycles), 2e-4 * 4 * settings.cycles * unknowns["modes"]
     steps = int(settings.cycles * settings.steps)
     f, shear = scene.friction, scene.contact is not None and bool(scene.contact.gives_way)
     each = 1e-6
@@ -212,13 +217,14 @@ def _groups(scene, chain) -> dict:
     if scene.kind == "rig":
         from .simulate_drive import largest, omega_of
         from .simulate_rig import drive_of
+        from .simulate_structure import first_frequency, friction_limit, moving_mass
 
-        drive = drive_of(scene)
-        push = scene.structure.moving_mass * largest(drive)
-        out["D"] = f.static * load / push if push > 0 else None
-        ratio = scene.structure.mode[0].frequency * drive.period if scene.drive.frequency else inf
-        out["knee"] = 4 / pi * f.static * load / scene.structure.moving_mass if abs(ratio - 1) < 0.2 else None
-        if f.bond_length:
+        drive, mass, limit = drive_of(scene), moving_mass(scene), friction_limit(scene, load)
+        push = mass * largest(drive)
+        out["D"] = limit / push if push > 0 else None
+        ratio = first_frequency(scene) * drive.period if scene.drive.frequency else inf
+        out["knee"] = 4 / pi * limit / mass if abs(ratio - 1) < 0.2 else None
+        if f is not None and f.bond_length:
             out["drive_amplitude_over_bond_length"] = largest(drive) / omega_of(drive)**2 / f.bond_length
     if scene.kind == "bench" and f.bond_length:
         from .simulate_slide import amplitude
@@ -251,7 +257,7 @@ def _verdict(scene, groups, size: int) -> list:
         part = min(1.0, 1 / sqrt(tilt)) if tilt > 1 else 1.0
         out.append(f"tilt is {tilt:.3g} of the first-opening tilt: " +
                    ("full contact" if tilt <= 1 else f"partial contact, roughly {100 * part:.0f} % or less"))
-    if scene.kind == "rig" and scene.friction.law == "nonlocal":
+    if scene.kind == "rig" and scene.friction is not None and scene.friction.law == "nonlocal":
         from .simulate_rig import LONGEST, choose, drive_of, list_cost, quadrature_of
 
         settings, drive = choose(scene), drive_of(scene)

@@ -7,10 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from . import simulate_drive
-from .core import BaseSine, Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
+from .core import Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
-    circular_mean,
     classify,
     harmonic,
     interface_loop,
@@ -23,10 +22,13 @@ from .response.measures import (
     window_ends,
 )
 from .simulate_acting import acting
-from .simulate_wrench_scene import acts, with_wrench
-from .structure.modes import basis
+from .simulate_interfaces import yaws
+from .simulate_structure import highest_frequency, mode_stiffness
+from .simulate_wrench_scene import acts
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
+COMPARED = ("duhamel", "newmark", "euler")
+COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
 
 
@@ -46,7 +48,8 @@ class Settings:
 @dataclass(frozen=True, eq=False, slots=True)
 class Raw:
     """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
-    error) or (None, None), snapshots."""
+    error) or (None, None), snapshots; levels: of a run in levels, slips: as `simulate_levels.onset` asks;
+    log: events of the exact engine; notes: warnings of the method."""
 
     values: dict
     response: Response
@@ -60,11 +63,17 @@ class Raw:
     model: object = None
     prepare: dict | None = None
     message: str = ""
+    levels: tuple = ()
+    slips: object = None
+    log: object = None
+    notes: tuple = ()
 
 
 def modes_of(scene) -> ModalBasis:
     """Modes of [structure]."""
-    return with_wrench(scene, basis(scene.structure.mode, scene.structure.moving_mass))
+    from .simulate_structure import modes_of
+
+    return modes_of(scene)
 
 
 def drive_of(scene):
@@ -74,7 +83,10 @@ def drive_of(scene):
 
 def start_of(scene, modes: ModalBasis):
     """core.Start of a scene that does not begin at rest, else None."""
-    return None
+    from .simulate_structure import start_of
+
+    start = start_of(scene, modes)
+    return start if start.z.any() or start.v.any() else None
 
 
 def speed_of(scene, drive) -> float:
@@ -92,37 +104,72 @@ def law_of(scene, speed: float) -> Bonds:
 
 def choose(scene, per_point: bool = False) -> Settings:
     """Engine and numerical settings from the scene; PatchfemError for a method that cannot do it."""
-    accuracy, f, contact = scene.accuracy, scene.friction, scene.contact
-    shear = contact.gives_way if contact is not None else ""
-    closed = f is None or (f.law in ("coulomb", "convolution") and not shear and not acts(scene))
+    accuracy, contact = scene.accuracy, scene.contact
     side = "upper"
     if contact is not None:
         from .simulate_plan import shape_side
 
         side = shape_side(contact)
-    if accuracy.method == "exact" and not closed:
-        beside = f" with {shear}" if shear else " under a load that changes" if acts(scene) else ""
-        raise PatchfemError(f"{scene.path}: accuracy.method: no exact solution exists for law '{f.law}'{beside}; use "
-                            "method = \"march\"")
     drive = drive_of(scene)
-    closed = closed and isinstance(drive, BaseSine) and scene.structure.stiffening is None
-    engine = "exact" if closed and accuracy.method != "march" else "march"
-    if engine == "march" and f is not None:
-        _refuse(scene, shear, side)
+    engine = engine_of(scene, drive, side)
     cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
-    fastest = max(simulate_drive.fastest(drive), *(m.frequency * drive.period for m in scene.structure.mode))
+    fastest = max(simulate_drive.fastest(drive), highest_frequency(scene) * drive.period)
     if scene.normal is not None and scene.normal.amplitude:
         fastest = max(fastest, scene.normal.frequency * drive.period)
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
-    if engine == "march" and side == "lower" and accuracy.quadrature not in ("auto", "recursion"):
-        raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{accuracy.quadrature}' with pressure on the lower "
-                            "piece in the rig: not yet built; use \"recursion\" or the upper piece")
+    if engine in COMPARED:
+        steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Settings(engine, steps, cycles, window, accuracy.shear_modes, per_point or side == "lower",
                     frozenset(pinned))
+
+
+def engine_of(scene, drive, side: str) -> str:
+    """"exact" where a closed form exists, else "march", or the method that the scene names."""
+    method, f, contact = scene.accuracy.method, scene.friction, scene.contact
+    shear = contact.gives_way if contact is not None else ""
+    if method in COMPARED:
+        if shear:
+            raise PatchfemError(f"{scene.where('accuracy.method')}: '{method}' takes an interface as a whole, not "
+                                f"{shear}; use method = \"march\"")
+        return method
+    if method == "harmonic":
+        return method
+    why = no_closed_form(scene, drive, shear)
+    if method == "exact" and why:
+        raise PatchfemError(f"{scene.where('accuracy.method')}: no exact solution exists {why}; use method = \"march\"")
+    if not why and method != "march":
+        return "exact"
+    if f is not None:
+        _refuse(scene, shear, side)
+    if side == "lower" and scene.accuracy.quadrature not in ("auto", "recursion"):
+        raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{scene.accuracy.quadrature}' with pressure on the "
+                            "lower piece in the rig: not yet built; use \"recursion\" or the upper piece")
+    return "march"
+
+
+def no_closed_form(scene, drive, shear: str) -> str:
+    """Why a run has no exact solution; empty where it has one."""
+    f, structure = scene.friction, scene.structure
+    laws = [one.law for one in structure.interface] or ([f.law] if f is not None else [])
+    if odd := [law for law in laws if law not in ("coulomb", "convolution")]:
+        return f"for law '{odd[0]}'{f' with {shear}' if shear else ''}"
+    if shear and laws:
+        return f"with {shear}"
+    if acts(scene):
+        return "under a load that changes"
+    if yaws(scene):
+        return "with strips that yaw"
+    if not drive.segments:
+        return f"under a drive of waveform '{scene.drive.waveform}'"
+    if structure.stiffening is not None:
+        return "with [structure.stiffening]"
+    if structure.bonded is not None and structure.bonded.wavelength is not None:
+        return "with structure.bonded.wavelength"
+    return ""
 
 
 def quadrature_of(scene, settings: Settings, drive):
@@ -206,119 +253,78 @@ def contact_model(scene, settings: Settings, patch, drive):
     return hub.points_model(law, [1.0], [load])
 
 
-def with_springs(scene, model, modes: ModalBasis, drive):
-    """The model beside the springs of [structure] that are not linear, or as it is where there are none."""
-    structure = scene.structure
-    interlocked = structure.bonded is not None and structure.bonded.wavelength is not None
-    if structure.stiffening is None and not interlocked:
-        return model
-    from . import simulate_slots as slots
-
-    rows, springs = [modes.slide], []
-    if interlocked:
-        springs.append(slots.interlock(0, structure.bonded.stiffness, structure.bonded.wavelength))
-    if structure.stiffening is not None:
-        springs.append(slots.cubic(len(rows), structure.stiffening.cubic))
-        rows.append(modes.output)
-    size = modes.mass * simulate_drive.omega_of(drive) * simulate_drive.peak_speed(drive, start_of(scene, modes))
-    return slots.SlotsModel(model if model.limit > 0 else None, tuple(springs), np.array(rows), size)
-
-
-def whole(span: float, drive) -> bool:
-    """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
-    return span > drive.period * (1 - 1e-6)
-
-
 def _ledger(ledger) -> dict:
     """Measures of the ledger but for what is stored, which depends on the instant at which the run ends."""
     return {name: value for name, value in ledger_measures(ledger).items() if name != "energy_stored"}
 
 
-def run_exact(scene, settings: Settings, modes, drive, load: float, progress=None,
-              share: float = 1.0) -> Raw:
-    """Closed-form run of a Coulomb scene, or of a structure without friction; share: of mu N that the law keeps."""
-    from .dynamics.histories import simulate
-
-    f = acting(scene).friction
-    static = f.static * load * share if f is not None else 0.0
-    kinetic = f.kinetic * load if f is not None and f.kinetic is not None else static
-    travel = scene.structure.travel or np.inf
-    begin = perf_counter()
-    done = simulate(modes, drive, static, kinetic, settings.cycles, settings.window, travel, progress)
-    last = min(settings.window, len(done.amplitudes))
-    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
-    span = done.window.time[-1] - done.window.time[0]
-    if f is not None:
-        slip = done.window.slip
-        values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
-                   "normal_load": load, **_ledger(np.array([[done.ledger["friction"]], [0.0]])[[0, 1, 0, 1]])}
-        if done.starts.size:
-            values["slip_start_phase"] = circular_mean(done.starts)
-        time, weight, slide, rate, force = done.loop
-        work = float(weight @ (force * rate)) * drive.period / span
-        omega = simulate_drive.omega_of(drive)
-        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, modes.mass * modes.omega[0]**2) if whole(span, drive) else {}
-    else:
-        values.pop("friction_force_peak")
-    stuck = f is not None and done.stick >= span * (1 - 1e-12)
-    outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
-               done.ledger, perf_counter() - begin)
-
-
 def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
     """One march at settings.steps per cycle."""
+    from . import simulate_levels
     from . import simulate_march as hub
+    from .simulate_interfaces import joined, model_of, other_measures
+    from .simulate_march import Mark
 
-    travel = scene.structure.travel or np.inf
+    travel, marks, start = scene.structure.travel or np.inf, simulate_levels.ends(scene), start_of(scene, modes)
     begin = perf_counter()
-    model = with_springs(scene, contact_model(scene, settings, patch, drive), modes, drive)
+    model = model_of(scene, settings, patch, modes, drive, start)
     reduced = perf_counter() - begin
     hub.warm_up(modes, drive, model, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
+    frames = 0 if yaws(scene) else frames  # strips have no common field of shear
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
-                     progress, start_of(scene, modes))
+                     progress, start, marks)
     seconds = perf_counter() - begin
+    done = joined(done, patch) if yaws(scene) else done
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
-    stuck = False
+    held, rubbing = 0.0, None
     if scene.friction is None:
         values.pop("friction_force_peak")
     else:
-        values |= _rubbing(scene, settings, modes, drive, patch, done)
         length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
-        held = 1e-3 * length if model.kind else 1e-300
-        stuck = scene.friction.law != "tanh" and values["slip_amplitude"] < held  # a law of the speed never holds
+        held = 1e-3 * length if model.kind else 1e-15 * simulate_drive.peak_speed(drive) * drive.period
+        held *= scene.friction.law != "tanh"  # a law of the speed never holds
+
+        def rubbing(part):
+            others = {} if yaws(scene) else other_measures(part.window, drive, settings.steps)
+            return _rubbing(scene, settings, modes, drive, patch, part) | others
+
+        whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
+        values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
+    stuck = values.get("slip_amplitude", np.inf) < held
+    levels, slips = (), None
+    if marks:
+        levels = simulate_levels.rows(scene, done.marks, drive, held, rubbing)
+
+        def slips(number, level):
+            other = simulate_levels.drive_with(drive, number + 1, level)
+            run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
+                modes, other, model, settings.steps, travel, start)
+            return run.slip_amplitude(round(marks[0]), settings.window) >= held
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
                steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,
-               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message)
+               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message, levels, slips)
 
 
-def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, done) -> dict:
-    """Measures of the interface of a march."""
-    w, omega = done.window, simulate_drive.omega_of(drive)
-    values = slip_measures(w, drive, settings.steps) | _ledger(done.response.extra["ledger"])
-    if not sinusoidal(drive):
+def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -> dict:
+    """Measures of the interface in a Mark of a march."""
+    w, omega = part.window, simulate_drive.omega_of(drive)
+    values = slip_measures(w, drive, settings.steps)
+    if not simulate_drive.sinusoidal(drive):
         values.pop("slip_start_phase", None)
     values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
     weight = np.full(w.time.size, 1.0)
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
-    work = float(done.window_work) * drive.period / span if span > 0 else 0.0
+    work = part.work * drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
-    if whole(span, drive):
-        values |= interface_loop(w.slide, q, step_harmonic(w.time, done.step_force, omega), work,
-                                 modes.mass * modes.omega[0]**2)
+    if simulate_drive.whole(span, drive):
+        values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,
+                                 mode_stiffness(scene))
     return values
-
-
-def sinusoidal(drive) -> bool:
-    """Whether a drive ends as a sine: only then do phases and steady cycles mean anything."""
-    return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
 
 def list_cost(scene, settings: Settings, drive) -> tuple:

@@ -154,13 +154,16 @@ class SlotRun(Run):
         return out + (super().strained() if self.model.patch is not None else 0.0)
 
     def response(self, rows, number) -> Response:
-        """Histories; `extra` has slides, slide_rates, forces, slips (e, k) of the elements."""
+        """Histories; `extra`: slides, slide_rates, forces, slips (k, i) of the interfaces, spring_forces (k, s)."""
         n, modes = 2 * self.modes.omega.size, self.modes
         out = super().response(rows, number)
         parts = rows[:, n + 10:].reshape(len(rows), len(self.kinds), 4)
         push = -np.einsum("ke,en->kn", parts[:, :, 2], self.rows[self.ports]) / modes.mass
         if self.model.patch is None:
             push += np.outer(out.force, modes.slide) / modes.mass  # of the first element, counted already
-        names = ("slides", "slide_rates", "forces", "slips")
-        extra = out.extra | {name: parts[:, :, k].T for k, name in enumerate(names)}
+        rubs = self.kinds < CUBIC
+        extra = out.extra | {"spring_forces": parts[:, ~rubs, 2]}
+        if rubs.any():
+            names = ("slides", "slide_rates", "forces", "slips")
+            extra |= {name: parts[:, rubs, k] for k, name in enumerate(names)}
         return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)

@@ -23,6 +23,8 @@ from .friction.kernels import (
     jenkins_step,
     loose_mean,
     loose_step,
+    rigid_mean,
+    rigid_step,
 )
 
 COULOMB, JENKINS, POINTS, LIST, RATE = 0, 1, 2, 3, 4
@@ -32,9 +34,9 @@ class Contact(NamedTuple):
     """Memory and numbers of a contact; a kind leaves the arrays it does not use empty.
 
     force: (static or scale, kinetic, bound) [N]; of a rate law (limit [N], v_0 [m/s], limit). Jenkins: stretch,
-    stiffness, limit (t,). Points: weight (m,) = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, and play (5, m)
-    where bonds stretch freely over the share growth[5] of their length; source (m,), shear modes psi (m, r),
-    kappa (r,), b (r,).
+    stiffness, limit (t,), now (3,) = force, energy, mean stretch. Points: weight (m,) = mu_s area/eps_0, bonds (4, m)
+    = m, z, s2, local slide, and play (5, m) where bonds stretch freely over the share growth[5] of their length;
+    source (m,), shear modes psi (m, r), kappa (r,), b (r,).
     List: bondlist (10, capacity), now (6,), tally (12,), law (24,), table (k,) as in friction.bond_kernels, or
     summed over place, as in simulate_list_kernels. growth of eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
@@ -127,6 +129,8 @@ def scalar_force(dq, kind, c, eps, dt):
         return c.force[0] * part, c.force[0] * (1 - part * part) / (dt * c.force[1])
     force, slope = 0.0, 0.0
     weight = c.weight
+    if c.bonds.shape[0] == 4:
+        return rigid_mean(dq, weight, c.bonds, c.source, eps)
     for j in range(weight.size):
         mean, s = point_mean(c, j, dq, eps)
         force += weight[j] * mean
@@ -200,7 +204,8 @@ def residual(y, free, beta, c, eps, out, slope):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def hessian(beta, c, slope, hess):
-    """Lower half of the Hessian (1 + r, 1 + r) at the slopes of the points; beta = 0: the slide is given."""
+    """Hessian (1 + r, 1 + r) at the slopes of the points, whole rows of modes (they vectorise), the lower half of the
+    rest; beta = 0: the slide is given."""
     psi, kappa = c.psi, c.kappa
     r = kappa.size
     hess[:] = 0.0
@@ -210,12 +215,14 @@ def hessian(beta, c, slope, hess):
     for j in range(slope.size):
         if beta > 0:
             hess[0, 0] += slope[j]
+            for l in range(r):
+                hess[0, l + 1] -= slope[j] * psi[j, l]
         for k in range(r):
             sp = slope[j] * psi[j, k]
-            if beta > 0:
-                hess[k + 1, 0] -= sp
-            for l in range(k + 1):
+            for l in range(r):
                 hess[k + 1, l + 1] += sp * psi[j, l]
+    for k in range(r):
+        hess[k + 1, 0] = hess[0, k + 1]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -322,8 +329,12 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     if kind == COULOMB or kind == RATE:
         return force * dq, True
     if kind == JENKINS:
-        return jenkins_step(dq, c.stretch, c.stiffness, c.limit), True
+        return jenkins_step(dq, c.stretch, c.stiffness, c.limit, c.now), True
     weight, bonds, source, psi, b = c.weight, c.bonds, c.source, c.psi, c.b
+    if b.size == 0 and bonds.shape[0] == 4 and not follow:
+        burnt = rigid_step(dq, weight, bonds, source, middle)
+        work.eps[0] = grow(work.eps[0], v0, v1, abs(dq), dt, c.growth)[0]
+        return burnt, True
     burnt = 0.0
     for j in range(weight.size):
         xi = dq
@@ -353,14 +364,7 @@ def contact_state(kind, c, q, held):
     if kind == COULOMB or kind == RATE:
         return held, 0.0, q
     if kind == JENKINS:
-        force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
-        for j in range(c.stretch.size):
-            force += c.stiffness[j] * c.stretch[j]
-            energy += 0.5 * c.stiffness[j] * c.stretch[j] ** 2
-            share = c.stiffness[j] * c.limit[j]
-            slip += share * (q - c.stretch[j])
-            total += share
-        return force, energy, slip / total if total > 0 else q
+        return c.now[0], c.now[1], q - c.now[2]
     if kind == LIST:
         force = c.force[0] * c.tally[5]
         return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q

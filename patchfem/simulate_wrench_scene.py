@@ -1,10 +1,9 @@
 """A scene whose contact acts on the modes with its whole wrench, or whose load is prescribed in time."""
 
-from dataclasses import replace
 
 import numpy as np
 
-from .core import ModalBasis, PatchfemError, frozen_array
+from .core import ModalBasis, PatchfemError
 from .simulate_acting import acting
 from .simulate_load import load_at, varies
 
@@ -14,15 +13,6 @@ def acts(scene) -> bool:
     if scene.structure is None or scene.friction is None:
         return False
     return varies(scene) or any(mode.normal or mode.pitch for mode in scene.structure.mode)
-
-
-def with_wrench(scene, modes: ModalBasis) -> ModalBasis:
-    """The basis with the heave and pitch of the scene's modes where it has none yet."""
-    if modes.normal is not None or modes.pitch is not None:
-        return modes
-    normal, pitch = (np.array([getattr(mode, key) for mode in scene.structure.mode]) for key in ("normal", "pitch"))
-    return replace(modes, normal=frozen_array(normal) if normal.any() else None,
-                   pitch=frozen_array(pitch) if pitch.any() else None)
 
 
 def rubbing_of(scene, speed: float):
@@ -57,7 +47,7 @@ def model_of(scene, modes: ModalBasis, patch, speed: float):
     from . import simulate_wrench as wrench
 
     load = None if patch is not None else lambda t: load_at(scene, t)
-    return wrench.wrench_model(with_wrench(scene, modes), rubbing_of(scene, speed), atlas_of(scene, patch), load)
+    return wrench.wrench_model(modes, rubbing_of(scene, speed), atlas_of(scene, patch), load)
 
 
 def frames_of(scene, patch, raw) -> dict:

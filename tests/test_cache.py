@@ -62,8 +62,8 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_march(tmp_path):
     assert (again["amplitude"], again["peak"]) == (first["amplitude"], first["peak"])
 
     law = home / "patchfem" / "friction" / "kernels.py"
-    text, count = re.subn(r"(def jenkins_mean\(.*?\n    return )force, slope\n", r"\g<1>0.8 * force, 0.8 * slope\n",
-                          law.read_text("utf-8"), count=1, flags=re.S)
+    text, count = re.subn(r"(def jenkins_mean\(.*?\n    return )force / dq, 0.5 \* slope",
+                          r"\g<1>0.8 * force / dq, 0.4 * slope", law.read_text("utf-8"), count=1, flags=re.S)
     assert count == 1
     law.write_text(text, "utf-8")
     edited = march(home, cache)

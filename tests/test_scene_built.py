@@ -35,7 +35,6 @@ REFUSED = [
     (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
     (RIG, ["friction.reading=report", LOWER], "contact.tilt.on", "'lower' in a rig with reading 'report'"),
     (RIG, ["friction.order=0.5", LOWER], "contact.tilt.on", "'lower' in a rig with order = 0.5"),
-    (LINEAR, ["accuracy.method=march"], "accuracy.method", "'march' without friction: leave method out"),
 ]
 PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is wanted"),

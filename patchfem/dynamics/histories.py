@@ -1,25 +1,28 @@
-"""Samples, extremes and energies of an event-driven run: closed forms evaluated where they are wanted."""
+"""Samples, extremes and energies of an event-driven run: its series evaluated where they are wanted."""
 
 from dataclasses import dataclass
-from itertools import pairwise
-from math import ceil
+from math import ceil, comb
 
 import numpy as np
 
-from ..core import BaseSine, ModalBasis, Outcome, Response
-from .events import PANEL, WEIGHT, Phase, Signal, combine, run
+from ..core import ModalBasis, Outcome, PatchfemError, Response, Start
+from . import batches
+from .event_list import RELEASE, EventLog
+from .events import Engine
 
 SAMPLES = 400  # per drive cycle in the kept window
+_TOGETHER = 512  # pieces
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventRun:
     """An event-driven run. window: uniform samples of the last cycles and both sides of every event.
 
-    amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its drive-frequency part; ledger: energies [J];
-    events: how many; loop: quadrature arrays (time, weight, slide, rate, force) over the window; stick: time stuck in
-    the window [s]; starts: phases of release; acceleration: largest |absolute acceleration| at the output in the
-    window, both sides of every jump.
+    amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its drive-frequency part; ledger: energies [J]
+    over all interfaces; events: how many stretches between events; loop: quadrature arrays (time, weight, slide, rate,
+    force) over the window; stick: time stuck in the window [s]; starts: phases of release, mod pi; acceleration:
+    largest |absolute acceleration| at the output in the window, both sides of every jump; log: the events. loop, stick
+    and starts are the first interface's; those of all are in Response.extra.
     """
 
     response: Response
@@ -34,202 +37,183 @@ class EventRun:
     starts: np.ndarray
     acceleration: float
     cycles_done: float
+    log: EventLog | None = None
 
 
-def _states(phase: Phase, tau):
-    return (np.stack([s.many(tau) for s in phase.modal], axis=1),
-            np.stack([s.rate().many(tau) for s in phase.modal], axis=1))
+def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: int = 10, travel: float = np.inf,
+             progress=None, start: Start | None = None) -> EventRun:
+    """Run `cycles` drive cycles from rest or `start` with friction forces [N]; keeps the last `window` cycles whole.
 
-
-def _panels(span: float, fastest: float) -> tuple:
-    count = max(1, ceil(span * fastest / 1.5))
-    edges = np.linspace(0, span, count + 1)
-    half = np.diff(edges) / 2
-    tau = (edges[:-1, None] + half[:, None] * (1 + PANEL)).ravel()
-    return tau, (half[:, None] * WEIGHT).ravel()
-
-
-def sample(phases, times, modes: ModalBasis, drive: BaseSine) -> Response:
-    """Response at `times` (k,), ascending; a time on the border of two phases belongs to the later one."""
-    starts = np.array([p.time for p in phases])
-    owner = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(phases) - 1)
-    n = modes.omega.size
-    z, v, force = np.empty((times.size, n)), np.empty((times.size, n)), np.empty(times.size)
-    for k in np.unique(owner):
-        mine = owner == k
-        tau = np.clip(times[mine] - phases[k].time, 0.0, phases[k].span)
-        z[mine], v[mine] = _states(phases[k], tau)
-        force[mine] = phases[k].force.many(tau)
-        if phases[k].direction == 0 and n == 1:
-            v[mine] = 0.0
-    return _response(times, z, v, force, modes, drive)
-
-
-def _response(times, z, v, force, modes, drive) -> Response:
-    base = drive.acceleration * np.sin(drive.omega * times)
-    accel = -np.outer(base, modes.base) - 2 * modes.zeta * modes.omega * v - modes.omega**2 * z \
-        - np.outer(force, modes.slide) / modes.mass
-    slide = z @ modes.slide
-    return Response(times, z, v, slide, v @ modes.slide, z @ modes.output, v @ modes.output,
-                    accel @ modes.output + base, base, force, slide)
-
-
-def _energy(phase: Phase, modes: ModalBasis, drive: BaseSine, fastest: float) -> tuple:
-    tau, weight = _panels(phase.span, fastest)
-    _, v = _states(phase, tau)
-    power = -modes.mass * drive.acceleration * np.sin(phase.theta + drive.omega * tau) * (v @ modes.base)
-    loss = modes.mass * (v**2 @ (2 * modes.zeta * modes.omega))
-    return weight @ power, weight @ loss, weight @ np.abs(power), weight @ (phase.force.many(tau) * (v @ modes.slide))
-
-
-def simulate(modes: ModalBasis, drive: BaseSine, static: float, kinetic: float, cycles: float, window: int = 10,
-             travel: float = np.inf, progress=None) -> EventRun:
-    """Run `cycles` drive cycles from rest with friction forces [N]; keeps the last `window` cycles whole.
-
-    The outcome is set only where the output passes `travel` [m]; the run ends there.
+    static, kinetic: one for every interface or (i,). The outcome is set only where the output passes `travel` [m]; the
+    run ends there. PatchfemError for a drive without closed form.
     """
-    period, duration = drive.period, cycles * drive.period
-    fastest = max(float(modes.omega.max()), drive.omega)
-    recent, corners, extremes, ledger, count, peak = [], [], {}, np.zeros(4), 0, 0.0
-    outcome, end, phasors = None, duration, np.zeros(int(np.ceil(cycles - 1e-9)), complex)
-    for phase in run(modes, drive, static, kinetic, duration):
-        out = combine(phase.modal, modes.output)
-        crossing, turns = _phase_extremes(phase, out, period, fastest, travel, extremes, int(np.ceil(cycles - 1e-9)))
-        if crossing is not None:
-            outcome, end = Outcome.EXCEEDS_TRAVEL, phase.time + crossing
-            phase = Phase(phase.time, phase.theta, crossing, phase.direction, phase.modal, phase.force)
-        ledger += _energy(phase, modes, drive, fastest)
-        _add_phasor(phase, out, period, phasors)
-        peak = max(peak, _stored(phase, modes, 0.0), _stored(phase, modes, phase.span / 2))
-        recent.append(phase)
-        count += 1
-        if len(corners) < 400_000:
-            own = [0.0, *(turns if static == 0 or len(phase.modal) > 1 else [])]
-            corners += [(phase.time + t, [s(t) for s in phase.modal], [s.rate()(t) for s in phase.modal],
-                         phase.force(t)) for t in own if t <= phase.span]
-        while len(recent) > 2 and recent[1].time < phase.time - (window + 1) * period:
-            recent.pop(0)
-        if progress is not None and count % 50 == 0:
-            progress(phase.time / duration)
-        if outcome is not None:
-            break
-    stored = _stored(recent[-1], modes, recent[-1].span)
-    book = dict(zip(("work_in", "viscous", "power", "friction"), map(float, ledger)))
-    book |= {"stored": stored, "peak_stored": max(peak, stored)}
-    return _collect(modes, drive, recent, corners, extremes, phasors, book, outcome, count, window, end)
+    if start is not None and abs(float(modes.output @ start.z)) > travel:
+        raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
+    book = _Book(modes, drive, cycles, window, travel)
+    engine, waiting = Engine(modes, drive, static, kinetic, cycles, start), []
+    book.live = engine.live
+    for piece in engine.pieces():
+        waiting.append(piece)
+        if len(waiting) == _TOGETHER:
+            book.add(batches.gather(waiting))
+            waiting = []
+            if book.outcome is not None:
+                break
+            if progress is not None:
+                progress(piece.time / book.end)
+    if waiting and book.outcome is None:
+        book.add(batches.gather(waiting))
+    return book.close(engine.recorder.log())
 
 
-def _add_phasor(phase, out, period: float, phasors) -> None:
-    """Add the samples of the output on a grid of 64 per cycle to the phasor of their cycle."""
-    first = int(np.ceil(phase.time / period * 64 - 1e-9))
-    number = np.arange(first, int(np.ceil((phase.time + phase.span) / period * 64 - 1e-9)))
-    y = out.many(number * (period / 64) - phase.time)
-    np.add.at(phasors, np.minimum(number // 64, len(phasors) - 1), y * np.exp(-2j * np.pi * number / 64) / 32)
+class _Book:
+    """What is kept while a run goes on."""
 
+    def __init__(self, modes, drive, cycles, window, travel):
+        self.modes, self.drive, self.window, self.travel, self.live = modes, drive, window, travel, ()
+        self.end, self.cycles = cycles * drive.period, max(1, ceil(cycles - 1e-9))
+        self.low, self.high = np.full(self.cycles, np.inf), np.full(self.cycles, -np.inf)
+        self.phasors = np.zeros(self.cycles, complex)
+        self.ledger, self.peak, self.events, self.corners = np.zeros(4), 0.0, 0, 0
+        self.early, self.recent, self.outcome, self.begun = [], [], None, None
 
-def _stored(phase, modes, tau) -> float:
-    z = np.array([s(tau) for s in phase.modal])
-    v = np.array([s.rate()(tau) for s in phase.modal])
-    return float(0.5 * modes.mass * np.sum(v**2 + (modes.omega * z)**2))
+    def add(self, batch) -> None:
+        """Take in the next pieces."""
+        series, share = batch.coefs @ self.modes.output, batch.share
+        piece, u = batches.turning_points(series, share)
+        begin, last = series[:, 0], batches.values_at(series, np.arange(len(batch)), share)
+        turn = batches.values_at(series, piece, u)
+        if max(np.abs(x).max(initial=0.0) for x in (begin, last, turn)) > self.travel:
+            batch, piece, u, turn, begin, last = self._stop(batch, series, piece, u, turn)
+            series = series[:len(batch)]
+        cycle = np.minimum(batch.cycle, self.cycles - 1)
+        for where, value in ((cycle, begin), (cycle, last), (cycle[piece], turn)):
+            np.minimum.at(self.low, where, value)
+            np.maximum.at(self.high, where, value)
+        if self.begun is None:
+            self.begun = float(batches.stored(batch.cut(slice(0, 1)), self.modes, 0.0)[0])
+        self.ledger += batches.energies(batch, self.modes, self.live)
+        self.peak = max(self.peak, *(float(batches.stored(batch, self.modes, s).max()) for s in (0.0, 0.5)))
+        self.events += int(np.count_nonzero(batch.first))
+        self._add_phasor(batch, series)
+        if self.corners < 400_000:
+            self._corners(batch, piece, u)
+        self.recent.append(batch)
+        while len(self.recent) > 1 and self.recent[1].time[0] < batch.time[-1] - (self.window + 1) * self.drive.period:
+            self.recent.pop(0)
 
-
-def _phase_extremes(phase, out, period, fastest, travel, extremes, cycles):
-    """Book the extremes of the output over the phase per cycle. Returns (time in the phase at which |output| passes
-    travel or None, times of the extremes)."""
-    first = min(int(phase.time / period + 1e-12), cycles - 1)
-    last = min(int((phase.time + phase.span) / period - 1e-12), cycles - 1)
-    rate, turns = out.rate(), []
-    for cycle in range(first, max(first, last) + 1):
-        low = max(cycle * period - phase.time, 0.0) if cycle > first else 0.0
-        high = min((cycle + 1) * period - phase.time, phase.span) if cycle < last else phase.span
-        tau, y = _turning(out, rate, low, high, fastest)
-        small, large = extremes.get(cycle, (np.inf, -np.inf))
-        extremes[cycle] = (min(small, float(y.min())), max(large, float(y.max())))
-        turns += sorted({float(tau[np.argmin(y)]), float(tau[np.argmax(y)])})
-        beyond = np.flatnonzero(np.abs(y) > travel)
-        if beyond.size:
-            k = beyond[0]
-            if k == 0:
-                return float(tau[0]), turns
+    def _stop(self, batch, series, piece, u, turn) -> tuple:
+        """Cut the pieces where the output first passes the travel."""
+        every = np.arange(len(batch))
+        order = np.concatenate([every, every, piece])
+        where = np.concatenate([np.zeros(len(batch)), batch.share, u])
+        value = np.concatenate([series[:, 0], batches.values_at(series, every, batch.share), turn])
+        k = order[np.abs(value) > self.travel].min()
+        beyond = np.sort(where[(order == k) & (np.abs(value) > self.travel)])[0]
+        inside = np.sort(where[(order == k) & (np.abs(value) <= self.travel) & (where < beyond)])
+        at = beyond
+        if inside.size:
             from scipy.optimize import brentq
 
-            return float(brentq(lambda t: abs(out(t)) - travel, tau[k - 1], tau[k])), turns
-    return None, turns
+            one = series[k:k + 1]
+            at = brentq(lambda x: abs(batches.values_at(one, [0], np.array([x]))[0]) - self.travel, inside[-1], beyond,
+                        xtol=1e-15)
+        span = at * batch.unit[k]
+        self.outcome, self.end = Outcome.EXCEEDS_TRAVEL, float(batch.time[k] + span)
+        batch = batch.cut(slice(0, k + 1)).ending(span)
+        kept = (piece < k) | ((piece == k) & (u <= at))
+        series = series[:k + 1]
+        return (batch, piece[kept], u[kept], turn[kept], series[:, 0],
+                batches.values_at(series, np.arange(k + 1), batch.share))
+
+    def _add_phasor(self, batch, series) -> None:
+        """Add the samples of the output on a grid of 64 per cycle to the phasor of their cycle."""
+        period = self.drive.period
+        first = ceil(batch.time[0] / period * 64 - 1e-9)
+        stop = batch.time[-1] + batch.span[-1]
+        number = np.arange(first, ceil(stop / period * 64 - 1e-9))
+        times = number * (period / 64)
+        owner = np.clip(np.searchsorted(batch.time, times, side="right") - 1, 0, len(batch) - 1)
+        y = batches.values_at(series, owner, (times - batch.time[owner]) / batch.unit[owner])
+        np.add.at(self.phasors, np.minimum(number // 64, self.cycles - 1), y * np.exp(-2j * np.pi * number / 64) / 32)
+
+    def _corners(self, batch, piece, u) -> None:
+        """States before the window: where events stand, and turning points unless every one of them is an event."""
+        owner, tau = np.flatnonzero(batch.first), np.zeros(np.count_nonzero(batch.first))
+        if len(self.live) == 0 or len(self.modes.omega) > 1:
+            owner = np.concatenate([owner, piece])
+            tau = np.concatenate([tau, u * batch.unit[piece]])
+            order = np.lexsort((tau, owner))
+            owner, tau = owner[order], tau[order]
+        kept = batch.time[owner] + tau < self.end - self.window * self.drive.period
+        owner, tau = owner[kept], tau[kept]
+        if owner.size:
+            self.corners += owner.size
+            self.early.append(batches.at(batch, owner, tau, batch.time[owner] + tau, self.modes, self.drive, self.live))
+
+    def close(self, log: EventLog) -> EventRun:
+        """Everything kept, as an EventRun."""
+        recent, period = batches.join(self.recent), self.drive.period
+        last = recent.cut(slice(len(recent) - 1, len(recent)))
+        stored = float(batches.stored(last, self.modes, 1.0)[0])
+        book = dict(zip(("work_in", "viscous", "power", "friction"), map(float, self.ledger)))
+        book |= {"stored": stored - self.begun, "peak_stored": max(self.peak, stored)}
+        first = max(0.0, self.end - self.window * period)
+        number = max(2, round((self.end - first) / period * SAMPLES) + 1)
+        events = recent.time[recent.first & (recent.time > first) & (recent.time < self.end)]
+        times = np.unique(np.concatenate([np.linspace(first, self.end, number), events,
+                                          np.nextafter(events, -np.inf)]))
+        wide = batches.sample(recent, times, self.modes, self.drive, self.live)
+        early = [_part(r, r.time < first) for r in self.early]
+        full = _chain([*[r for r in early if r.time.size], wide])
+        held = self._inside(recent, first)
+        loop, mine = batches.loop_of(held, self.modes, self.live), bool(len(self.live) and self.live[0] == 0)
+        stick = float(held.span[held.signs[:, 0] == 0].sum()) if mine else 0.0
+        log = log.until(self.end)
+        starts = log.phase[(log.interface == 0) & (np.abs(log.what) == RELEASE) & (log.time > first)] % np.pi
+        done = slice(0, max(1, ceil(self.end / period - 1e-9)))
+        return EventRun(full, wide, np.stack([self.low, self.high], axis=1)[done], self.phasors[done], book,
+                        self.outcome, self.events, loop, stick, starts, self._peak_acceleration(held),
+                        self.end / period, log)
+
+    def _inside(self, recent, first: float):
+        """The pieces of the window, the first one cut at its border."""
+        held = recent.cut((recent.time + recent.span > first) & (recent.time < self.end) & (recent.span > 0))
+        if held.time[0] >= first:
+            return held
+        gone = first - held.time[0]
+        return held if gone < 1e-9 * self.drive.period else _shift(held, gone)
+
+    def _peak_acceleration(self, held) -> float:
+        series = batches.absolute(held, self.modes, self.drive.moving)
+        piece, u = batches.turning_points(series, held.share)
+        every = np.arange(len(held))
+        values = [series[:, 0], batches.values_at(series, every, held.share), batches.values_at(series, piece, u)]
+        return float(max(np.abs(x).max(initial=0.0) for x in values))
 
 
-def _turning(out, rate, low: float, high: float, fastest: float) -> tuple:
-    """Times and values of the output on [low, high], the ends and every turning point among them."""
-    if len(out.terms) == 1 and out.terms[0][0] == 0:
-        tau = np.array([low, high])
-        return tau, out.many(tau)
-    return stationary(out, rate, np.linspace(low, high, max(3, ceil((high - low) * fastest * 6) + 1)))
+def _shift(batch, gone: float):
+    """The first piece of a batch begun `gone` [s] later."""
+    coefs, time, span, theta = (getattr(batch, n).copy() for n in ("coefs", "time", "span", "theta"))
+    x, size = gone / batch.unit[0], batch.coefs.shape[1]
+    move = np.array([[comb(k, j) * x**(k - j) if k >= j else 0.0 for k in range(size)] for j in range(size)])
+    coefs[0] = move @ coefs[0]
+    time[0], span[0], theta[0] = time[0] + gone, span[0] - gone, theta[0] + batch.drive[0, 2] * gone
+    new = {"coefs": coefs, "time": time, "span": span, "theta": theta}
+    return type(batch)(*(new.get(name, getattr(batch, name)) for name in type(batch).__slots__))
 
 
-def stationary(signal, rate, tau, share: float = 0.0) -> tuple:
-    """Times and values of `signal` at tau (k,) and at the zeros of its rate between them (Newton from the secant,
-    kept inside). share: only zeros beside a value of at least this share of the largest are looked for."""
-    y, slope = signal.many(tau), rate.many(tau)
-    size = np.abs(y)
-    turn = np.flatnonzero((slope[:-1] * slope[1:] < 0) & (np.maximum(size[:-1], size[1:]) >= share * size.max()))
-    extra, curve = [], rate.rate()
-    for k in turn:
-        a, b = tau[k], tau[k + 1]
-        t = a - slope[k] * (b - a) / (slope[k + 1] - slope[k])
-        for _ in range(6):
-            bend = curve(t)
-            t = min(max(t - rate(t) / bend, a), b) if bend != 0 else t
-        extra.append(t)
-    if not extra:
-        return tau, y
-    times = np.concatenate([tau, extra])
-    order = np.argsort(times, kind="stable")
-    return times[order], np.concatenate([y, signal.many(np.array(extra))])[order]
+_COLUMNS = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
+            "base_acceleration", "force", "slip")
 
 
-def _collect(modes, drive, recent, corners, extremes, phasors, book, outcome, count, window, end) -> EventRun:
-    period = drive.period
-    first = max(0.0, end - window * period)
-    number = max(2, round((end - first) / period * SAMPLES) + 1)
-    grid = np.linspace(first, end, number)
-    events = np.array([p.time for p in recent if first < p.time < end])
-    before = np.nextafter(events, -np.inf)
-    times = np.unique(np.concatenate([grid, events, before]))
-    wide = sample(recent, times, modes, drive)
-    head = [c for c in corners if c[0] < first]
-    if head:
-        t, z, v, f = (np.array(column) for column in zip(*head))
-        early = _response(t, z, v, f, modes, drive)
-        full = Response(*(np.concatenate([getattr(early, k), getattr(wide, k)]) for k in (
-            "time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
-            "base_acceleration", "force", "slip")))
-    else:
-        full = wide
-    fastest = max(float(modes.omega.max()), drive.omega)
-    pieces, stick, starts, top = [], 0.0, [], 0.0
-    for p in recent:
-        a, b = max(p.time, first), min(p.time + p.span, end)
-        if b <= a:
-            continue
-        tau, weight = _panels(b - a, fastest)
-        tau = tau + a - p.time
-        z, v = _states(p, tau)
-        pieces.append((p.time + tau, weight, z @ modes.slide, v @ modes.slide, p.force.many(tau)))
-        stick += (b - a) if p.direction == 0 else 0.0
-        if p.direction != 0 and a == p.time and a > first:
-            starts.append((p.theta % np.pi, p.time))
-        top = max(top, _peak_acceleration(p, modes, drive, a - p.time, b - p.time, fastest))
-    stops = {b.time for a, b in pairwise(recent) if a.direction == 0 and a.span > 0}
-    released = [theta for theta, time in starts if time in stops]
-    loop = tuple(np.concatenate(column) for column in zip(*pieces))
-    keys = sorted(extremes)
-    return EventRun(full, wide, np.array([extremes[k] for k in keys]), phasors[:len(keys)], book, outcome, count, loop,
-                    stick, np.array(released), top, end / period)
+def _part(response: Response, which) -> Response:
+    return Response(*(getattr(response, name)[which] for name in _COLUMNS),
+                    {name: values[which] for name, values in response.extra.items()})
 
 
-def _peak_acceleration(phase, modes, drive, low: float, high: float, fastest: float) -> float:
-    """Largest |absolute acceleration| of the output between two times of a phase, both ends included."""
-    out = combine(phase.modal, modes.output).rate().rate()
-    lead = -1j * drive.acceleration * np.exp(1j * phase.theta)
-    signal = Signal([*out.terms, (1j * drive.omega, complex(lead), 0.0, 0.0)])
-    tau = np.linspace(low, high, max(5, ceil((high - low) * fastest * 8) + 1))
-    return float(np.abs(stationary(signal, signal.rate(), tau, 0.9)[1]).max())
+def _chain(parts) -> Response:
+    if len(parts) == 1:
+        return parts[0]
+    return Response(*(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS),
+                    {name: np.concatenate([r.extra[name] for r in parts]) for name in parts[0].extra})

@@ -1,6 +1,6 @@
 """Exact one-step propagation of damped modes under any drive and interface forces that are constant over the step.
 
-Everything comes from matrix exponentials of the modes (of all of them at once where damping couples them), so resonance
+Everything comes from the exponentials of the modes (of all of them at once where damping couples them), so resonance
 without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where 3.7 and
 3.9 print i w). What the drive adds in a step and the energies of the step are sums over Gauss points of the step, exact
 to round-off for a drive that is smooth inside it.
@@ -9,7 +9,6 @@ to round-off for a drive that is smooth inside it.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from ..core import ModalBasis
 
@@ -64,7 +63,7 @@ def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Pro
     nodes, weight = dt * (1 + x) / 2, dt * w / 2
     n, coupled = modes.omega.size, modes.damping is not None
     at_end, inside = _flow(modes, np.array([dt])), _flow(modes, nodes)
-    push = _push(modes, dt)
+    push = _push(modes, dt, nodes, weight)
     parts, quadratic = _parts(modes, dt, nodes, weight, inside)
     one = [part[0] for part in at_end]
     if coupled:
@@ -83,30 +82,53 @@ def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Pro
 
 def _flow(modes: ModalBasis, times) -> tuple:
     """Blocks zz, zv, vz, vv of the free motion after `times` (k,): (k, n) each, (k, n, n) where damping couples."""
-    n = modes.omega.size
+    times = np.asarray(times, float)
     if modes.damping is None:
-        a = np.zeros((n, 2, 2))
-        a[:, 0, 1], a[:, 1, 0], a[:, 1, 1] = 1.0, -modes.omega**2, -2 * modes.zeta * modes.omega
-        e = expm(a * np.asarray(times)[:, None, None, None])
-        return e[..., 0, 0], e[..., 0, 1], e[..., 1, 0], e[..., 1, 1]
-    a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), -modes.damping]])
-    e = expm(a * np.asarray(times)[:, None, None])
-    return e[:, :n, :n], e[:, :n, n:], e[:, n:, :n], e[:, n:, n:]
+        return _single(modes.omega, modes.zeta, times[:, None])
+    n, scale = modes.omega.size, max(float(modes.omega.max()), 1 / float(times.max()))
+    # rates over `scale`: all entries of like size
+    a = np.block([[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]])
+    e = _exponentials(a, times)
+    return e[:, :n, :n], e[:, :n, n:] / scale, e[:, n:, :n] * scale, e[:, n:, n:]
 
 
-def _push(modes: ModalBasis, dt: float) -> tuple:
-    """(z, z') after dt per constant modal acceleration: (n,) each, (n, n) where damping couples."""
-    n = modes.omega.size
-    if modes.damping is None:
-        a = np.zeros((n, 3, 3))
-        a[:, 0, 1], a[:, 1, 0], a[:, 1, 1], a[:, 1, 2] = 1.0, -modes.omega**2, -2 * modes.zeta * modes.omega, 1.0
-        e = np.stack([expm(one * dt) for one in a])
-        return e[:, 0, 2], e[:, 1, 2]
-    a = np.zeros((3 * n, 3 * n))
-    a[:n, n:2 * n], a[n:2 * n, 2 * n:] = np.eye(n), np.eye(n)
-    a[n:2 * n, :n], a[n:2 * n, n:2 * n] = -np.diag(modes.omega**2), -modes.damping
-    e = expm(a * dt)
-    return e[:n, 2 * n:], e[n:2 * n, 2 * n:]
+def _single(omega, zeta, t) -> tuple:
+    """zz, zv, vz, vv of single coordinates (n,) after times t (k, 1), in closed form for any damping."""
+    decay, root = zeta * omega, omega * np.sqrt(np.abs(zeta**2 - 1))
+    x = root * t
+    small = x < 1e-3
+    under = np.where(small | (zeta < 1), x, 0.0)
+    over = np.where(~small & (zeta > 1), x, 0.0)
+    sign = np.where(zeta < 1, -1.0, 1.0)
+    square = sign * x * x
+    fade = np.exp(-decay * t)
+    c, s = fade * np.cos(under), fade * np.sinc(under / np.pi)
+    c = np.where(small, fade * (1 + square / 2 * (1 + square / 12)), c)
+    s = np.where(small, fade * (1 + square / 6 * (1 + square / 20)), s)
+    slow, fast = np.exp(-decay * t + over), np.exp(-decay * t - over)
+    c = np.where(over > 0, (slow + fast) / 2, c)
+    s = np.where(over > 0, (slow - fast) / (2 * np.where(over > 0, over, 1.0)), s)
+    zv = t * s
+    return c + decay * zv, zv, -omega**2 * zv, c - decay * zv
+
+
+def _exponentials(a, times) -> np.ndarray:
+    """exp(a t) (k, m, m) for times (k,): Taylor's sum of a scaled matrix, squared back."""
+    top = np.abs(a).sum(axis=1).max() * float(times.max())
+    halvings = max(0, int(np.ceil(np.log2(max(top, 1e-300) / 0.25))))
+    x = a * (times[:, None, None] / 2.0**halvings)
+    out = np.broadcast_to(np.eye(len(a)), x.shape)
+    for k in range(13, 0, -1):
+        out = np.eye(len(a)) + x @ out / k
+    for _ in range(halvings):
+        out = out @ out
+    return out
+
+
+def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
+    """(z, z') after dt per constant modal acceleration: (n,) each, (n, n) where damping couples. The first is the
+    integral of zv: of a short step no difference of large numbers."""
+    return np.tensordot(weight, _flow(modes, nodes)[1], 1), _flow(modes, np.array([dt]))[1][0]
 
 
 def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:

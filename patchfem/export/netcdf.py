@@ -31,11 +31,13 @@ LONG = {
 }
 
 
-def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None) -> xr.Dataset:
+def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None,
+            levels: dict | None = None) -> xr.Dataset:
     """Dataset of a run.
 
     histories: name -> (k,) with "time"; modal: (names, (k, n)) or None; fields: name -> (f, m) with "time", or {};
-    x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a patch in strips.
+    x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a patch in strips; levels: name ->
+    (unit, (l,)) of a run in levels.
     """
     data, coords = {}, {}
     if histories:
@@ -60,6 +62,9 @@ def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | Non
     if strips is not None:
         coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "place of the strip over the width"})
         data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
+    for name, (unit, values) in (levels or {}).items():
+        text = {"level_drive": "acceleration of the base", "level_stuck": "whether the interface held"}
+        data[name] = ("level", values, {"units": unit, "long_name": text.get(name, name.replace("_", " "))})
     return xr.Dataset(data, coords)
 
 

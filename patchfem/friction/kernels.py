@@ -137,30 +137,75 @@ def _primitive(v, floor):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def jenkins_mean(dq, stretch, stiffness, limit):
-    """Path-mean force [N] and slope [N/m] of parallel elements (t,); 1.5 ns per element."""
-    force, slope = 0.0, 0.0
-    for j in range(stretch.size):
-        s0 = stretch[j]
-        s1 = s0 + dq
-        bound = limit[j] if s1 > limit[j] else (-limit[j] if s1 < -limit[j] else s1)
-        if bound == s1:
-            force += stiffness[j] * (s0 + s1) * 0.5
-            slope += stiffness[j] * 0.5
-        else:
-            part = (bound - s0) / dq
-            force += stiffness[j] * (part * (s0 + bound) * 0.5 + (1 - part) * bound)
-            slope += stiffness[j] * 0.5 * part * part
-    return force, slope
+def rigid_mean(dq, weight, bonds, source, eps):
+    """`bond_mean` summed over points (m,) that all slide by dq [m], with their weights: one exponential for all; 0.3 ns
+    per point."""
+    zs, sigmas, ms = 0.0, 0.0, 0.0
+    for j in range(weight.size):
+        zs += weight[j] * bonds[1, j]
+        sigmas += weight[j] * source[j]
+        ms += weight[j] * bonds[0, j]
+    return bond_mean(ms, zs, dq, sigmas, eps)
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def jenkins_step(dq, stretch, stiffness, limit):
-    """Move the elements (t,) in place; returns the energy they dissipate [J]."""
-    burnt = 0.0
+def rigid_step(dq, weight, bonds, source, eps):
+    """`bond_step` of points (m,) that all slide by dq [m], in place; returns the energy they dissipate [J]."""
+    path = abs(dq)
+    g = 1.0 if dq > 0 else -1.0
+    x = path / eps
+    f1, _, e = shape(x)
+    a1 = x * f1
+    a2, a3, a4 = moments(x, e)
+    burnt, far, left, two = 0.0, eps * eps, x * e, 2 * g * eps * a2
+    for j in range(weight.size):
+        m, z, s2, sigma = bonds[0, j], bonds[1, j], bonds[2, j], source[j]
+        young = sigma - m
+        burnt += weight[j] * (s2 * a1 + two * z + far * (m * a3 + sigma * a4))
+        bonds[0, j] = sigma - young * e
+        bonds[1, j] = z * e + g * eps * (sigma * a1 - young * left)
+        bonds[2, j] = e * (s2 + 2 * g * z * path + m * path * path) + sigma * far * a3
+        bonds[3, j] += dq
+    return burnt / 2
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def jenkins_mean(dq, stretch, stiffness, limit):
+    """Path-mean force [N] and slope [N/m] of parallel elements (t,); 0.4 ns per element.
+
+    What an element cannot stretch, `rest`, is exactly zero where it only stretches: no difference of large numbers.
+    """
+    force, slope = 0.0, 0.0
+    if abs(dq) < 1e-290:
+        for j in range(stretch.size):
+            force += stiffness[j] * stretch[j]
+            slope += 0.5 * stiffness[j]
+        return force, slope
+    for j in range(stretch.size):
+        s0 = stretch[j]
+        s1 = s0 + dq
+        bound = min(max(s1, -limit[j]), limit[j])
+        rest = s1 - bound
+        elastic = dq - rest
+        force += stiffness[j] * (elastic * (s0 + bound) * 0.5 + rest * bound)
+        slope += stiffness[j] * elastic * elastic
+    return force / dq, 0.5 * slope / dq / dq
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def jenkins_step(dq, stretch, stiffness, limit, now):
+    """Move the elements (t,) in place; returns the energy they dissipate [J]. now (3,): force [N], stored energy [J]
+    and stretch [m] averaged with stiffness * limit, all after the step."""
+    burnt, force, energy, shared, total = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(stretch.size):
         s1 = stretch[j] + dq
-        bound = limit[j] if s1 > limit[j] else (-limit[j] if s1 < -limit[j] else s1)
-        burnt += stiffness[j] * bound * (s1 - bound)
+        bound = min(max(s1, -limit[j]), limit[j])
+        pull = stiffness[j] * bound
+        burnt += pull * (s1 - bound)
+        force += pull
+        energy += pull * bound
+        shared += limit[j] * pull
+        total += limit[j] * stiffness[j]
         stretch[j] = bound
+    now[0], now[1], now[2] = force, 0.5 * energy, shared / total if total > 0 else 0.0
     return burnt

@@ -13,6 +13,7 @@ UNITS = {
     "equivalent_stiffness": "N m-1", "equivalent_damping": "1", "energy_balance": "1", "drift_per_cycle": "m",
     "normal_load": "N", "friction_ratio_end": "1", "friction_ratio_peak": "1",
     "friction_work": "J", "energy_stored": "J", "energy_dissipated": "J", "energy_created": "J",
+    "onset_level": "m s-2", "jump_level": "m s-2", "level_hysteresis": "m",
 }
 FLOORS = {
     "relative_displacement_amplitude": 1e-10, "absolute_acceleration_peak": 1e-4, "slip_amplitude": 1e-10,

@@ -7,10 +7,16 @@ import numpy as np
 
 from ..core import ModalBasis, frozen_array
 
+PATCH = ("normal", "pitch", "lateral", "yaw")  # motions of the patch beside its slide
+
 
 def basis(modes, mass: float) -> ModalBasis:
-    """ModalBasis of objects with name, frequency [Hz], damping, slide, base, output; `mass` [kg] is each modal mass."""
+    """ModalBasis of objects with name, frequency [Hz], damping, slide, base, output, normal, pitch, lateral, yaw.
+
+    mass [kg] is each modal mass; a motion of the patch that no mode has is None.
+    """
     column = {key: frozen_array([getattr(mode, key) for mode in modes])
-              for key in ("frequency", "damping", "slide", "base", "output")}
+              for key in ("frequency", "damping", "slide", "base", "output", *PATCH)}
+    moved = {key: column[key] if column[key].any() else None for key in PATCH}
     return ModalBasis(tuple(mode.name for mode in modes), frozen_array(2 * np.pi * column["frequency"]),
-                      column["damping"], column["slide"], column["base"], column["output"], float(mass))
+                      column["damping"], column["slide"], column["base"], column["output"], float(mass), **moved)

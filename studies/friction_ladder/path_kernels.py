@@ -30,10 +30,11 @@ def tanh(path, dt, speed, force):
 
 @njit(error_model="numpy")
 def jenkins(path, stretch, stiffness, limit, force):
+    now = np.zeros(3)
     for i in range(path.size - 1):
         dq = path[i + 1] - path[i]
         force[i] = jenkins_mean(dq, stretch, stiffness, limit)[0]
-        jenkins_step(dq, stretch, stiffness, limit)
+        jenkins_step(dq, stretch, stiffness, limit, now)
 
 
 @njit(error_model="numpy")

@@ -6,14 +6,12 @@ from math import asin, cos, pi, sin, sqrt
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from patchfem import closed_forms
 from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError
-from patchfem.dynamics.events import Signal, combine, first_root, run
+from patchfem.dynamics.events import combine, run
 from patchfem.dynamics.histories import simulate
 from patchfem.response.measures import energy_balance
 
@@ -374,62 +372,3 @@ def test_refuses_friction_that_moves_nothing():
         simulate(modes_of(W, 0.003, (0.0,), (1.0,), (1.0,)), BaseSine(5 * G_N, W), 1.0, 1.0, 2)
 
 
-# the first root
-
-def sampled_root(signals, limit, count=20_001):
-    """First root by dense samples and brentq; inf where no sample is negative."""
-    t = np.linspace(0, limit, count)
-    out = np.inf
-    for f in signals:
-        below = np.flatnonzero(f.many(t[1:]) <= 0)
-        if below.size:
-            k = below[0] + 1
-            low = t[k - 1] if f(t[k - 1]) > 0 else t[k - 1] + 1e-9 * limit
-            out = min(out, brentq(f, low, t[k], xtol=1e-15) if f(low) > 0 else t[k])
-    return out
-
-
-RATE = st.tuples(st.floats(-0.6, 0.0), st.floats(0.0, 5.0))
-TERM = st.tuples(RATE, st.floats(-2, 2), st.floats(-2, 2), st.floats(-0.5, 0.5))
-
-
-@settings(max_examples=100, deadline=None)
-@given(st.lists(TERM, min_size=1, max_size=4), st.floats(0.05, 3.0), st.floats(1.0, 25.0))
-def test_always_first_root_against_samples(terms, start, limit):
-    parts = [(complex(*rate), complex(a, b), complex(c), 0.0) for rate, a, b, c in terms]
-    lift = start - Signal(parts)(0.0)
-    f = Signal([*parts, (0j, lift, 0.0, 0.0)])
-    g = Signal([(0j, start, 0.0, 0.0), *f.rate().scaled(0.3), (0j, -0.3 * f.rate()(0.0), 0.0, 0.0)])
-    wanted = sampled_root((f, g), limit)
-    found = first_root((f, g), limit, 0.3)
-    if found < wanted - 1e-7 * limit:  # a dip between two samples: it must be a true root
-        assert min(f(found), g(found)) < 1e-9
-        assume(False)
-    if np.isinf(wanted):
-        assert np.isinf(found) or found > limit * (1 - 1e-9)
-    else:
-        assert found == pytest.approx(wanted, abs=1e-7 * limit)
-        assert min(abs(f(found)), abs(g(found))) < 1e-7
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.floats(1e-11, 1e-2), st.floats(0.3, 20.0), st.booleans())
-def test_always_grazing_is_decided(depth, rate, touches):
-    """1 + cos(rate t) + or - depth: the dip reaches zero or passes just above it."""
-    f = Signal([(1j * rate, 1.0, 0.0, 0.0), (0j, 1.0 - depth if touches else 1.0 + depth, 0.0, 0.0)])
-    found = first_root((f,), 1.9 * pi / rate, 0.25 * 2 * pi / rate)
-    if touches:
-        exact = (pi - 2 * asin(sqrt(depth / 2))) / rate
-        assert found == pytest.approx(exact, rel=1e-13 / sqrt(depth) + 1e-13)
-    else:
-        assert found == np.inf
-
-
-def test_exact_root_at_the_start_is_left_alone():
-    """A velocity that starts at zero with a positive first, second or third derivative is followed to its next zero."""
-    for power in (1, 2, 3):
-        terms = {1: [(1j, -1j, 0, 0)], 2: [(0j, 1, 0, 0), (1j, -1, 0, 0)], 3: [(0j, 0, 1, 0), (1j, 1j, 0, 0)]}[power]
-        f = Signal([tuple(map(complex, t)) for t in terms])
-        found = first_root((f,), 6.5, 0.5)
-        assert found == (pytest.approx(pi, rel=1e-13) if power == 1 else pytest.approx(2 * pi, abs=1e-6)
-                         if power == 2 else np.inf)

@@ -80,7 +80,7 @@ def jenkins_numpy(dq, stretch, stiffness, limit):
 def test_exact_jenkins_is_a_clip(seed):
     rng = np.random.default_rng(seed)
     stiffness, limit = rng.uniform(0.1, 3, 30), rng.uniform(0.05, 2, 30)
-    stretch = np.zeros(30)
+    stretch, now = np.zeros(30), np.zeros(3)
     for dq in rng.normal(0, 1, 60) * 10.0**rng.uniform(-3, 1, 60):
         want, new, loss = jenkins_numpy(dq, stretch, stiffness, limit)
         force, slope = kernels.jenkins_mean(dq, stretch, stiffness, limit)
@@ -88,9 +88,35 @@ def test_exact_jenkins_is_a_clip(seed):
         ahead, behind = (jenkins_numpy(dq + s * h, stretch, stiffness, limit)[0] for s in (1, -1))
         assert force == pytest.approx(want, abs=1e-12)
         assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
-        burnt = kernels.jenkins_step(dq, stretch, stiffness, limit)
+        burnt = kernels.jenkins_step(dq, stretch, stiffness, limit, now)
+        share = stiffness * limit
+        assert now == pytest.approx([stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12)
         assert stretch == pytest.approx(new, abs=1e-15) and burnt == pytest.approx(loss, abs=1e-11)
         assert burnt >= -1e-15
+
+
+def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
+    """No difference of large numbers: a step of 1e-12 of the stretch, elastic, has its force to 1e-15 of itself."""
+    stiffness, limit, stretch = np.full(4, 3.0), np.full(4, 1.0), np.array([0.3, -0.7, 0.9, 0.1])
+    for dq in (1e-12, -1e-13, 1e-300, 0.0):
+        force, slope = kernels.jenkins_mean(dq, stretch, stiffness, limit)
+        assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(6.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("eps", [1.0, 0.02])
+def test_exact_rigid_points_are_single_points_together(eps):
+    rng = np.random.default_rng(5)
+    weight, sigma = rng.uniform(0.1, 2, 7), rng.uniform(0, 3, 7)
+    bonds = np.concatenate([np.stack([0.6 * sigma, 0.2 * sigma, 0.3 * sigma]), np.zeros((1, 7))])
+    for dq in (0.3, -0.01, -2.0, 0.0):
+        single = [kernels.bond_mean(*bonds[:2, j], dq, sigma[j], eps) for j in range(7)]
+        want = weight @ np.array(single)
+        assert kernels.rigid_mean(dq, weight, bonds, sigma, eps) == pytest.approx(want, rel=1e-13, abs=1e-15)
+        moved = np.array([kernels.bond_step(*bonds[:3, j], dq, sigma[j], eps) for j in range(7)])
+        slide = bonds[3] + dq
+        assert kernels.rigid_step(dq, weight, bonds, sigma, eps) == pytest.approx(weight @ moved[:, 3] / 2, abs=1e-14)
+        assert bonds[:3].T == pytest.approx(moved[:, :3], rel=1e-13, abs=1e-15)
+        assert bonds[3] == pytest.approx(slide)
 
 
 def test_exact_gauss_nodes_of_the_kernels():

@@ -1,0 +1,21 @@
+"""Compiled periodic motion of one mode with one Coulomb interface: the arithmetic of `orbit_kernels`."""
+
+import numpy as np
+from numba import njit
+
+from . import orbit_kernels as plain
+from .event_kernels import COMPILED, compiled_copy
+
+INNER = ("impulse", "flow", "newton", "sliding_guess", "settle", "report", "recurrence")
+SCOPE = compiled_copy(plain, INNER, ("point",), COMPILED)
+point = SCOPE["point"]
+
+
+@njit(error_model="numpy", cache=True)
+def points(table, patience, found, phases):
+    """Steady motion of many cases. table (n, 8): w, decay, static, kinetic, B, om and z, v at phase 0, forces over the
+    mass; found (n, 12) and phases (n, 16) as in `point`."""
+    out = np.empty(24)
+    for n in range(table.shape[0]):
+        w, decay, static, kinetic, b, om, z, v = table[n]
+        point(w, decay, static, kinetic, b, om, z, v, patience, out, phases[n], found[n])

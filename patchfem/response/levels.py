@@ -1,0 +1,55 @@
+"""Measures of a run whose level is raised or lowered in steps: onset of slip, jump, hysteresis."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "stick_fraction",
+        "friction_force_peak", "loop_area", "equivalent_stiffness", "equivalent_damping")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Level:
+    """The end of one level: drive [m s-2], whether nothing slipped, whether the last two windows agree, measures by
+    name and, where known, their errors."""
+
+    drive: float
+    stuck: bool
+    values: dict
+    errors: dict
+
+
+def bracket(levels) -> tuple | None:
+    """(number of the last level that still held, of the first that slips) on the way up; -1 for the start; None where
+    none slips."""
+    for k, level in enumerate(levels):
+        if not level.stuck:
+            return k - 1, k
+        if k + 1 < len(levels) and levels[k + 1].drive < level.drive:
+            return None
+    return None
+
+
+def jump(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
+    """(drive of the level after it, factor) of the largest growth of a measure between neighbouring levels, over what
+    the drive itself grew; None with fewer than two levels that move."""
+    found = []
+    for a, b in pairwise(levels):
+        if min(a.drive, b.drive, a.values[name], b.values[name]) > 0 and not (a.stuck or b.stuck):
+            factor = (b.values[name] / a.values[name]) / (b.drive / a.drive)
+            found.append((abs(np.log(factor)), b.drive, factor))
+    return max(found)[1:] if found else None
+
+
+def hysteresis(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
+    """(largest difference of a measure at one drive passed upwards and downwards, its error); None where no drive is
+    passed both ways."""
+    drives = np.array([level.drive for level in levels])
+    top = int(np.argmax(drives))
+    back = {round(level.drive, 9): level for level in levels[top + 1:]}
+    pairs = [(level, back[round(level.drive, 9)]) for level in levels[:top] if round(level.drive, 9) in back]
+    if not pairs:
+        return None
+    gaps = [(abs(a.values[name] - b.values[name]), a.errors.get(name, 0.0) + b.errors.get(name, 0.0)) for a, b in pairs]
+    return max(gaps)

@@ -1,0 +1,181 @@
+"""A coupled run from its plan to its result: engine, errors by coarser runs, levels, frames of the interface."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .core import Outcome
+from .simulate_result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
+
+
+def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
+    """Run a plan of kind rig or linear; arguments as `simulate.run` has them, patch and coarse of its [contact]."""
+    from . import simulate_rig as rig
+    from .response.errors import change, with_errors
+    from .simulate_interfaces import viewed
+    from .simulate_structure import notes_of
+
+    scene = viewed(what.scene)
+    settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
+    warnings = [*warnings, *notes_of(scene)]
+    extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
+    lumps = scene.friction is not None and scene.friction.law != "convolution"
+    moves = rig.acts(scene) or rig.yaws(scene)
+    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not moves:
+        warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
+                    "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
+    if settings.engine == "exact":
+        from .simulate_exact import run_exact
+
+        load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
+        share, rough = _shares(scene, patch, coarse[0] if estimate else None)
+        raw = run_exact(scene, settings, modes, drive, load, rig.start_of(scene, modes), progress, share, say)
+        seconds["march"] = raw.seconds
+        errors = []
+        if rough is not None:
+            other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, None, rough)
+            errors, seconds["error"] = [change(raw.values, other.values)], other.seconds
+        found = with_errors(raw.values, *errors, least=1e-9)
+    elif settings.engine == "harmonic":
+        from .simulate_steady import curve_measures, steady
+
+        load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
+        raw, errors, more = steady(scene, settings, modes, drive, patch, load, say)
+        seconds["march"] = raw.seconds
+        found, extra = with_errors(raw.values, errors) | curve_measures(more), extra | more
+    else:
+        rig.refuse_costly(scene, settings, drive)
+        raw, settings, found = _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress,
+                                        estimate)
+        extra |= {"steps_per_cycle": settings.steps, "iterations": raw.book["iterations"]}
+    if raw.levels:
+        from . import simulate_levels as levels
+
+        lowest = levels.onset(scene, raw.levels, raw.slips, scene.accuracy.tolerance)
+        found, extra = found | levels.measures(raw.levels, lowest), extra | {"levels": raw.levels}
+    estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
+    outcome, found = rig.settle(raw, without_errors(found, estimated), scene.accuracy.tolerance)
+    fields = {}
+    if patch is not None:
+        from .simulate_measures import measures
+
+        found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
+        fields = _rig_fields(scene, settings, patch, raw, drive)
+    extra["book"] = raw.book
+    warnings = [*warnings, *warming(scene, patch, raw.response, raw.book["friction"])]
+    if scene.friction is not None and scene.friction.law == "tanh":
+        warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
+                    f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
+    if scene.friction is not None and scene.friction.law == "nonlocal":
+        law = rig.law_of(scene, rig.speed_of(scene, drive))
+        warnings = [*warnings, *unripe(law, float(np.abs(raw.window.slide_rate).max())),
+                    *creeping(law, outcome, found)]
+    warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
+    warnings = [*warnings, *raw.notes, *([raw.message] if raw.message else [])]
+    return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
+
+
+def _shares(scene, patch, coarse) -> tuple:
+    """Shares of mu N that limit a rigid block, on the mesh of the patch and on the coarser one, None where it is 1."""
+    if scene.friction is None or scene.friction.law != "convolution":
+        return 1.0, None
+    from .simulate_convolution import limit_share
+
+    return limit_share(scene, patch), None if coarse is None else limit_share(scene, coarse)
+
+
+def _marched(scene, settings, modes, drive, patch, coarse, seconds, warnings, say, progress, estimate) -> tuple:
+    """The march with its error: half and a quarter of the steps, a coarser mesh, fewer shear modes; an automatic step
+    is halved until the error of the displacement is met."""
+    from . import simulate_rig as rig
+    from .response.errors import step_error, with_errors
+
+    frames = FRAMES if patch is not None else 0
+    go = rig.run_march
+    if settings.engine in rig.COMPARED:
+        from .simulate_comparison import run_comparison as go
+    raw = go(scene, settings, modes, drive, patch, frames, say, progress)
+    seconds |= {"march": raw.seconds, "reduce": raw.prepare["reduce"], "load": raw.prepare["load"], "error": 0.0}
+    if not estimate or raw.outcome is Outcome.NOT_CONVERGED:
+        return raw, settings, with_errors(raw.values)
+    half, quarter = (go(scene, replace(settings, steps=max(1, settings.steps // k)), modes, drive, patch)
+                     for k in (2, 4))
+    seconds["error"] += half.seconds + quarter.seconds
+    rest = _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds)
+    tolerance = scene.accuracy.tolerance
+    while True:
+        step = step_error(raw.values, half.values, quarter.values, settings.steps)
+        found = with_errors(raw.values, step, *rest, least=1e-9)
+        main = found["relative_displacement_amplitude"]
+        if raw.levels:
+            from .simulate_levels import with_errors as level_errors
+
+            raw = replace(raw, levels=level_errors(raw.levels, half.levels, quarter.levels, settings.steps))
+        met = main.error <= tolerance * abs(main.value) + main.floor
+        again = settings.steps * 2
+        if met or "steps_per_cycle" in settings.pinned or again > rig.MOST_STEPS or again * settings.cycles > 1e7 \
+                or raw.outcome is Outcome.EXCEEDS_TRAVEL:
+            return raw, settings, found
+        half, quarter, settings = raw, half, replace(settings, steps=again)
+        seconds["error"] += raw.seconds
+        raw = go(scene, settings, modes, drive, patch, frames, say, progress)
+        seconds["march"] = raw.seconds
+
+
+def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds) -> list:
+    """Errors of the mesh and of the shear modes, both at a quarter of the steps."""
+    from . import simulate_rig as rig
+    from .response.errors import change
+
+    out = []
+    few = replace(settings, steps=max(1, settings.steps // 4))
+    if coarse[0] is not None and rig.acts(scene):
+        rough = rig.run_march(scene, few, modes, drive, coarse[0])
+        out.append(change(quarter.values, rough.values))
+        seconds["error"] += rough.seconds
+    elif coarse[0] is not None and scene.contact.gives_way:
+        rough = rig.run_march(scene, few, modes, drive, coarse[0])
+        out.append(change(quarter.values, rough.values))
+        seconds["error"] += rough.seconds
+        if scene.friction.law == "nonlocal":
+            kept = quarter.model.reduction.stiffness.size
+            fewer = rig.run_march(scene, replace(few, shear_modes=max(1, kept // 2)), modes, drive, patch)
+            out.append(change(quarter.values, fewer.values))
+            seconds["error"] += fewer.seconds
+    return out
+
+
+def _rig_fields(scene, settings, patch, raw, drive) -> dict:
+    """Interface frames of the last cycle."""
+    from . import simulate_bench as bench
+    from . import simulate_rig as rig
+
+    sigma, f = patch.pressure.sigma_n, scene.friction
+    if rig.acts(scene):
+        from .simulate_wrench_scene import frames_of as wrench_frames
+
+        return wrench_frames(scene, patch, raw)
+    if settings.engine == "exact" or not raw.snapshots:
+        at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // settings.window),
+                         len(raw.window.time) - 1, FRAMES).round().astype(int)
+        tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
+        if f is not None and f.law == "convolution":
+            from .simulate_convolution import limit_tractions
+
+            tau = limit_tractions(scene, patch, raw.window.force[at])
+        slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
+        return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
+    shots = raw.snapshots
+    time = np.array([s["time"] for s in shots])
+    shear = bool(scene.contact.gives_way)
+    if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or settings.per_point):
+        law = rig.law_of(scene, rig.speed_of(scene, drive))
+        tau, local = bench.point_fields(patch, law, raw.model.reduction, [(s["slide"], s["bonds"]) for s in shots])
+    elif shear:
+        length = f.bond_length if f.law == "elastic-plastic" else 0.0
+        states = [(s["slide"], s["stretch"]) for s in shots]
+        tau, local = bench.element_fields(patch, raw.model.reduction, states, length)
+    else:
+        tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
+        local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
+    return frames_of(patch, time, tau, local, np.array([s["slide"] for s in shots]))

@@ -1,0 +1,137 @@
+"""The exact engine under a scene: Coulomb friction from event to event, one mode by its own fast engine."""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from . import simulate_drive, simulate_levels
+from .core import BaseSine, Outcome, Start
+from .response.levels import Level
+from .response.measures import (
+    circular_mean,
+    harmonic,
+    interface_loop,
+    ledger_measures,
+    run_measures,
+    steady_amplitude,
+    window_amplitudes,
+    window_ends,
+)
+from .simulate_interfaces import limits, loads_of, other_measures
+from .simulate_structure import mode_stiffness
+
+
+def run_exact(scene, settings, modes, drive, load: float, start=None, progress=None, share: float = 1.0, say=None):
+    """simulate_rig.Raw of a Coulomb scene, or of a structure without friction; load [N] of [contact] or [normal];
+    share: of mu N that the law keeps."""
+    from .simulate_rig import Raw
+
+    begin, forces = perf_counter(), _forces(scene, modes, load, share)
+    if simulate_levels.ends(scene):
+        done, levels, slips = _levels(scene, settings, modes, drive, forces, start, progress, say)
+    else:
+        done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
+        levels, slips = (), None
+    values, stuck = _values(scene, settings, drive, done, load)
+    outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
+               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
+               done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log)
+
+
+def _forces(scene, modes, load: float, share: float) -> tuple:
+    """(static, kinetic) friction [N] of every interface (i,)."""
+    if scene.friction is None:
+        return (np.zeros(len(modes.interfaces)),) * 2
+    if scene.structure.interface:
+        pairs = [limits(scene, k, n) for k, n in enumerate(loads_of(scene))]
+    else:
+        static, kinetic = limits(scene, 0, load)
+        pairs = [(static * share, kinetic if scene.friction.kinetic is not None else static * share)]
+    return tuple(np.array(column) for column in zip(*pairs))
+
+
+def _go(scene, modes, drive, forces, cycles: float, window: int, start, progress, say):
+    travel = scene.structure.travel or np.inf
+    if modes.omega.size == 1 and len(modes.interfaces) == 1:
+        from .dynamics import sdof
+
+        fast = cycles > sdof.COMPILED_FROM
+        if fast:
+            from .compiled import load
+
+            load("dynamics.event_kernels", say)
+        return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
+                             start, fast)
+    from .dynamics.histories import simulate
+
+    return simulate(modes, drive, *forces, cycles, window, travel, progress, start)
+
+
+def _values(scene, settings, drive, done, load: float) -> tuple:
+    """(measures, whether nothing slipped) of the window of an event-driven run."""
+    last = min(settings.window, len(done.amplitudes))
+    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
+    span = done.window.time[-1] - done.window.time[0]
+    if scene.friction is None:
+        values.pop("friction_force_peak")
+        return values, False
+    slip, lost = done.window.slip, done.ledger["friction"]
+    ledger = ledger_measures(np.array([[lost], [0.0], [lost], [0.0]]))
+    ledger.pop("energy_stored")
+    values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
+               "normal_load": load, **ledger}
+    if done.starts.size and simulate_drive.sinusoidal(drive):
+        values["slip_start_phase"] = circular_mean(done.starts)
+    time, weight, slide, rate, force = done.loop
+    work = float(weight @ (force * rate)) * drive.period / span
+    if simulate_drive.whole(span, drive):
+        omega = simulate_drive.omega_of(drive)
+        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
+        values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
+    values |= other_measures(done.window, drive, 400)
+    others = np.ptp(done.window.extra["slides"], axis=0).any() if "slides" in done.window.extra else False
+    return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tuple:
+    """(EventRun of all levels one after the other, their Levels, slips as `simulate_levels.onset` asks)."""
+    cycles, states, parts, levels = simulate_levels.ends(scene)[0], [start], [], []
+
+    def go(level, state, watch=None):
+        sine = BaseSine(level, simulate_drive.omega_of(drive), drive.moving)
+        return _go(scene, modes, sine, forces, cycles, settings.window, state, watch, say), sine
+
+    for k, level in enumerate(scene.drive.levels):
+        share = None if progress is None else (lambda part, k=k: progress((k + part) / len(scene.drive.levels)))
+        done, sine = go(level, states[-1], share)
+        values, stuck = _values(scene, settings, sine, done, 0.0)
+        kept = {name: values[name] for name in simulate_levels.KEPT if name in values}
+        levels.append(Level(level, stuck, kept, {name: 1e-9 * abs(value) for name, value in kept.items()}))
+        parts.append(done)
+        states.append(Start(done.response.modal[-1], done.response.modal_rate[-1]))
+        if done.outcome is not None:
+            break
+
+    def slips(number, level):
+        return not _values(scene, settings, *go(level, states[number + 1])[::-1], 0.0)[1]
+
+    return _joined(parts, cycles * drive.period), tuple(levels), slips
+
+
+def _joined(parts, each: float):
+    """Runs of `each` [s] one after the other as one EventRun; its window, loop and log are those of the last."""
+    shift = [k * each for k in range(len(parts))]
+    last = parts[-1]
+    columns = {name: np.concatenate([getattr(p.response, name) for p in parts])
+               for name in type(last.response).__dataclass_fields__ if name not in ("time", "extra")}
+    time = np.concatenate([p.response.time + t for p, t in zip(parts, shift)])
+    extra = {name: np.concatenate([p.response.extra[name] for p in parts]) for name in last.response.extra}
+    response = replace(last.response, time=time, extra=extra, **columns)
+    window = replace(last.window, time=last.window.time + shift[-1])
+    ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
+    ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
+    return replace(last, response=response, window=window, ledger=ledger,
+                   amplitudes=np.concatenate([p.amplitudes for p in parts]),
+                   phasors=np.concatenate([p.phasors for p in parts]), events=sum(p.events for p in parts))

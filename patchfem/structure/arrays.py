@@ -1,0 +1,160 @@
+"""The rig from arrays in a .npz or .mat file: matrices M, K, C, or modal data.
+
+Matrices: M, K, optional C (n, n) [kg, N/m, N s/m]; modal: omega (n,) [rad/s] or frequency (n,) [Hz], damping (n,)
+ratios or (n, n) D [1/s], moving_mass [kg]. Both: slide (n,) or (i, n), base (n,) [ones for matrices], output (n,)
+[slide of the first interface], force (n,) [output], normal, pitch, lateral, yaw (n,), names. Names of arrays are taken
+as they stand; other arrays in the file are left alone.
+"""
+
+import numpy as np
+
+from ..core import ModalBasis, PatchfemError, frozen_array
+from . import masses, matrices
+
+PATCH = ("normal", "pitch", "lateral", "yaw")
+KNOWN = ("M", "K", "C", "omega", "frequency", "damping", "moving_mass", "slide", "base", "output", "force", *PATCH,
+         "names")
+
+
+def read(path) -> dict:
+    """Known arrays of a file by name; PatchfemError for a file that cannot be read."""
+    try:
+        if str(path).lower().endswith(".npz"):
+            with np.load(path, allow_pickle=False) as file:
+                return {key: file[key] for key in KNOWN if key in file.files}
+        from scipy.io import loadmat
+
+        found = loadmat(path)
+    except NotImplementedError:
+        raise PatchfemError(f"structure.file: {path} is a version 7.3 .mat file; save it with '-v7'") from None
+    except Exception as error:  # a damaged file raises whatever its reader trips over
+        raise PatchfemError(f"structure.file: {path} cannot be read ({error}); plain arrays are wanted, no objects") \
+            from None
+    return {key: _plain(found[key]) for key in KNOWN if key in found}
+
+
+def _plain(value):
+    """An array of a .mat file without the two dimensions that it always has."""
+    if hasattr(value, "toarray"):
+        return value.toarray()
+    return value if value.ndim == 2 and min(value.shape) > 1 else value.ravel()
+
+
+def basis(data: dict, pairs=(), pushed: int | None = None, forced: bool = False, mass: float | None = None,
+          where: str = "structure.file") -> ModalBasis:
+    """ModalBasis of arrays as `read` gives them.
+
+    pairs: interfaces (i, j) between coordinates of the matrices from 1, 0 the base, instead of `slide`; pushed: the
+    coordinate a force drives instead of `force`; forced: a force drives; mass: moving mass [kg] of modal data.
+    PatchfemError names the array that is missing or wrong.
+    """
+    try:
+        if "M" in data or "K" in data:
+            return _of_matrices(data, pairs, pushed, forced, where)
+        return _of_modes(data, pairs, pushed, forced, mass, where)
+    except PatchfemError as error:
+        text = str(error).removeprefix("structure: ")
+        raise PatchfemError(text if text.startswith(where) else f"{where}: {text}") from None
+
+
+def _lacks(data: dict, what: str, where: str):
+    held = ", ".join(data) or "none that is known here"
+    raise PatchfemError(f"{where}: lacks {what}; it holds {held}")
+
+
+def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
+    for key in ("M", "K"):
+        if key not in data:
+            _lacks(data, f"the matrix {key}", where)
+    M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
+    n = len(M)
+    if pairs and "slide" in data:
+        raise PatchfemError(f"{where}: holds slide, and [[structure.interface]] names interfaces as well: keep one")
+    over = [k for pair in pairs for k in pair if k > n]
+    if over or (pushed or 0) > n:
+        raise PatchfemError(f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, counted from 1")
+    faces = masses.rows(pairs, n) if pairs else data.get("slide")
+    if faces is not None:
+        faces = np.asarray(faces)
+        faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
+    output = data.get("output", faces[0] if faces is not None and len(faces) else None)
+    if output is None:
+        _lacks(data, "output (n,), what the accelerometer feels (or slide)", where)
+    force = None
+    if forced:
+        force = np.eye(n)[pushed - 1] if pushed else data.get("force", output)
+    rows = {key: data.get(key) for key in PATCH}
+    return matrices.basis(M, K, C, faces=faces, output=output, base=data.get("base"), force=force,
+                          names=_names(data, n, where) or tuple(str(k + 1) for k in range(n)), **rows)
+
+
+def _square(data, key, where):
+    value = data.get(key)
+    if value is None or np.ndim(value) == 2:
+        return value
+    if np.size(value) != 1:
+        raise PatchfemError(f"{where}: {key} must be square, not of shape {np.shape(value)}")
+    return np.reshape(value, (1, 1))
+
+
+def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
+    if pairs or pushed:
+        raise PatchfemError(f"{where}: modal data have no numbered masses for [[structure.interface]] or drive.mass; "
+                            "give slide and force in the file")
+    if "omega" not in data and "frequency" not in data:
+        _lacks(data, "M and K, or omega [rad/s] or frequency [Hz] of modes", where)
+    omega = _numbers(data, "omega", where) if "omega" in data else 2 * np.pi * _numbers(data, "frequency", where)
+    n = omega.size
+    for key in ("damping", "slide", *(() if forced else ("base",))):
+        if key not in data:
+            _lacks(data, f"{key} of the modes", where)
+    if mass is None and "moving_mass" in data:
+        mass = float(_numbers(data, "moving_mass", where)[0])
+    if mass is None or not mass > 0:
+        raise PatchfemError(f"{where}: lacks moving_mass > 0, the modal mass [kg]; give it there or in [structure]")
+    if (omega < 0).any():
+        raise PatchfemError(f"{where}: frequencies must be >= 0, not {omega.min():g}")
+    faces = np.atleast_2d(_numbers(data, "slide", where, (n,), (None, n)))
+    damping = _numbers(data, "damping", where, (n,), (n, n))
+    if damping.ndim == 1 and (damping < 0).any():
+        raise PatchfemError(f"{where}: damping must be >= 0, not {damping.min():g}")
+    if damping.ndim == 2 and np.linalg.eigvalsh(damping + damping.T).min() < -1e-9 * np.abs(damping).max():
+        raise PatchfemError(f"{where}: damping feeds energy in; a positive matrix D [1/s] is wanted")
+    zeta, coupled = matrices.split(damping, omega) if damping.ndim == 2 else (frozen_array(damping), None)
+    output = _numbers(data, "output", where, (n,)) if "output" in data else faces[0]
+    base = -(_numbers(data, "force", where, (n,)) if "force" in data else output) if forced \
+        else _numbers(data, "base", where, (n,))
+    if not forced and np.sum(base**2) > 1 + 1e-9:
+        raise PatchfemError(f"{where}: the sum of base^2 over the modes is {np.sum(base**2):.6g}; <= 1 is wanted")
+    moved = {key: frozen_array(_numbers(data, key, where, (n,))) for key in PATCH if key in data and data[key].any()}
+    return ModalBasis(_names(data, n, where) or tuple(f"mode {k + 1}" for k in range(n)), frozen_array(omega), zeta,
+                      frozen_array(faces[0]), frozen_array(base), frozen_array(output), mass, coupled,
+                      frozen_array(faces) if len(faces) > 1 else None, **moved)
+
+
+def _numbers(data, key, where, *shapes) -> np.ndarray:
+    """data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
+    value = np.asarray(data[key])
+    if value.dtype.kind not in "iufb":
+        raise PatchfemError(f"{where}: {key} holds no real numbers")
+    value = value.astype(float)
+    if not shapes:
+        value = value.ravel()
+    elif value.ndim == 1 and shapes[-1] == (1, 1):
+        value = value.reshape(-1)
+    if not np.isfinite(value).all():
+        raise PatchfemError(f"{where}: {key} holds values that are not finite")
+    fits = [s for s in shapes if len(s) == value.ndim and all(a in (None, b) for a, b in zip(s, value.shape))]
+    if shapes and not fits:
+        n = shapes[0][0]
+        raise PatchfemError(f"{where}: {key} has shape {value.shape}, but there are {n} modes")
+    return value
+
+
+def _names(data, n, where):
+    if "names" not in data:
+        return None
+    names = tuple(str(one if isinstance(one, str) else np.asarray(one).ravel()[0]).strip() for one in data["names"])
+    if len(names) != n or len(set(names)) != n:
+        raise PatchfemError(f"{where}: names must be {n} different texts")
+    return names

@@ -1,0 +1,32 @@
+"""Masses in a row or a net, joined by springs and dampers, 0 being the base (report, section 3 and figure 16)."""
+
+import numpy as np
+
+from ..core import ModalBasis
+from . import matrices
+
+
+def rows(pairs, n: int) -> np.ndarray:
+    """Relative displacements x_i - x_j (len(pairs), n) of pairs (i, j) of masses from 1, 0 the base."""
+    out = np.zeros((len(pairs), n))
+    for row, (i, j) in zip(out, pairs):
+        if i:
+            row[i - 1] += 1.0
+        if j:
+            row[j - 1] -= 1.0
+    return out
+
+
+def basis(masses, springs, dampers, interfaces, output: int, pushed: int | None = None) -> ModalBasis:
+    """ModalBasis (mass 1 kg) of masses (n,) [kg] joined by springs and dampers ((i, j), [N/m] or [N s/m]).
+
+    interfaces: pairs (i, j), slide x_i - x_j; output: the mass that is watched; pushed: the one a force drives, None:
+    the base moves them all. A mass that nothing holds has a rigid mode.
+    """
+    n = len(masses)
+    stretch = rows([pair for pair, _ in springs], n) * np.sqrt([[k] for _, k in springs] or np.zeros((0, 1)))
+    dash = rows([pair for pair, _ in dampers], n) * np.sqrt([[c] for _, c in dampers] or np.zeros((0, 1)))
+    unit = np.eye(n)
+    return matrices.basis(np.diag(np.asarray(masses, float)), stretch.T @ stretch, dash.T @ dash if len(dash) else None,
+                          faces=rows(interfaces, n) if interfaces else None, output=unit[output - 1],
+                          force=None if pushed is None else unit[pushed - 1], stretch=stretch)

@@ -1,0 +1,175 @@
+"""The rig from its matrices: M x'' + C x' + K x = -M r a(t) + p F(t) - B^T (friction) (report, 3.2-3.3 as corrected).
+
+x are motions relative to the base, r the unit rigid motion that the base gives all of them. The mass-normalised shapes
+Phi (Phi^T M Phi = 1) turn it into z'' + Phi^T C Phi z' + omega^2 z = ...: the print lacks the m^-1/2 beside c, and for
+non-proportional c the modes stay coupled by D = Phi^T C Phi.
+"""
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
+
+from ..core import ModalBasis, PatchfemError, frozen_array
+
+ROUND = 16 * np.finfo(float).eps  # times the size: what the eigenvalues of exact rigid modes come out as
+SKEW = 1e-8  # share of the largest entry by which a symmetric matrix may differ from its transpose
+APART = 1e-11  # relative distance of eigenvalues below which any mix of their shapes is as good
+
+
+def basis(M, K, C=None, *, faces=None, output=None, base=None, force=None, names=None, stretch=None,
+          **rows) -> ModalBasis:
+    """ModalBasis of mass 1 kg from M, K and C (n, n) [kg, N/m, N s/m], C may be None.
+
+    faces (i, n) or (n,): rows that give the slide of each interface (x_i - x_j); None: no interface, and `slide` is the
+    motion of the output. output (n,): what the accelerometer feels, default the first interface. base (n,): unit motion
+    of the base, default ones. force (n,) instead: a force drive acts by these shares, a(t) = F/1 kg. rows: normal,
+    pitch, lateral, yaw (n,).
+    stretch (s, n): rows with K = stretch^T stretch, for springs that are known one by one: soft modes beside stiff
+    links keep all their digits. The coordinates are sorted by frequency; rigid ones have omega exactly 0.
+
+    PatchfemError names a matrix that is not square, finite, symmetric, or M not positive, K or C not positive
+    semidefinite.
+    """
+    M, K = _symmetric(M, "M"), _symmetric(K, "K", np.shape(M))
+    n = len(M)
+    C = None if C is None else _symmetric(C, "C", M.shape)
+    root = _root(M)
+    omega, turned = _modes(root, K, stretch)
+    phi = solve_triangular(root, turned, lower=True, trans="T")
+    D = np.zeros((n, n)) if C is None else _damper(phi, C)
+    phi, D = _unmixed(phi, omega, D)
+    faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_row(faces, n, "slide"))
+    if output is None:
+        output = faces[0] if len(faces) else np.eye(n)[0]
+    output = _row(output, n, "output")
+    sign = _signs(phi, output)
+    phi, D = phi * sign, D * np.outer(sign, sign)
+    share = -phi.T @ _row(force, n, "force") if force is not None else \
+        phi.T @ (M @ (np.ones(n) if base is None else _row(base, n, "base")))
+    moved = {key: frozen_array(_row(row, n, key) @ phi) for key, row in rows.items() if row is not None and np.any(row)}
+    slides, (zeta, damping) = frozen_array(faces @ phi), split(D, omega)
+    return ModalBasis(tuple(names) if names is not None else tuple(str(k + 1) for k in range(n)), frozen_array(omega),
+                      zeta, slides[0] if len(slides) else frozen_array(output @ phi), frozen_array(share),
+                      frozen_array(output @ phi), 1.0, damping, None if len(slides) == 1 else slides,
+                      shapes=frozen_array(phi), **moved)
+
+
+def split(D, omega) -> tuple:
+    """(zeta (n,), damping (n, n) or None) of D (n, n) [1/s]: None where D = diag(2 zeta omega) says it all."""
+    own = np.diag(D)
+    zeta = np.divide(own, 2 * omega, out=np.zeros_like(own), where=omega > 0)
+    alone = not (D - np.diag(own)).any() and not own[omega == 0].any()
+    return frozen_array(zeta), None if alone else frozen_array(D)
+
+
+def decouple(rows) -> tuple:
+    """(omega (n,), V (n, n)) of the stiffness rows^T rows over unit mass, rows (s, n) [1/s], ascending.
+
+    By singular values: omega is right to round-off of the largest omega, not of its square.
+    """
+    rows = np.atleast_2d(rows)
+    n = rows.shape[1]
+    padded = rows if len(rows) >= n else np.vstack([rows, np.zeros((n - len(rows), n))])
+    _, values, V = svd(padded, full_matrices=False)
+    omega = np.where(values <= n * ROUND * values[0], 0.0, values)
+    return omega[::-1], V[::-1].T
+
+
+def trimmed(D, scale) -> np.ndarray:
+    """D (n, n) with entries set to zero that are round-off beside scale (n, n), symmetric."""
+    D = (D + D.T) / 2
+    return np.where(np.abs(D) <= 1e-12 * scale, 0.0, D)
+
+
+def _modes(root, K, stretch) -> tuple:
+    if stretch is not None:
+        return decouple(solve_triangular(root, np.asarray(stretch, float).T, lower=True).T)
+    half = solve_triangular(root, K, lower=True)
+    unit = solve_triangular(root, half.T, lower=True)
+    square, turned = eigh((unit + unit.T) / 2)
+    least = len(K) * ROUND * np.abs(square).max(initial=0.0)
+    if square[0] < -least:
+        raise PatchfemError(f"structure: K is not positive semidefinite: one shape has the stiffness "
+                            f"{square[0]:.3g} 1/s^2 over its mass, {square[0] / square[-1]:.2g} of the largest; give "
+                            "symmetric springs >= 0 and the matrix with all its digits")
+    return np.sqrt(np.where(square <= least, 0.0, square)), turned
+
+
+def _root(M):
+    try:
+        root = cholesky(M, lower=True)
+    except LinAlgError:
+        root = None
+    scale = np.sqrt(np.maximum(np.diag(M), 0.0))
+    if root is None or np.any(np.diag(root) <= np.sqrt(len(M) * ROUND) * scale):
+        bare = np.flatnonzero(np.diag(M) <= 0)
+        which = f" (coordinate {bare[0] + 1} has none)" if bare.size else ""
+        raise PatchfemError(f"structure: M is not positive definite: every coordinate needs mass{which}; condense the "
+                            "others out or give them their mass")
+    return root
+
+
+def _symmetric(matrix, name, shape=None) -> np.ndarray:
+    if hasattr(matrix, "toarray"):
+        matrix = matrix.toarray()
+    try:
+        matrix = np.asarray(matrix, float)
+    except (TypeError, ValueError):
+        raise PatchfemError(f"structure: {name} is no matrix of real numbers") from None
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
+        raise PatchfemError(f"structure: {name} must be square, not of shape {matrix.shape}")
+    if shape is not None and matrix.shape != shape:
+        raise PatchfemError(f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
+                            f"{shape[0]} x {shape[0]}")
+    if not np.isfinite(matrix).all():
+        raise PatchfemError(f"structure: {name} holds values that are not finite")
+    skew, most = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
+    if skew > SKEW * most:
+        raise PatchfemError(f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
+                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms have no modes here")
+    return (matrix + matrix.T) / 2
+
+
+def _damper(phi, C):
+    D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
+    least = eigh(D, eigvals_only=True)
+    if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):
+        raise PatchfemError(f"structure: C feeds energy in: one shape has the damping {least[0]:.3g} 1/s over its "
+                            "mass; dampers >= 0 are wanted")
+    return D
+
+
+def _unmixed(phi, omega, D) -> tuple:
+    """Shapes of equal frequency turned so that D does not couple them."""
+    first = 0
+    for last in range(1, len(omega) + 1):
+        if last < len(omega) and omega[last] - omega[first] <= APART * omega[last]:
+            continue
+        if last - first > 1 and np.abs(D[first:last, first:last]).sum() > np.abs(np.diag(D)[first:last]).sum():
+            turn = np.eye(len(omega))
+            turn[first:last, first:last] = eigh(D[first:last, first:last])[1]
+            size = np.sqrt(np.outer(np.diag(D), np.diag(D)))
+            phi, D = phi @ turn, trimmed(turn.T @ D @ turn, np.maximum(size, size.max()))
+        first = last
+    return phi, D
+
+
+def _row(row, n, name) -> np.ndarray:
+    try:
+        row = np.asarray(row, float)
+    except (TypeError, ValueError):
+        raise PatchfemError(f"structure: {name} holds no real numbers") from None
+    if row.ndim == 2 and 1 in row.shape and name != "slide":
+        row = row.ravel()
+    if row.shape[-1:] != (n,) or row.ndim > (2 if name == "slide" else 1):
+        raise PatchfemError(f"structure: {name} has shape {row.shape}, but M has {n} coordinates")
+    if not np.isfinite(row).all():
+        raise PatchfemError(f"structure: {name} holds values that are not finite")
+    return row
+
+
+def _signs(phi, output) -> np.ndarray:
+    """+-1 per shape: the output moves in its positive sense, or the largest entry does where it is a node."""
+    there = output @ phi
+    largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
+    size = np.abs(output) @ np.abs(phi)
+    return np.where(np.where(np.abs(there) > 1e-9 * size, there, largest) < 0, -1.0, 1.0)

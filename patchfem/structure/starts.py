@@ -1,0 +1,54 @@
+"""Initial conditions in the coordinates of a basis (report, 3.2: z = phi^T m^1/2 x)."""
+
+import numpy as np
+
+from ..core import ModalBasis, PatchfemError, Start, frozen_array
+
+
+def at_rest(basis: ModalBasis) -> Start:
+    """Nothing moved, nothing moving."""
+    zero = frozen_array(np.zeros(basis.omega.size))
+    return Start(zero, zero)
+
+
+def given(basis: ModalBasis, displacement=None, velocity=None) -> Start:
+    """Start of displacements [m] and velocities [m/s] (p,) of the scene's own modes or masses; None: zeros."""
+    return Start(*(frozen_array(_coordinates(basis, values)) for values in (displacement, velocity)))
+
+
+def _coordinates(basis: ModalBasis, values) -> np.ndarray:
+    n = basis.omega.size
+    if values is None:
+        return np.zeros(n)
+    values, own = np.asarray(values, float), n if basis.shapes is None else len(basis.shapes)
+    if values.shape != (own,):
+        raise PatchfemError(f"structure.start: {values.size} values stand for {own} modes or masses; one for each is "
+                            "wanted")
+    if basis.shapes is None:
+        return values
+    return np.linalg.lstsq(basis.shapes, values, rcond=None)[0] if own != n else np.linalg.solve(basis.shapes, values)
+
+
+def released(basis: ModalBasis, displacement: float) -> Start:
+    """At rest with the output moved by `displacement` [m], in the shape that a static force at the output gives.
+
+    One mode: it alone. Several: z_i proportional to output_i / omega_i^2; where rigid modes move the output, a force
+    moves them alone, z_i proportional to output_i. PatchfemError where no mode moves the output.
+    """
+    rigid = (basis.omega == 0) & (basis.output != 0)
+    shape = np.zeros(basis.omega.size)
+    if rigid.any():
+        shape[rigid] = basis.output[rigid]
+    else:
+        moving = basis.omega > 0
+        shape[moving] = basis.output[moving] / basis.omega[moving]**2
+    reach = float(shape @ basis.output)
+    if reach == 0:
+        raise PatchfemError("structure: no mode moves the output, so it cannot be released from a displacement; give "
+                            "[structure.start]")
+    return Start(frozen_array(displacement / reach * shape), frozen_array(np.zeros(shape.size)))
+
+
+def base_step(basis: ModalBasis, displacement: float) -> Start:
+    """The instant after the base has jumped by `displacement` [m]: what it carries stays where it was, z = -X base."""
+    return Start(frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size)))

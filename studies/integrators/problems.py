@@ -1,0 +1,43 @@
+"""The two problems with exact answers: stick-slip at resonance and the two masses of Fig 16."""
+
+from functools import cache
+
+import numpy as np
+
+from patchfem.compiled import load
+from patchfem.core import BaseSine, ModalBasis, frozen_array
+from patchfem.dynamics.events import run
+from patchfem.dynamics.histories import sample
+
+load("dynamics.comparison_kernels")  # compiled loops come from the hashed cache
+
+
+def basis(omega, zeta, slide, base) -> ModalBasis:
+    """Modes of unit mass with one interface."""
+    omega, slide = frozen_array(omega), frozen_array(slide)
+    return ModalBasis(tuple(f"mode {i + 1}" for i in range(omega.size)), omega, frozen_array(zeta), slide,
+                      frozen_array(base), slide, 1.0)
+
+
+HALF = np.sqrt(0.5)
+# a block on its spring, m = k = 1, damping ratio .003, base acceleration sin t, friction .8
+SDOF, SDOF_DRIVE, SDOF_LIMIT = basis([1.0], [0.003], [1.0], [1.0]), BaseSine(1.0, 1.0), 0.8
+PLAIN = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
+# two free masses and a spring, m = k = 1, sin 1.14 t on the first, friction 3 under the second; coordinates: together
+# and against each other
+TWO, TWO_DRIVE, TWO_LIMIT = (basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF]),
+                             BaseSine(1.0, 1.14, False), 3.0)
+
+
+@cache
+def phases(name: str, duration: float) -> list:
+    """Exact phases of "sdof" or "two" from rest."""
+    modes, drive, limit = {"sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT), "two": (TWO, TWO_DRIVE, TWO_LIMIT)}[name]
+    return list(run(modes, drive, limit, limit, duration))
+
+
+def exact(name: str, times):
+    """Exact Response at `times` (k,)."""
+    modes, drive, _ = {"sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT), "two": (TWO, TWO_DRIVE, TWO_LIMIT)}[name]
+    times = np.asarray(times, float)
+    return sample(phases(name, float(np.ceil(times[-1]))), times, modes, drive)

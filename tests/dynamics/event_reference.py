@@ -1,0 +1,124 @@
+"""An independent twin of the exact engine: DOP853 with events and accelerations by trying every choice."""
+
+from itertools import product
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+
+def choose(faces, mass, pull, active, signs, static, kinetic, tol):
+    """Signs of all faces: those in `active` have no slip velocity. pull (n,) without friction."""
+    options = sorted(product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c)))
+    for option in options:
+        trial = np.array(signs)
+        trial[active] = option
+        stuck = np.flatnonzero(trial == 0)
+        known = pull - faces.T @ (np.abs(trial) * trial * kinetic) / mass
+        force = np.zeros(len(faces))
+        if stuck.size:
+            rows = faces[stuck]
+            force[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
+        accel = faces @ (known - faces.T @ force / mass)
+        good = all(abs(force[c]) <= static[c] * (1 + tol) if trial[c] == 0 else trial[c] * accel[c] > -tol * static[c]
+                   for c in active)
+        if good:
+            return trial
+    raise AssertionError("no choice")
+
+
+def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12):
+    """[(time, signs, z, v)] at the start of every stretch and at the end."""
+    faces, mass, n = np.asarray(modes.interfaces), modes.mass, modes.omega.size
+    static, kinetic = (np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic))
+    square, dampers = modes.omega**2, modes.dampers
+    scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
+
+    def accel(part, t):
+        return part.constant + part.amplitude * np.sin(part.omega * (t - part.start) + part.phase)
+
+    def pull(part, t, z, v):
+        return -square * z - dampers @ v - modes.base * accel(part, t)
+
+    def forces_of(signs, part, t, z, v):
+        known = pull(part, t, z, v) - faces.T @ (signs * kinetic) / mass
+        out, stuck = signs * kinetic, np.flatnonzero(signs == 0)
+        if stuck.size:
+            rows = faces[stuck]
+            out = out.astype(float)
+            out[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
+        return out
+
+    t, number, out, y = 0.0, 0, [], np.concatenate([z, v])
+    signs = np.sign(np.where(np.abs(faces @ v) > 1e-13, faces @ v, 0.0)).astype(int)
+    active = list(np.flatnonzero(signs == 0))
+    fastest = max(modes.omega.max(), *(s.omega for s in segments), np.linalg.norm(dampers, 2))
+    while t < end:
+        part = segments[number]
+        stop = min(end, segments[number + 1].start if number + 1 < len(segments) else end)
+        if active:
+            signs = choose(faces, mass, pull(part, t, y[:n], y[n:]), active, signs, static, kinetic, 1e-9)
+        out.append((t, tuple(signs), y[:n].copy(), y[n:].copy()))
+
+        def slope(t, y, signs=signs, part=part):
+            force = forces_of(signs, part, t, y[:n], y[n:])
+            return np.concatenate([y[n:], pull(part, t, y[:n], y[n:]) - faces.T @ force / mass])
+
+        events = []
+        for c, s in enumerate(signs):
+            if s:
+                events.append((lambda t, y, c=c, s=s: s * (faces[c] @ y[n:])))
+            else:
+                for side in (1, -1):
+                    events.append((lambda t, y, c=c, side=side, signs=signs, part=part:
+                                   static[c] - side * forces_of(signs, part, t, y[:n], y[n:])[c]))
+        for f in events:
+            f.terminal, f.direction = True, -1
+        done = solve_ivp(slope, (t, stop), y, "DOP853", events=events, rtol=rtol, atol=1e-15 * scale / fastest**2,
+                         max_step=0.1 / fastest)
+        t, y = done.t[-1], done.y[:, -1].copy()
+        active = list(np.flatnonzero(signs == 0))
+        if done.status == 0:
+            number += t >= stop and number + 1 < len(segments)
+            continue
+        k = next(i for i, hit in enumerate(done.t_events) if hit.size)
+        names = [(c, side) for c, s in enumerate(signs) for side in ((0,) if s else (1, -1))]
+        face, side = names[k]
+        force = forces_of(signs, part, t, y[:n], y[n:])
+        if side == 0:
+            active = sorted({*active, face})
+        speed, size = faces @ y[n:], np.abs(faces) @ np.abs(y[n:])
+        active = sorted({*active, *(c for c, s in enumerate(signs) if s and abs(speed[c]) < 1e-11 * size[c])})
+        rows = faces[active]
+        y[n:] -= np.linalg.pinv(rows) @ (rows @ y[n:])
+        signs = np.array(signs)
+        if side:
+            signs[face] = side
+            active = [c for c in active if c != face]
+            if abs(force[face]) < static[face] * (1 - 1e-9):
+                raise AssertionError("released below its limit")
+    out.append((end, tuple(signs), y[:n].copy(), y[n:].copy()))
+    return out
+
+
+def march_reference(modes, drive, limit, end, z, v, steps):
+    """(time, z) of a Moreau march with theta = 1/2: impulses within +-limit h that leave each face without mean slip
+    or against it, by Gauss-Seidel. static = kinetic = limit (i,)."""
+    faces, n, h = np.asarray(modes.interfaces), modes.omega.size, end / steps
+    left = np.linalg.inv(np.eye(n) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2))
+    gram = faces @ left @ faces.T / modes.mass
+    force, t = np.zeros(len(faces)), h * (np.arange(steps) + 0.5)
+    drives, out = drive.values(t), [z]
+    for k in range(steps):
+        free = left @ (v + h * (-modes.base * drives[k] - modes.omega**2 * (z + h / 4 * v) - modes.dampers @ v / 2))
+        want = faces @ (free + v) / 2
+        for _ in range(200):
+            before = force.copy()
+            for c in range(len(faces)):
+                force[c] = np.clip(force[c] + (want[c] - h / 2 * gram[c] @ force) / (h / 2 * gram[c, c]), -limit[c],
+                                   limit[c])
+            if np.abs(force - before).max() < 1e-13 * limit.max():
+                break
+        new = free - h * left @ (faces.T @ force) / modes.mass
+        z, v = z + h * (v + new) / 2, new
+        out.append(z)
+    return np.linspace(0, end, steps + 1), np.array(out)

@@ -1,0 +1,524 @@
+"""The exact engine for any basis, start, drive and number of interfaces: against DOP853, a Moreau march, closed forms
+and the conservation of energy."""
+
+from math import atan, cos, exp, pi, sin, sqrt
+
+import numpy as np
+import pytest
+from event_reference import march_reference, run_reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
+from patchfem.dynamics import drives
+from patchfem.dynamics.engine import Engine
+from patchfem.dynamics.event_list import BORDER, RELEASE, REVERSAL, STOP
+from patchfem.dynamics.events import combine, run
+from patchfem.dynamics.histories import simulate
+from patchfem.dynamics.stick_sets import Entry, System, settle
+from patchfem.response.measures import energy_balance
+
+
+def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
+    omega = np.atleast_1d(np.asarray(omega, float))
+    n, faces = omega.size, np.atleast_2d(np.asarray(faces, float))
+    base, output = (np.asarray(faces[0] if x is None else x, float) for x in (base, output))
+    return ModalBasis(tuple(f"m{k}" for k in range(n)), omega, np.broadcast_to(np.asarray(zeta, float), (n,)).copy(),
+                      faces[0], base, output, mass, damping, faces)
+
+
+def random_basis(rng, n, faces, coupled=True, rigid=False):
+    omega, root = rng.uniform(0.3, 3, n), rng.normal(size=(n, n)) * 0.15
+    if rigid:
+        omega[0] = 0.0
+    return basis_of(omega, 0.01, rng.normal(size=(faces, n)), rng.normal(size=n), rng.normal(size=n), 1.3,
+                    root @ root.T + 0.02 * np.eye(n) if coupled else None)
+
+
+def start_of(rng, n):
+    return Start(rng.normal(size=n), rng.normal(size=n))
+
+
+def slides(modes, phase, tau):
+    z = np.array([s.many(tau) for s in phase.modal])
+    return np.asarray(modes.interfaces) @ z
+
+
+# against other integrators
+
+@pytest.mark.parametrize("seed, n, faces, ratio, rigid", [
+    (1, 3, 2, 1.0, False), (2, 3, 2, 0.6, False), (7, 2, 1, 0.8, True), (4, 4, 3, 1.0, True), (6, 4, 3, 0.7, False)])
+def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
+    rng = np.random.default_rng(seed)
+    modes = random_basis(rng, n, faces, True, rigid)
+    static = rng.uniform(0.2, 1.0, faces)
+    drive, begin = BaseSine(1.0, 1.2), start_of(rng, n)
+    wanted = run_reference(modes, drive.segments, static, ratio * static, 6 * drive.period, begin.z, begin.v)
+    found = list(run(modes, drive, static, ratio * static, 6 * drive.period, begin))
+    assert [p.directions for p in found] == [w[1] for w in wanted[:-1]] and len(found) > 10
+    np.testing.assert_allclose([p.time for p in found], [w[0] for w in wanted[:-1]], rtol=0, atol=1e-10)
+    z = [[s(0.0) for s in p.modal] for p in found] + [[s(found[-1].span) for s in found[-1].modal]]
+    np.testing.assert_allclose(z, [w[2] for w in wanted], rtol=0, atol=1e-11)
+
+
+def test_exact_steps_and_sines_in_turn_against_dop853():
+    rng = np.random.default_rng(11)
+    modes, static = random_basis(rng, 3, 2), np.array([0.3, 0.5])
+    drive = drives.Piecewise((Segment(0.0, 0.7), Segment(4.1, 0.0, 2.0, 1.7, 0.4), Segment(9.3), Segment(
+        14.0, -0.2, 1.5, 0.8, 3.0)), 5.0)
+    wanted = run_reference(modes, drive.segments, static, static, 25.0, np.zeros(3), np.zeros(3))
+    found = list(run(modes, drive, static, static, 25.0))
+    times, states = [w[0] for w in wanted], np.array([w[2] for w in wanted])
+    assert len(found) > 12 and set(np.array([4.1, 9.3, 14.0])) <= {round(p.time, 12) for p in found}
+    for t, z in zip(times[:-1], states):
+        k = int(np.argmin([abs(p.time - t) for p in found]))
+        assert abs(found[k].time - t) < 1e-9
+        np.testing.assert_allclose([s(0.0) for s in found[k].modal], z, atol=1e-9)
+    done = simulate(modes, drive, static, static, 5.0, 2)
+    assert energy_balance(done.ledger) < 1e-10
+    assert np.count_nonzero(done.log.what == BORDER) == 3
+
+
+def test_order_dependent_interfaces_against_a_march():
+    """Three interfaces between two coordinates: dependent when stuck together; a march with impulses closes in."""
+    rng = np.random.default_rng(9)
+    modes = random_basis(rng, 2, 3)
+    static, drive, begin = rng.uniform(0.3, 1.0, 3), BaseSine(1.0, 1.2), start_of(rng, 2)
+    done = simulate(modes, drive, static, static, 3, 3, start=begin)
+    errors = []
+    for steps in (500, 2000):
+        t, z = march_reference(modes, drive, static, 3 * drive.period, begin.z, begin.v, steps)
+        mine = np.stack([np.interp(t, done.response.time, done.response.modal[:, k]) for k in range(2)], axis=1)
+        errors.append(np.abs(z - mine).max())
+    assert errors[1] < 0.005 and errors[0] / errors[1] > 2.5
+    assert energy_balance(done.ledger) < 1e-10
+
+
+# laws that hold for any system
+
+@settings(max_examples=25)
+@given(st.integers(0, 10**6), st.integers(1, 4), st.integers(1, 3), st.floats(0.4, 1.0), st.booleans(), st.booleans())
+def test_always_friction_law_and_energy(seed, n, faces, ratio, coupled, rigid):
+    rng = np.random.default_rng(seed)
+    modes = random_basis(rng, n, faces, coupled, rigid)
+    static = rng.uniform(0.05, 1.5, faces)
+    drive = BaseSine(rng.uniform(0.2, 2.0), rng.uniform(0.5, 2.0))
+    begin = start_of(rng, n)
+    done = simulate(modes, drive, static, ratio * static, 4, 4, start=begin)
+    assert energy_balance(done.ledger) < 1e-10 and done.ledger["friction"] > 0
+    speed = max(1.0, np.abs(done.response.modal_rate).max())
+    for phase in run(modes, drive, static, ratio * static, 4 * drive.period, begin):
+        tau = np.linspace(0, phase.span, 12)
+        z = np.array([s.rate().many(tau) for s in phase.modal])
+        rates = np.asarray(modes.interfaces) @ z
+        for c, sign in enumerate(phase.directions):
+            force = phase.forces[c].many(tau)
+            assert np.all(np.abs(force) <= static[c] * (1 + 1e-9))
+            if sign:
+                np.testing.assert_allclose(force, sign * ratio * static[c], rtol=1e-12)
+                assert np.all(sign * rates[c] >= -1e-10 * speed)
+            else:
+                assert np.abs(rates[c]).max() < 1e-11 * speed
+
+
+def test_exact_slides_do_not_move_in_stick():
+    """To the last bit, in every interface, across the events of the others."""
+    rng = np.random.default_rng(5)
+    modes, static = random_basis(rng, 4, 3), np.array([0.9, 1.1, 0.5])
+    done = simulate(modes, BaseSine(1.0, 1.2), static, static, 30, 30, start=start_of(rng, 4))
+    log, extra, time = done.log, done.window.extra, done.window.time
+    assert extra["slides"].shape == extra["forces"].shape == extra["slide_rates"].shape == (time.size, 3)
+    stuck = 0
+    for c in range(3):
+        mine = np.flatnonzero((log.interface == c) & (log.what == STOP))
+        for k in mine:
+            later = np.flatnonzero((log.interface == c) & (log.time > log.time[k]))
+            end = log.time[later[0]] if later.size else np.inf
+            inside = (time >= log.time[k]) & (time < end)
+            assert np.all(extra["slides"][inside, c] == log.slide[k])
+            assert not extra["slide_rates"][inside, c].any()
+            stuck += np.count_nonzero(inside)
+    assert stuck > 1000
+    np.testing.assert_array_equal(done.window.slide, extra["slides"][:, 0])
+    assert np.all(np.abs(extra["forces"]) <= static * (1 + 1e-9))
+
+
+# several interfaces at once
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_exact_two_interfaces_that_stop_together(joined):
+    """Two equal blocks, each on its own spring, move as one does alone; also with a third interface between them."""
+    faces = [[1, 0], [0, 1], [1, -1]] if joined else [[1, 0], [0, 1]]
+    modes = basis_of([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
+    drive, one = BaseSine(1.0, 1.1), basis_of(1.0, 0.01)
+    twin, alone = simulate(modes, drive, 0.6, 0.6, 20, 20), simulate(one, drive, 0.6, 0.6, 20, 20)
+    np.testing.assert_allclose(twin.amplitudes, alone.amplitudes, atol=1e-13)
+    np.testing.assert_allclose(twin.window.extra["slides"][:, 1], twin.window.extra["slides"][:, 0], atol=1e-13)
+    first = twin.log.time[twin.log.interface == 0]
+    np.testing.assert_allclose(first, alone.log.time, atol=1e-11)
+    np.testing.assert_allclose(twin.log.time[twin.log.interface == 1], first, atol=1e-11)
+    assert energy_balance(twin.ledger) < 1e-10
+    if joined:
+        assert not np.any(twin.log.interface == 2)
+
+
+@pytest.mark.parametrize("middle", [0.05, 10.0])
+def test_exact_three_dependent_interfaces(middle):
+    """Blocks 1 and 2 on the ground and on each other: with weak friction between them they stop one after the other,
+    with strong friction they move as one of both masses."""
+    modes = basis_of([1.0, 1.0], 0.0, [[1, 0], [0, 1], [1, -1]], (1.0, 0.4), (1, 0))
+    drive = BaseSine(1.5, 0.9)
+    done = simulate(modes, drive, [0.4, 0.6, middle], [0.4, 0.6, middle], 30, 30)
+    assert energy_balance(done.ledger) < 1e-10
+    extra = done.window.extra
+    if middle > 1:
+        assert np.array_equal(extra["slides"][:, 0], extra["slides"][:, 1]) or np.abs(
+            extra["slides"][:, 0] - extra["slides"][:, 1]).max() < 1e-14
+        both = simulate(basis_of(1.0, 0.0, ((1.0,),), (0.7,)), drive, 0.5, 0.5, 30, 30)
+        np.testing.assert_allclose(done.amplitudes, both.amplitudes, atol=1e-12)
+        np.testing.assert_allclose(done.ledger["friction"], 2 * both.ledger["friction"], rtol=1e-11)
+    else:
+        assert np.ptp(extra["slides"][:, 2]) > 0.01
+
+
+def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
+    """One coordinate, three interfaces of limits 1, 2, 3: nothing moves below 6; above, all slip at once."""
+    modes = basis_of(1.0, 0.0, [[1.0], [1.0], [1.0]])
+    limit = np.array([1.0, 2.0, 3.0])
+    assert not simulate(modes, BaseSine(5.999999, 0.7), limit, limit, 3).response.slide.any()
+    done = simulate(modes, BaseSine(6.5, 0.7), limit, limit, 8, 8)
+    one = simulate(basis_of(1.0), BaseSine(6.5, 0.7), 6.0, 6.0, 8, 8)
+    np.testing.assert_allclose(done.amplitudes, one.amplitudes, atol=1e-13)
+    np.testing.assert_allclose(done.window.extra["forces"].sum(axis=1)[::50], done.window.extra["forces"].sum(
+        axis=1)[::50].clip(-6, 6), atol=1e-12)
+    assert np.all(np.abs(done.window.extra["forces"]) <= limit * (1 + 1e-12))
+    assert done.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-12)
+
+
+def test_exact_seven_interfaces_stop_together():
+    """Seven equal blocks: more than are tried one by one."""
+    modes = basis_of(np.ones(7), 0.02, np.eye(7), np.ones(7), np.eye(7)[0])
+    drive = BaseSine(1.0, 1.1)
+    many, one = simulate(modes, drive, 0.5, 0.5, 6, 6), simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
+    np.testing.assert_allclose(many.amplitudes, one.amplitudes, atol=1e-13)
+    assert np.ptp(many.window.extra["slides"], axis=1).max() < 1e-13
+    assert energy_balance(many.ledger) < 1e-10
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**6), st.integers(5, 11), st.floats(0.3, 1.0))
+def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
+    """All at rest at once: the accelerations of the choice agree with its signs, the forces with their limits."""
+    rng = np.random.default_rng(seed)
+    n = 8
+    modes = random_basis(rng, n, faces)
+    static = rng.uniform(0.1, 1.0, faces)
+    system = System(modes, np.asarray(modes.interfaces), static, ratio * static)
+    z, v = rng.normal(size=n), rng.normal(size=n)
+    rows = system.faces
+    weak = np.linalg.matrix_rank(rows) < faces
+    v -= np.linalg.pinv(rows) @ (rows @ v)
+    entry = Entry(system, z, v, 0.7, 0.3, 0.4)
+    choice = settle(system, entry, (0,) * faces, range(faces), 1.0, 0.3)
+    flow = system.stick_set(tuple(s == 0 for s in choice.signs), 1.0, 0.3)
+    full, _ = entry.under(system, choice.given)
+    accel = rows @ (flow.motion[2] @ full) * 2 / 0.09
+    for c, sign in enumerate(choice.signs):
+        if choice.held[c]:
+            assert abs(accel[c]) < 1e-9
+        elif sign:
+            assert sign * accel[c] > 0
+        else:
+            assert abs(accel[c]) < 1e-9 and abs(flow.watch[c][0] @ full) <= static[c] * (1 + 1e-9)
+    assert weak or not any(choice.held)
+
+
+# starts, drives and printed numbers
+
+FREE = drives.release(2 * pi)
+
+
+@pytest.mark.parametrize("x0, rest, halves", [(11.5, -0.5, 6), (11.0, -1.0, 5), (11 + 1e-9, -0.999999999, 6)])
+def test_exact_free_decay(x0, rest, halves):
+    *moves, last = run(basis_of(1.0), FREE, 1.0, 1.0, 100.0, Start(np.array([x0]), np.zeros(1)))
+    assert len(moves) == halves and last.direction == 0
+    condition = 1 / (x0 - 11) if x0 > 11 else 1.0  # the last swing's time is round-off over its size
+    assert last.time == pytest.approx(halves * pi, abs=1e-13 + 2e-16 * condition)
+    assert last.modal[0](0.0) == pytest.approx(rest, abs=2e-14)
+    assert last.modal[0](80.0) == last.modal[0](0.0)
+
+
+@pytest.mark.parametrize("omega, force, x, halves", [(1.0, 0.125, 0.0, 4), (1.0, 0.13, -0.04, 4),
+                                                     (2.0, 4 / 15, -1 / 15, 7)])
+def test_table_check_16_rests(omega, force, x, halves):
+    last = list(run(basis_of(omega), FREE, force, force, 40.0, Start(np.ones(1), np.zeros(1))))[-1]
+    assert last.direction == 0 and last.modal[0](0.0) == pytest.approx(x, abs=1e-14)
+    rest = halves * pi / omega
+    assert last.time == pytest.approx(rest, abs=1e-13)
+
+
+def test_exact_hold_does_not_creep():
+    done = simulate(basis_of(1.0), drives.step(0.5, 2 * pi), 1.0, 1.0, 80 / (2 * pi))
+    assert not done.response.slide.any() and not done.response.slide_rate.any() and done.log.count == 0
+    np.testing.assert_allclose(done.window.force, -0.5, rtol=1e-15)
+
+
+def test_exact_belt():
+    """Mass on a spring on a belt of speed 0.1, static 1, kinetic 0.6; the belt is a coordinate of near endless mass."""
+    tiny, speed = 1e-8, 0.1
+    modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
+    begin = Start(np.zeros(2), np.array([speed, speed / tiny]))
+    done = simulate(modes, drives.release(2 * pi), 1.0, 0.6, 30.0, 10, start=begin)
+    releases = done.log.time[np.abs(done.log.what) == RELEASE]
+    np.testing.assert_allclose(np.diff(releases)[2:], 8 + 2 * (pi - atan(4)), atol=1e-9)
+    assert 8 + 2 * (pi - atan(4)) == pytest.approx(11.6315499798, abs=1e-10)
+    assert done.amplitudes[-5:, 1].max() == pytest.approx(0.6 + sqrt(0.17), abs=1e-10)
+    assert done.amplitudes[-5:, 0].min() == pytest.approx(0.6 - sqrt(0.17), abs=1e-10)
+
+
+@pytest.mark.parametrize("friction", [1e6, 1e-9])
+def test_exact_extreme_friction(friction):
+    drive, modes = BaseSine(1.0, 1.0), basis_of(1.0, 0.01)
+    done = simulate(modes, drive, friction, friction, 40)
+    assert energy_balance(done.ledger) < 1e-10
+    if friction > 1:
+        assert not done.response.slide.any()
+    else:
+        bare = simulate(modes, drive, 0.0, 0.0, 40)
+        np.testing.assert_allclose(done.amplitudes[1:], bare.amplitudes[1:], rtol=1e-7)
+        assert done.ledger["friction"] > 0
+
+
+def test_exact_start_that_slides_into_rest():
+    """A rigid block with speed v stops after v/f at v^2/2f; overdamped and resonant ones meet their closed forms."""
+    *_, last = run(basis_of(0.0), FREE, 0.5, 0.3, 20.0, Start(np.zeros(1), np.array([2.0])))
+    assert (last.direction, last.time) == (0, pytest.approx(2 / 0.3, rel=1e-14))
+    assert last.modal[0](0.0) == pytest.approx(4 / 0.6, rel=1e-14)
+    modes = basis_of(1.0, 20.0)
+    done = next(iter(run(modes, FREE, 0.0, 0.0, 3.0, Start(np.ones(1), np.zeros(1)))))
+    fast, slow = -20 - sqrt(399), -1 / (20 + sqrt(399))
+    t = np.linspace(0, 3, 40)
+    exact = (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
+    np.testing.assert_allclose(done.modal[0].many(t), exact, rtol=1e-12)
+
+
+def test_exact_stuck_structure_in_resonance_without_damping():
+    """Second mass held by friction, the first one on its spring to it: t sin t grows until the limit is reached."""
+    h = sqrt(0.5)
+    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, h))  # masses h(z1 +- z2), the second one rubs
+    first = next(iter(run(modes, BaseSine(1.0, 1.0), 30.0, 30.0, 400.0)))
+    t = np.linspace(0, first.span, 500)
+    mass = h * (first.modal[0].many(t) + first.modal[1].many(t))
+    np.testing.assert_allclose(mass, (np.sin(t) - t * np.cos(t)) / 2, atol=1e-11)
+    assert np.abs(slides(modes, first, t)).max() < 1e-13
+    limit = abs(sin(first.span) - first.span * cos(first.span)) / 2
+    assert limit == pytest.approx(30.0, rel=1e-12) and first.span > 55
+
+
+def test_exact_defective_system():
+    """Coupled damping with a double root that has one eigenvector: (A + t B) exp(-t)."""
+    modes = basis_of([1.0, 1.0], 0.0, [[1.0, 0.0]], (0, 0), (1, 0), 1.0, np.array([[2.0, 0.0], [1.0, 2.0]]))
+    phase = next(iter(run(modes, FREE, 0.0, 0.0, 12.0, Start(np.array([1.0, 0.0]), np.zeros(2)))))
+    t = np.linspace(0, 12, 60)
+    np.testing.assert_allclose(phase.modal[0].many(t), (1 + t) * np.exp(-t), atol=1e-14)
+    # z2'' + 2 z2' + z2 = -z1' = t exp(-t)
+    np.testing.assert_allclose(phase.modal[1].many(t), t**3 / 6 * np.exp(-t), atol=1e-14)
+
+
+@pytest.mark.parametrize("d, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)])
+def test_exact_grazing_onset(d, peak):
+    done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), d, d, 30, 30)
+    assert np.abs(done.amplitudes[-1]).max() == pytest.approx(peak, rel=1e-11)
+
+
+@pytest.mark.parametrize("miss", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_exact_first_slip_tends_to_its_law(miss):
+    """9/2 (1 - D)^2; the instant of release is known to eps/(1 - D) of it: the condition number."""
+    phases = list(run(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 1 - miss, 1 - miss, pi))
+    stop = next(p for p in phases[1:] if p.direction == 0)
+    found = abs(stop.modal[0](0.0))
+    assert found == pytest.approx(4.5 * miss**2, rel=3 * sqrt(miss) + 1e-15 / miss)
+    if miss == 1e-6:
+        assert found == pytest.approx(4.4988e-12, rel=2e-5)
+
+
+def test_exact_phase_after_a_million_cycles():
+    """Stuck for a million cycles (the clock is put there), then 1.25 times the amplitude: the motion is the one from
+    rest, at the same phases."""
+    rate = 2 * pi * 0.37
+    drive, modes = drives.levels([0.5, 1.25], rate, 10**6), basis_of(rate, 0.003)
+    engine = Engine(modes, drive, 1.0, 1.0, 10**6 + 4)
+    engine.clock.cycle = 10**6 - 1
+    engine.clock.base_phase()
+    late = [p for p in engine.pieces() if p.cycle >= 10**6]
+    early = list(Engine(modes, BaseSine(1.25, rate), 1.0, 1.0, 4).pieces())
+    assert len(late) == len(early)
+    for a, b in zip(late, early):
+        assert a.theta == pytest.approx(b.theta, abs=1e-14)
+        assert a.span == pytest.approx(b.span, abs=1e-14)
+        np.testing.assert_allclose(a.coefs, b.coefs, atol=1e-14)
+
+
+@pytest.mark.slow
+def test_exact_hundred_thousand_stuck_cycles():
+    rate = 2 * pi * 0.37
+    drive, modes = drives.levels([0.5, 1.25], rate, 10**5), basis_of(rate, 0.003)
+    late = simulate(modes, drive, 1.0, 1.0, 10**5 + 4, 4)
+    early = simulate(modes, BaseSine(1.25, rate), 1.0, 1.0, 4, 4)
+    np.testing.assert_allclose(late.amplitudes[-4:], early.amplitudes, atol=1e-14)
+    np.testing.assert_allclose(late.log.phase[-10:], early.log.phase[-10:], atol=1e-13)
+
+
+def test_exact_levels_carry_the_state_over():
+    drive = drives.levels([1.2, 1.6], 1.0, 10)
+    done = simulate(basis_of(1.0, 0.003), drive, 1.0, 1.0, 20, 5)
+    low = simulate(basis_of(1.0, 0.003), BaseSine(1.2, 1.0), 1.0, 1.0, 10, 5)
+    np.testing.assert_allclose(done.amplitudes[:10], low.amplitudes, rtol=1e-12)
+    assert np.abs(done.amplitudes[-1]).max() > 1.5 * np.abs(low.amplitudes[-1]).max()
+    assert energy_balance(done.ledger) < 1e-10
+
+
+def test_exact_force_drive_leaves_the_frame_at_rest():
+    modes = basis_of(1.0, 0.05)
+    base, force = (simulate(modes, BaseSine(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False))
+    np.testing.assert_array_equal(base.window.slide, force.window.slide)
+    assert not force.window.base_acceleration.any()
+    np.testing.assert_allclose(base.window.acceleration - force.window.acceleration, np.sin(0.8 * base.window.time),
+                               atol=1e-11)
+    assert base.acceleration == pytest.approx(np.abs(base.window.acceleration).max(), rel=1e-3)
+    assert force.acceleration == pytest.approx(np.abs(force.window.acceleration).max(), rel=1e-3)
+
+
+def test_exact_log_of_a_stick_slip_run():
+    done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 200)
+    log = done.log
+    assert log.count == log.time.size == 800 == done.events - 1
+    assert np.all(np.diff(log.time) > 0) and set(log.interface) == {0}
+    kinds = np.abs(log.what)
+    assert np.all(kinds[::2] == RELEASE) and np.all(kinds[1::2] == STOP)
+    np.testing.assert_allclose(log.phase[-8::2] % pi, 0.538622, atol=5e-7)
+    sliding = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.5, 0.5, 200)
+    assert np.count_nonzero(np.abs(sliding.log.what) == REVERSAL) > 390
+
+
+@pytest.mark.parametrize("hertz, level, size, top", [(143, 5, 0.52651, 7.8194), (143, 6, 0.72533, 9.3193),
+                                                     (143, 7, 0.89714, 10.6154), (155, 8, 1.13683, 12.4237)])
+def test_table_check_15_bonded_spring(hertz, level, size, top):
+    own = sqrt(1 + 6.5439)
+    done = simulate(basis_of(own, 0.003 / own), BaseSine(level, hertz / 143), 3.8475, 3.8475, 400)
+    tail = done.amplitudes[-10:]
+    assert (tail[:, 1].max() - tail[:, 0].min()) / 2 == pytest.approx(size, rel=1e-4)
+    assert done.acceleration == pytest.approx(top, rel=1e-4)
+
+
+def test_table_check_9_waveform():
+    done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.82802, 0.82802, 200)
+    stops = done.log.phase[-9:][done.log.what[-9:] == STOP] % pi
+    np.testing.assert_allclose(np.degrees(done.starts), 42.69, atol=0.03)
+    np.testing.assert_allclose(np.degrees(stops), 164.09, atol=0.03)
+    w = done.window
+    assert np.abs(w.slide_rate).max() == pytest.approx(0.2529, abs=1e-3)
+    k = np.flatnonzero(np.abs(np.diff(w.force)) > 0.3)
+    np.testing.assert_allclose(np.abs(w.force[k]), 0.8280, atol=1e-3)
+    np.testing.assert_allclose(np.abs(w.force[k + 1]), 0.1241, atol=1e-3)
+    np.testing.assert_allclose(np.abs(w.acceleration[k + 1] - w.acceleration[k]), 0.7039, atol=1e-3)
+    assert done.stick / (w.time[-1] - w.time[0]) == pytest.approx(0.3256, abs=1e-3)
+
+
+def test_table_check_11_and_18():
+    h = sqrt(0.5)
+    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h))
+    last = list(run(modes, BaseSine(1.0, 1.14), 3.0, 3.0, 100.0))[-1]
+    assert slides(modes, last, np.array([last.span]))[0, 0] == pytest.approx(0.5676, abs=1e-4)
+    for ratio in (0.2, 1.0, 3.0):
+        assert not simulate(basis_of(1.0, 0.003), BaseSine(0.999, ratio), 1.0, 1.0, 10).response.slide.any()
+
+
+def test_exact_figure_16_never_drifts():
+    """The steady range of the second mass after t = 1000."""
+    h = sqrt(0.5)
+    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
+    drive = BaseSine(1.0, 1.14)
+    done = simulate(modes, drive, 3.0, 3.0, 1400 / drive.period, 40)
+    assert done.window.slide.max() == pytest.approx(0.69867878, abs=2e-8)
+    assert done.window.slide.min() == pytest.approx(-0.39299347, abs=2e-8)
+
+
+@pytest.mark.slow
+def test_exact_figure_16_range_after_3900():
+    h = sqrt(0.5)
+    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
+    drive = BaseSine(1.0, 1.14)
+    done = simulate(modes, drive, 3.0, 3.0, 3900 / drive.period, 40)
+    assert done.window.slide.max() == pytest.approx(0.69867878, abs=2e-8)
+    assert done.window.slide.min() == pytest.approx(-0.39299347, abs=2e-8)
+
+
+def test_refuses_drives_without_closed_form():
+    with pytest.raises(PatchfemError, match='use method = "march"'):
+        simulate(basis_of(1.0), drives.Sweep(1.0, 2.0, 5.0, 1.0), 1.0, 1.0, 3)
+
+
+def test_refuses_a_start_beyond_the_travel():
+    with pytest.raises(PatchfemError, match=r"structure\.travel"):
+        simulate(basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1)))
+    done = simulate(basis_of(1.0), FREE, 0.1, 0.1, 3, travel=2.0, start=Start(np.array([1.0]), np.array([3.0])))
+    assert done.outcome is Outcome.EXCEEDS_TRAVEL  # 1.1 cos t + 3 sin t - 0.1 passes 2
+    at = done.response.time[-1]
+    assert 1.1 * cos(at) + 3 * sin(at) - 0.1 == pytest.approx(2.0, rel=1e-12) and at < 1
+    assert energy_balance(done.ledger) < 1e-12
+
+
+@pytest.mark.parametrize("kinetic", [1.1, -0.1])
+def test_refuses_kinetic_friction_out_of_range(kinetic):
+    with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
+        simulate(basis_of(1.0), BaseSine(1.0, 1.0), 1.0, kinetic, 3)
+
+
+def test_exact_slow_rate_beside_a_fast_one():
+    """A first-order creep of rate 1e-3 in an overdamped mode is exact next to a rate of 1e3."""
+    modes = basis_of(1.0, 500.0)
+    phase = next(iter(run(modes, FREE, 0.0, 0.0, 2.0, Start(np.ones(1), np.zeros(1)))))
+    slow = -1 / (500 + sqrt(500**2 - 1))
+    fast = -500 - sqrt(500**2 - 1)
+    assert phase.modal[0](2.0) == pytest.approx((fast * exp(slow * 2) - slow * exp(fast * 2)) / (fast - slow),
+                                                rel=1e-12)
+
+
+def test_exact_combined_signal_is_the_slide():
+    modes = basis_of([1.0, 2.0], 0.1, [[1.0, 0.3]])
+    phase = next(p for p in run(modes, BaseSine(1.0, 1.0), 0.3, 0.3, 10.0) if p.direction)
+    t = np.linspace(0, phase.span, 5)
+    np.testing.assert_allclose(combine(phase.modal, modes.slide).many(t), slides(modes, phase, t)[0], atol=1e-15)
+
+
+def test_exact_coordinates_stay_on_the_stuck_slide():
+    """The coordinates move on while the interface sticks; their slide stays where it stopped, over 300 cycles."""
+    h = sqrt(0.5)
+    modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
+    drive = drives.levels([4.0, 0.3], 1.14, 3)
+    engine = Engine(modes, drive, 1.5, 1.5, 300)
+    last = [p for p in engine.pieces() if p.cycle >= 20]
+    assert all(p.signs == (0,) for p in last) and abs(last[0].held[0]) > 0.1
+    size = max(np.abs(p.coefs[0]).max() for p in last)
+    assert max(abs(float(modes.interfaces[0] @ p.coefs[0]) - p.held[0]) for p in last) < 4e-16 * size
+
+
+def test_exact_interface_without_friction_among_others():
+    """Interface 0 has no friction: the run is that of the other one alone."""
+    modes = basis_of([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
+    alone = basis_of([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
+    drive = BaseSine(1.0, 1.2)
+    two, one = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5), simulate(alone, drive, 0.4, 0.4, 20, 5)
+    np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-13)
+    np.testing.assert_allclose(two.log.time, one.log.time, rtol=1e-14)
+    assert set(two.log.interface) == {1} and two.stick == 0 and not two.window.force.any()
+    np.testing.assert_array_equal(two.window.extra["forces"][:, 1], one.window.force)
+    assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-13)
+
+
+def test_exact_log_has_a_limit(monkeypatch):
+    monkeypatch.setattr("patchfem.dynamics.event_list.ROOM", 30)
+    log = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 20).log
+    assert log.time.size == log.slide.size == 30 and log.count == 80
+    assert not log.time.flags.writeable

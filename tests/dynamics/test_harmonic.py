@@ -1,0 +1,318 @@
+"""Harmonic balance against closed forms, direct marching, dense linear algebra and energy."""
+
+import itertools
+
+import numpy as np
+import pytest
+from harmonic_cases import five, many, march, plain_jenkins, sdof
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.closed_forms import jenkins_loop, stretch_loop
+from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
+from patchfem.dynamics.harmonic import Balance, newton, pack, unpack
+from patchfem.friction.law import Bonds
+from patchfem.friction.recursion import advance
+from patchfem.simulate_harmonic import cycle_energy, periodic_response, point
+from patchfem.simulate_harmonic_contact import Group
+from patchfem.simulate_harmonic_laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, analysis, synthesis
+from patchfem.simulate_harmonic_point import balance_of, group_of
+from patchfem.simulate_march import coulomb_model, jenkins_model, points_model, rate_model
+
+DRIVE = BaseSine(1.0, 1.0)
+PEAKS = {10: 0.249538145, 100: 0.285786312, 1000: 0.288449682}  # DOP853 at 1e-12, D = 0.8, xi = 0.003
+
+
+def harmonics(seed, count, size=1.0):
+    rng = np.random.default_rng(seed)
+    x = (rng.normal(size=count + 1) + 1j * rng.normal(size=count + 1)) * 0.3 * size
+    x[0] = 0.1 * size * rng.normal()
+    x[1] *= 3
+    return x
+
+
+# ---- the laws along a periodic slide
+
+@settings(max_examples=15)
+@given(st.integers(0, 10**6), st.integers(1, 6), st.floats(0.05, 3.0))
+def test_always_elements_follow_the_plain_loop(seed, count, size):
+    """Samples and true turning points in order, two turns, one element at a time."""
+    k, w = many(17, 3.0, 1.0)
+    track = Track(harmonics(seed, count, size), 1.0, 64)
+    angles, places, cells, _ = track.turning
+    order = np.argsort(np.concatenate([np.arange(64), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable")
+    cycle = np.concatenate([track.q, places])[order]
+    forces = plain_jenkins(np.tile(cycle, 2), k, w)[0][cycle.size:]
+    found = Jenkins(k, w).sample(track)
+    assert found.force == pytest.approx(forces[order < 64], abs=1e-12)
+    fine = synthesis(track.x, 65536)
+    assert angles.size >= 2 and places.max() == pytest.approx(fine.max(), abs=1e-6 * np.ptp(fine))
+
+
+@settings(max_examples=6)
+@given(st.integers(0, 10**6), st.integers(1, 5), st.floats(0.05, 3.0))
+def test_always_bonds_follow_the_recursion(seed, count, size):
+    """Turn after turn of friction.recursion.advance until the stretch repeats."""
+    track = Track(harmonics(seed, count, size), 1.0, 32)
+    _, places, cells, _ = track.turning
+    order = np.argsort(np.concatenate([np.arange(32), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable")
+    cycle = np.concatenate([track.q, places])[order]
+    law = Bonds(0.3, 0.4)
+    bonds, last = np.array([[1.0], [0.0], [0.0]]), cycle[-1]
+    for _ in range(int(10 / np.abs(np.diff(cycle)).sum()) + 3):
+        forces = []
+        for q in cycle:
+            bonds = advance(bonds, np.array([q - last]), np.ones(1), law.length)[0]
+            last = q
+            forces.append(law.static / law.length * bonds[1, 0])
+    found = Stretch(0.3, 0.4).sample(track)
+    assert found.force == pytest.approx(np.array(forces)[order < 32], abs=1e-10)
+
+
+@pytest.mark.parametrize("law", [Jenkins([10.0, 3.0], [0.08, 0.2]), Stretch(0.8, 0.1), Spring(2.0, 5.0),
+                                 Interlock(3.0, 0.5), Tanh(0.8, 0.3)], ids=lambda law: type(law).__name__)
+def test_exact_slopes_are_the_derivative_of_the_forces(law):
+    group, q = Group(sdof(), law, 4096), harmonics(3, 5)[None]
+    fold, v, eps = group(q, 1.3), pack(harmonics(3, 5)[None]), 1e-6
+
+    def force(x, omega=1.3):
+        return group(unpack(x, 1), omega).force[0]
+
+    found = np.stack([(force(v + d) - force(v - d)) / (2 * eps) for d in eps * np.eye(v.size)], axis=1)
+    assert fold.slope[0] == pytest.approx(found, abs=1e-7)
+    if fold.rate is not None:
+        assert fold.rate[0] == pytest.approx((force(v, 1.3 + eps) - force(v, 1.3 - eps)) / (2 * eps), abs=1e-8)
+
+
+def test_exact_areas_of_the_closed_loops():
+    """A cosine through each law: area -pi A Im F_1 and end force of the closed forms."""
+    for amplitude in (0.5, 1.7, 6.0):
+        x = np.array([0.0, amplitude])
+        for law, truth in ((Jenkins([2.0], [1.0]), jenkins_loop(amplitude, 1.0, 2.0)),
+                           (Stretch(2.0, 1.0), stretch_loop(amplitude, 1.0, 2.0))):
+            force = law.sample(Track(x + 0j, 1.0, 8192)).force
+            assert np.pi * amplitude * analysis(force, 1)[1].imag == pytest.approx(truth[0], rel=1e-6, abs=1e-6)
+            assert force[0] == pytest.approx(truth[1], rel=1e-12)
+
+
+def test_exact_samples_of_more_harmonics_than_they_resolve():
+    x = harmonics(7, 40)
+    angle = 2 * np.pi * np.arange(16) / 16
+    assert synthesis(x, 16) == pytest.approx((x * np.exp(1j * np.outer(angle, np.arange(41)))).sum(axis=1).real)
+
+
+# ---- the balance
+
+def dense(modes, omega, level, spring):
+    """Modal phasors of the linear structure with a spring at the slide."""
+    a = np.diag(modes.omega**2) - omega**2 * np.eye(modes.omega.size) + 1j * omega * modes.dampers \
+        + np.outer(modes.slide, modes.slide) * spring / modes.mass
+    return np.linalg.solve(a, 1j * level * modes.base)
+
+
+@pytest.mark.parametrize("omega", [0.7, 1.0, 2.3, 5.0])
+def test_exact_linear_limits(omega):
+    """Elements that never yield are a spring; without force nothing is left; coupled damping too."""
+    c = np.diag(0.04 * np.arange(1, 6)) + 0.02
+    for damping in (None, c):
+        modes = five(damping)
+        found = point(modes, BaseSine(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3)
+        assert found.modal[1] == pytest.approx(dense(modes, omega, 2.0, 3.5), rel=1e-10)
+        assert np.abs(found.modal[[0, 2, 3]]).max() < 1e-12
+        free = point(modes, BaseSine(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
+        assert free.modal[1] == pytest.approx(dense(modes, omega, 2.0, 0.0), rel=1e-7)
+
+
+def test_exact_a_mode_without_stiffness_or_damping():
+    """A rigid mode and an undamped one at its own frequency have no receptance and need none."""
+    one = np.ones(2)
+    modes = ModalBasis(("r", "a"), np.array([0.0, 1.0]), np.zeros(2), np.array([1.0, 0.6]), one, one, 1.5)
+    for omega in (0.8, 1.0):
+        found = point(modes, BaseSine(1.0, omega), Spring(2.0), harmonics=3)
+        assert found.modal[1] == pytest.approx(dense(modes, omega, 1.0, 2.0), rel=1e-10)
+        assert np.abs(found.modal[0]).max() < 1e-12
+    shaken = point(modes, BaseSine(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4)
+    check_cycle(modes, BaseSine(1.0, 1.0), shaken, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4)
+
+
+def test_exact_the_jacobian_of_the_balance():
+    """Against central differences: a rigid mode, coupled damping, two rows, a law of the rate; over x, omega, level."""
+    one = np.ones(3)
+    c = 0.1 * np.eye(3) + 0.05
+    faces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
+    for damping in (None, c):
+        modes = ModalBasis(("r", "a", "b"), np.array([0.0, 1.0, 3.0]), 0.02 * one, faces[0], one, one, 1.3, damping,
+                           faces)
+        group = Group(modes, [(0, Tanh(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, Stretch(0.5, 0.4))], 1024)
+        balance = Balance(modes, group.rows, group)
+        x = np.random.default_rng(4).normal(size=balance.size(1.1, 3)) * 0.5
+        here = balance.system(x, 1.1, 0.7, 3)
+
+        def residual(v, omega=1.1, level=0.7, balance=balance):
+            return balance.system(v, omega, level, 3).residual
+
+        eps = 1e-6
+        found = np.stack([(residual(x + d) - residual(x - d)) / (2 * eps) for d in eps * np.eye(x.size)], axis=1)
+        assert here.jacobian == pytest.approx(found, abs=1e-7)
+        assert here.by_omega == pytest.approx((residual(x, 1.1 + eps) - residual(x, 1.1 - eps)) / (2 * eps), abs=1e-7)
+        assert here.by_level == pytest.approx((residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9)
+
+
+def test_exact_more_rows_than_modes():
+    """Three rows on one mode: the same as one row with the summed law."""
+    modes = sdof(0.02)
+    parts = [(np.array([f]), Spring(k)) for f, k in ((1.0, 1.0), (0.5, 2.0), (-2.0, 0.25))]
+    found = point(modes, BaseSine(1.0, 0.9), parts, harmonics=3)
+    one = point(modes, BaseSine(1.0, 0.9), Spring(1.0 + 0.25 * 2.0 + 4 * 0.25), harmonics=3)
+    assert found.modal[1] == pytest.approx(one.modal[1], rel=1e-12)
+
+
+@pytest.mark.parametrize("omega, level", [(0.8, 1.0), (1.5, 3.0), (2.5, 2.0)])
+def test_exact_one_harmonic_of_elements(omega, level):
+    """Describing function of a Jenkins element: stick angle acos(1 - 2 w/A)."""
+    modes, k, w = sdof(0.01), 2.0, 0.15
+    group = Group(modes, Jenkins([k], [w]), 16384)
+    found = point(modes, BaseSine(level, omega), group, harmonics=1)
+    a = abs(found.coefficients[0, 1])
+    assert a > 1.1 * w
+    angle = np.arccos(1 - 2 * w / a)
+    stiff = k / np.pi * (angle - np.sin(angle) * np.cos(angle)) + 4j * k * w * (a - w) / (np.pi * a * a)
+    assert abs(1 - omega**2 + 0.02j * omega + stiff) * a == pytest.approx(level, rel=1e-6)
+
+
+# ---- against marching
+
+def check_cycle(modes, drive, found, k, w, near, steps=4000):
+    """March one cycle from the state the balance gives: it must follow it and come back."""
+    response = periodic_response(found, modes, drive, steps)
+    path = np.tile(response.slide[:-1], 2)
+    stretch = plain_jenkins(np.append(path, path[0]), k, w)[1]
+    start = np.concatenate([response.modal[0], response.modal_rate[0]])
+    rows, forces = march(modes, drive, k, w, start, stretch, steps)
+    n = modes.omega.size
+    scale = np.abs(response.modal).max()
+    assert np.abs(rows[:, :n] - response.modal).max() < near * scale
+    assert np.abs(rows[:, n:] - response.modal_rate).max() < 3 * near * np.abs(response.modal_rate).max()
+    assert np.abs(forces - response.force).max() < 10 * near * np.abs(forces).max()
+
+
+@pytest.mark.parametrize("omega", [0.7, 1.2, 2.45])
+def test_exact_a_hundred_elements_and_five_modes_march(omega):
+    modes, (k, w), drive = five(), many(), BaseSine(1.5, omega)
+    found = point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
+    assert found.error < 1e-4 and np.ptp(synthesis(found.coefficients, 512)) > 4 * w.min()
+    check_cycle(modes, drive, found, k, w, 2e-4)
+
+
+def test_exact_the_march_from_rest_ends_there():
+    modes, (k, w), drive = five(zeta=0.06), many(30), BaseSine(1.5, 1.2)
+    found = point(modes, drive, Jenkins(k, w), tolerance=1e-4)
+    rows, _ = march(modes, drive, k, w, np.zeros(10), np.zeros(30), 300, 25)
+    z = synthesis(found.modal.T, 600)[:, ::2]
+    assert np.abs(rows[-301:-1, :5] - z.T).max() < 1e-3 * np.abs(z).max()
+
+
+@pytest.mark.parametrize("stiffness, tolerance, near", [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5),
+                                                        (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)])
+def test_exact_peaks_at_resonance(stiffness, tolerance, near):
+    found = point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
+    miss = abs(found.amplitude([1.0]) / PEAKS[stiffness] - 1)
+    assert miss < near and miss < found.error < tolerance
+
+
+@pytest.mark.parametrize("omega", [0.6, 1.0, 1.7])
+def test_always_work_in_is_what_is_lost(omega):
+    """Parseval: base work = viscous loss + the loop's area, per cycle, from three independent sums."""
+    modes, (k, w), drive = five(), many(), BaseSine(1.5, omega)
+    found = point(modes, drive, Jenkins(k, w), harmonics=15)
+    r = periodic_response(found, modes, drive, 2000)
+    dt = drive.period / 2000
+    base = -modes.mass * dt * np.sum((r.modal_rate @ modes.base * drive.values(r.time))[:-1])
+    viscous = modes.mass * dt * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.dampers, r.modal_rate[:-1])
+    slip = np.sum((r.force * r.slide_rate)[:-1]) * dt
+    assert slip > 0.05 * base and base == pytest.approx(viscous + slip, rel=2e-4)
+    book = cycle_energy(found, modes)
+    assert [book[n] for n in ("work_in", "viscous", "friction")] == pytest.approx([base, viscous, slip], rel=2e-4)
+    assert book["balance"] < 1e-9
+
+
+def test_order_of_what_is_cut_off():
+    """Smooth: spectral. Elements: the slide's harmonics fall like k^-4, so the error like H^-3 or better."""
+    modes, drive = sdof(0.05), BaseSine(1.0, 0.5)
+    best = point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
+    errors = [abs(point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1) for h in (3, 9, 15)]
+    assert errors[0] > 1e-4 and errors[1] < 1e-2 * errors[0] and errors[2] < 1e-2 * errors[1]
+    group = Group(modes, Jenkins([2.0], [0.3]), 8192)
+    best = point(modes, drive, group, harmonics=255)
+    y = synthesis(best.coefficients[0], 1024)
+    errors = []
+    for h in (9, 19, 39, 79):
+        here = point(modes, drive, group, harmonics=h)
+        errors.append(np.abs(synthesis(here.coefficients[0], 1024) - y).max())
+    order = -np.polyfit(np.log([9, 19, 39, 79]), np.log(errors), 1)[0]
+    assert 2.7 < order < 4.5
+
+
+def test_always_the_residual_in_time_falls_with_the_harmonics():
+    rest = [point(sdof(0.05), DRIVE, Jenkins([3.0], [0.3]), harmonics=h).residual for h in (3, 7, 15, 31)]
+    assert all(b < 0.6 * a for a, b in itertools.pairwise(rest)) and rest[-1] > 1e-5
+
+
+def test_exact_both_rows_of_a_group():
+    """Slide and output with their own laws; the two forces act where they should: reciprocal linear check."""
+    modes = five()
+    laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
+    found = point(modes, BaseSine(1.0, 1.9), laws, harmonics=1)
+    a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.dampers
+    for row, k in ((modes.slide, 1.5), (modes.output, 0.7)):
+        a = a + np.outer(row, row) * k / modes.mass
+    assert found.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
+    balance = balance_of(modes, group_of(modes, laws), 64)
+    receptance = balance.faces @ balance.plant(1.9, 3).inverse @ balance.faces.T
+    assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
+
+
+@pytest.mark.parametrize("law", [Stretch(0.8, 0.05), Tanh(0.4, 0.05), Interlock(1.0, 0.5)],
+                         ids=lambda law: type(law).__name__)
+def test_exact_other_laws_obey_the_equation_of_motion(law):
+    """The accelerations of the harmonics against those the law's own force gives."""
+    modes, drive = sdof(0.05), BaseSine(1.0, 1.2)
+    found = point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
+    r = periodic_response(found, modes, drive, 512)
+    k = np.arange(found.modal.shape[0])[:, None]
+    accel = synthesis((-(1.2 * k)**2 * found.modal).T, 512)
+    assert r.acceleration[:-1] - drive.values(r.time[:-1]) == pytest.approx(accel[0], abs=2e-3)
+
+
+# ---- refusals
+
+def test_refuses_what_cannot_be_balanced():
+    modes = sdof()
+    with pytest.raises(PatchfemError, match="coulomb"):
+        point(modes, DRIVE, coulomb_model(1.0, 1.0))
+    with pytest.raises(PatchfemError, match="breakaway"):
+        point(modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0]))
+    with pytest.raises(PatchfemError, match="interface 2"):
+        Group(modes, (2, Spring(1.0)))
+    with pytest.raises(PatchfemError, match="at least one law"):
+        Group(modes, [])
+    with pytest.raises(PatchfemError, match="stiffnesses > 0"):
+        Jenkins([1.0, -1.0], [1.0, 1.0])
+    with pytest.raises(PatchfemError, match="no mode moves"):
+        Balance(modes, np.zeros((1, 1)), None)
+
+
+def test_refuses_to_call_an_unbalanced_motion_steady():
+    modes = sdof()
+    group = Group(modes, Jenkins([10.0], [0.08]), 256)
+    balance = balance_of(modes, group, 256)
+    with pytest.raises(NotConverged, match="missed its residual"):
+        newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, most=2)
+
+
+def test_exact_models_of_the_march_become_laws():
+    modes = sdof()
+    law = Group(modes, points_model(Bonds(0.3, 2e-6), [1.0, 2.0], [5.0, 4.0])).laws[0][0]
+    assert (law.limit, law.length) == (pytest.approx(0.3 * 13), 2e-6)
+    law = Group(modes, rate_model(3.0, 0.1)).laws[0][0]
+    assert (law.limit, law.speed) == (3.0, 0.1)

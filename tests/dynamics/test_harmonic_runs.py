@@ -1,0 +1,153 @@
+"""Steady motions by balance against runs of scenes, at 40 frequencies, and in hard cases."""
+
+import numpy as np
+import pytest
+from harmonic_cases import five, many, march, plain_jenkins, sdof
+from scene_texts import STRUCTURE
+
+from patchfem.core import BaseSine, ModalBasis, NotConverged
+from patchfem.response.measures import acceleration_peak, harmonic, interface_loop, slip_measures
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_harmonic import periodic_response, point, regime
+from patchfem.simulate_harmonic_branch import response
+from patchfem.simulate_harmonic_laws import Jenkins, Spring, Stretch, synthesis
+from patchfem.simulate_harmonic_point import group_of
+from patchfem.simulate_rig import drive_of, modes_of
+
+SCENE = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "20 um"\n' + STRUCTURE + \
+    '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
+LOAD = 26 * 4.4482216152605
+DRIVE = BaseSine(1.0, 1.0)
+
+
+@pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
+def test_exact_measures_of_a_run_of_a_scene(law):
+    """The last ten of 300 cycles of a marched run at 5 g and the measures of the balance."""
+    scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
+    found = run(plan(scene), estimate=False).measures
+    modes, drive = modes_of(scene), drive_of(scene)
+    limit = 0.3 * LOAD
+    p = point(modes, drive, Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else Stretch(limit, 20e-6),
+              tolerance=1e-5)
+    r = periodic_response(p, modes, drive, 1000)
+    dt = np.full(1001, drive.period / 1000)
+    dt[[0, -1]] /= 2
+    q, f = (harmonic(r.time, dt, v, drive.omega) for v in (r.slide, r.force))
+    work = float(dt @ (r.force * r.slide_rate))
+    mine = {"relative_displacement_amplitude": p.amplitude(modes.output),
+            "absolute_acceleration_peak": acceleration_peak(r), "friction_force_peak": np.abs(r.force).max(),
+            **slip_measures(r, drive, 1000), **interface_loop(r.slide, q, f, work, modes.mass * modes.omega[0]**2)}
+    for name, near in (("relative_displacement_amplitude", 1e-3), ("absolute_acceleration_peak", 2e-3),
+                       ("friction_force_peak", 1e-3), ("slip_amplitude", 2e-3), ("loop_area", 2e-3),
+                       ("equivalent_stiffness", 2e-3), ("equivalent_damping", 2e-3)):
+        assert mine[name] == pytest.approx(found[name].value, rel=near), name
+
+
+def test_exact_forty_points_of_five_modes_and_a_hundred_elements():
+    """Each motion, marched for a cycle with its own memory, follows itself and closes."""
+    modes, (k, w) = five(), many()
+    last = None
+    for omega in np.linspace(0.5, 4.4, 40):
+        drive = BaseSine(1.5, omega)
+        last = point(modes, drive, Jenkins(k, w), tolerance=1e-3, start=last)
+        r = periodic_response(last, modes, drive, 800)
+        stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
+        start = np.concatenate([r.modal[0], r.modal_rate[0]])
+        rows, forces = march(modes, drive, k, w, start, stretch, 800)
+        scale = np.abs(r.modal).max()
+        assert last.error < 1e-3 and np.abs(rows[:, :5] - r.modal).max() < 1.5e-3 * scale, omega
+        assert np.abs(forces - r.force).max() < 1e-2 * np.abs(forces).max(), omega
+
+
+@pytest.mark.parametrize("limit", [1e-9, 1e6])
+def test_exact_friction_that_does_nothing_or_everything(limit):
+    """1e-9 times the drive: the free resonance; 1e6 times: a spring."""
+    modes, drive = sdof(), BaseSine(1.0, 1.0)
+    p = point(modes, drive, Jenkins([20.0], [limit / 20.0]), tolerance=1e-6)
+    stiff = 20.0 if limit > 1 else 0.0
+    assert p.amplitude([1.0]) == pytest.approx(1 / abs(stiff + 0.006j), rel=1e-6)
+
+
+def test_exact_an_overdamped_and_a_rigid_mode_with_friction():
+    """Frequency 0 and damping 3: no special case, the march closes; the mean of the rigid slide stays where it was."""
+    one = np.ones(2)
+    modes = ModalBasis(("r", "o"), np.array([0.0, 2.0]), np.array([0.0, 3.0]), np.array([1.0, 0.5]), one, one, 1.0)
+    drive, k, w = BaseSine(1.0, 1.5), np.array([2.0, 1.0]), np.array([0.05, 0.3])
+    p = point(modes, drive, Jenkins(k, w), tolerance=1e-4)
+    r = periodic_response(p, modes, drive, 2000)
+    stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
+    rows, _ = march(modes, drive, k, w, np.concatenate([r.modal[0], r.modal_rate[0]]), stretch, 2000)
+    assert np.abs(rows[:, :2] - r.modal).max() < 3e-4 * np.abs(r.modal).max()
+    assert abs(p.forces[0, 0]) < 1e-9
+
+
+def test_exact_many_interfaces_on_few_modes():
+    """Thirty interfaces, five modes: the same as a march with thirty forces would need; checked by energy and by the
+    equation of motion on the samples."""
+    rng = np.random.default_rng(2)
+    faces = rng.normal(size=(30, 5)) * np.array([1.0, 0.5, 0.4, 0.3, 0.2])
+    base = five()
+    modes = ModalBasis(base.names, base.omega, base.zeta, faces[0], base.base, base.output, base.mass, None, faces)
+    laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
+    drive = BaseSine(1.0, 0.9)
+    p = point(modes, drive, laws, tolerance=1e-4)
+    assert p.coefficients.shape[0] == 30 and p.error < 1e-4
+    r = periodic_response(p, modes, drive, 1024)
+    forces = group_of(modes, laws).forces(p.coefficients, drive.omega, 1024)
+    dt = drive.period / 1024
+    slip = sum((forces[i] * (r.modal_rate[:-1] @ faces[i])).sum() for i in range(30)) * dt
+    viscous = modes.mass * dt * ((r.modal_rate[:-1] ** 2) @ (2 * modes.zeta * modes.omega)).sum()
+    work = -modes.mass * dt * ((r.modal_rate @ modes.base) * drive.values(r.time))[:-1].sum()
+    assert slip > 0 and work == pytest.approx(slip + viscous, rel=1e-3)
+    k = np.arange(p.modal.shape[0])[:, None]
+    accel = synthesis((-(drive.omega * k)**2 * p.modal).T, 1024)
+    push = -np.outer(modes.base, drive.values(r.time[:-1])) - faces.T @ forces / modes.mass
+    rest = push - (2 * modes.zeta * modes.omega * r.modal_rate[:-1] + modes.omega**2 * r.modal[:-1]).T - accel
+    assert np.sqrt((rest**2).mean()) < 2e-2 * np.sqrt((accel**2).mean())
+
+
+def test_always_a_sweep_finds_what_cold_starts_find():
+    modes, law = sdof(0.01), Jenkins([4.0, 1.0], [0.05, 0.5])
+    values = np.linspace(0.12, 0.4, 15)
+    swept = response(modes, BaseSine(1.0, 1.0), law, values, tolerance=1e-4)
+    assert swept.ended == "listed" and swept.values == pytest.approx(values)
+    for p in swept.points:
+        cold = point(modes, BaseSine(1.0, p.omega), law, tolerance=1e-4)
+        assert p.amplitude([1.0]) == pytest.approx(cold.amplitude([1.0]), rel=3e-4)
+
+
+def test_exact_regimes():
+    """Slides of a given swing through elements that slip at 0.1 and 0.5."""
+    modes, law = sdof(0.0), Jenkins([1.0, 1.0], [0.1, 0.5])
+    for amplitude, want in ((0.05, ("stuck", 0.0)), (0.3, ("partial slip", 0.1 / 0.6)), (0.6, ("slides", 1.0))):
+        # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
+        p = point(modes, BaseSine(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
+        name, share = regime(p)
+        assert (name, share) == (want[0], pytest.approx(want[1]))
+    assert regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
+    assert regime(point(modes, BaseSine(1e-4, 0.5), Stretch(1.0, 1.0), harmonics=3))[0] == "stuck"
+    assert regime(point(modes, BaseSine(1.0, 0.5), Stretch(0.1, 0.1), harmonics=7))[0] == "slides"
+
+
+@pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
+def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit, bounded):
+    """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
+    modes, law = sdof(0.0), Jenkins([20.0], [limit / 20.0])
+    if not bounded:
+        with pytest.raises(NotConverged, match="undamped mode driven at its own frequency"):
+            point(modes, DRIVE, law)
+        return
+    p = point(modes, DRIVE, law, tolerance=1e-4)
+    assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # the whole drive of the first harmonic
+    r = periodic_response(p, modes, DRIVE, 4000)
+    k, w = np.array([20.0]), np.array([limit / 20.0])
+    stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
+    rows, _ = march(modes, DRIVE, k, w, np.array([r.modal[0, 0], r.modal_rate[0, 0]]), stretch, 4000)
+    assert np.abs(rows[:, 0] - r.modal[:, 0]).max() < 3e-4 * np.abs(r.modal).max()
+
+
+def test_refuses_a_tolerance_that_no_ladder_reaches():
+    """A nearly rigid element at resonance: 255 harmonics are not enough for 1e-9, and it is said."""
+    with pytest.raises(NotConverged, match="harmonics leave an error"):
+        point(sdof(0.05), BaseSine(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12)

@@ -1,0 +1,194 @@
+"""Shooting on the event map against printed numbers, long runs, finite differences and perturbed runs."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from test_event_systems import basis_of, random_basis
+
+from patchfem import closed_forms
+from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.dynamics import drives
+from patchfem.dynamics.histories import simulate
+from patchfem.dynamics.steady_events import period_map, steady
+
+
+def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
+    """Half the peak-to-peak of the last cycle of a run."""
+    low, high = simulate(modes, drive, static, kinetic, cycles, 1, start=begin).amplitudes[-1]
+    return (high - low) / 2
+
+
+@pytest.mark.parametrize("d, zeta, wanted, regime", [
+    (0.8, 0.003, 0.28704671337871602595, "2 stops"), (0.8, 0.0, 0.29943104174842751488, "2 stops"),
+    (0.5, 0.003, 60.5632260810004979, "sliding"), (2 / 3, 0.003, 25.1953787788816, "sliding"),
+    (4 / 7, 0.003, 45.4055793050063, "sliding"), (0.79, 0.0, 0.435537658848, "2 stops"), (1.2, 0.003, 0.0, "stuck")])
+def test_exact_printed_amplitudes(d, zeta, wanted, regime):
+    found = steady(basis_of(1.0, zeta), BaseSine(1.0, 1.0), d, d)
+    assert found.amplitude == pytest.approx(wanted, rel=2e-12) and found.regime == regime
+    assert found.residual < 1e-12 and found.alone
+    if regime != "stuck":
+        assert np.abs(found.multipliers).max() < 1
+
+
+@pytest.mark.parametrize("d, q", [(0.95, 0.006603), (0.90, 0.032368), (0.85, 0.096925), (0.828, 0.152702),
+                                  (0.80, 0.299431), (0.79, 0.435538), (0.786, 0.599134), (0.828843, 0.15),
+                                  (pi / 4 + 1e-6, 0.76259)])
+def test_table_checks_2_and_5_without_damping(d, q):
+    found = steady(basis_of(1.0), BaseSine(1.0, 1.0), d, d)
+    assert found.amplitude == pytest.approx(q, abs=2e-5)
+    # the amplitude's condition near pi/4 is that of a square root
+    assert found.amplitude == pytest.approx(closed_forms.two_stop_amplitude(d), rel=1e-12 / (d - pi / 4))
+    assert found.regime == "2 stops"
+
+
+@pytest.mark.parametrize("hertz, level, amplitude", [(135, 6, 5.22698), (150, 7, 6.66151), (155, 8, 4.29575)])
+def test_table_check_7_without_damping(hertz, level, amplitude):
+    found = steady(basis_of(1.0), BaseSine(level / 4, hertz / 143), 1.0, 1.0)
+    assert found.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6) and found.regime == "sliding"
+
+
+@pytest.mark.parametrize("hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)])
+def test_table_check_8_knee(hertz, knee):
+    """Input over friction at which the last stop vanishes."""
+    regimes = [steady(basis_of(1.0, 0.003), BaseSine(knee + side, hertz / 143), 1.0, 1.0).regime
+               for side in (-1e-3, 1e-3)]
+    assert regimes == ["2 stops", "sliding"]
+
+
+@pytest.mark.parametrize("side", [1e-3, 1e-4])
+def test_exact_both_sides_of_pi_over_four(side):
+    over, under = pi / 4 + side, pi / 4 - side
+    found = steady(basis_of(1.0), BaseSine(1.0, 1.0), over, over)
+    assert found.regime == "2 stops"
+    assert found.amplitude == pytest.approx(closed_forms.two_stop_amplitude(over), rel=1e-14 / side)
+    assert steady(basis_of(1.0), BaseSine(1.0, 1.0), under, under).regime == "unbounded"
+
+
+@pytest.mark.parametrize("d", [0.78, 0.6])
+def test_exact_unbounded_below_pi_over_four(d):
+    assert steady(basis_of(1.0), BaseSine(1.0, 1.0), d, d).regime == "unbounded"
+    assert steady(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), d, d).regime == "sliding"
+
+
+POINTS = [(0.4, 2.0), (0.6, 1.5), (0.8, 1.3), (0.9, 1.15), (1.0, 1.25), (1.05, 1.2), (1.1, 1.6), (1.3, 3.0),
+          (1.7, 1.4), (2.5, 2.2)]
+
+
+def compare_with_runs(points, zeta, cycles):
+    for ratio, level in points:
+        modes, drive = basis_of(1.0, zeta), BaseSine(level, ratio)
+        found = steady(modes, drive, 1.0, 1.0)
+        marched = amplitude_of_run(modes, drive, 1.0, 1.0, cycles)
+        assert found.amplitude == pytest.approx(marched, rel=1e-9), (ratio, level)
+
+
+def test_exact_steady_points_against_runs():
+    compare_with_runs(POINTS, 0.08, 60)
+
+
+@pytest.mark.slow
+def test_exact_forty_steady_points_against_runs():
+    compare_with_runs([(r, a) for r in np.linspace(0.3, 2.2, 10) for a in (1.1, 1.26, 1.6, 4.0)], 0.03, 400)
+
+
+@pytest.mark.parametrize("level, ratio, wanted", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
+def test_exact_many_stops_below_resonance(level, ratio, wanted):
+    """A slow drive: several stops per cycle, as the run counts them."""
+    modes, drive = basis_of(1.0, 0.0005), BaseSine(level, ratio)
+    found = steady(modes, drive, 1.0, 1.0)
+    done = simulate(modes, drive, 1.0, 1.0, 80, 10)
+    stops = np.count_nonzero((done.log.what == 0) & (done.log.time > 70 * drive.period)) / 10
+    assert found.stops == (stops,) == (wanted,) and found.regime == f"{wanted} stops"
+    low, high = done.amplitudes[-1]
+    assert found.amplitude == pytest.approx((high - low) / 2, rel=1e-10)
+
+
+def test_exact_two_motions_at_one_level():
+    """Kinetic below static friction: at rest it stays, kicked it goes on sliding."""
+    modes, drive = basis_of(1.0, 0.05), BaseSine(0.9, 1.0)
+    rest = steady(modes, drive, 1.0, 0.3)
+    moving = steady(modes, drive, 1.0, 0.3, Start(np.zeros(1), np.array([8.0])))
+    assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
+    wanted = 0.9 * closed_forms.sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
+    assert moving.amplitude == pytest.approx(wanted, rel=1e-11)
+    assert np.abs(moving.multipliers).max() < 1
+
+
+def test_refuses_drives_that_do_not_repeat():
+    with pytest.raises(PatchfemError, match="one sine that goes on"):
+        steady(basis_of(1.0), drives.levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
+
+
+def two_faces(seed=2, ratio=1.0):
+    rng = np.random.default_rng(seed)
+    modes = random_basis(rng, 3, 2)
+    static = rng.uniform(0.1, 0.3, 2)
+    return modes, BaseSine(1.0, 1.2), static, ratio * static
+
+
+@pytest.mark.parametrize("seed, ratio", [(2, 1.0), (3, 0.7), (5, 1.0)])
+def test_exact_two_interfaces_against_a_run(seed, ratio):
+    modes, drive, static, kinetic = two_faces(seed, ratio)
+    found = steady(modes, drive, static, kinetic)
+    assert found.amplitude == pytest.approx(amplitude_of_run(modes, drive, static, kinetic, 400), rel=1e-8)
+    again = simulate(modes, drive, static, kinetic, 1, 1, start=found.start).window
+    np.testing.assert_allclose(again.modal[-1], found.start.z, atol=1e-11 * np.abs(again.modal).max())
+    np.testing.assert_allclose(again.modal_rate[-1], found.start.v, atol=1e-11 * np.abs(again.modal_rate).max())
+
+
+@pytest.mark.parametrize("seed, n, faces, ratio", [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)])
+def test_exact_derivative_of_the_map(seed, n, faces, ratio):
+    """Pieces and saltations against central differences."""
+    rng = np.random.default_rng(seed)
+    modes, static = random_basis(rng, n, faces), rng.uniform(0.2, 1.0, faces)
+    x, drive, step = rng.normal(size=2 * n), BaseSine(1.0, 1.2), 1e-6
+    one = period_map(modes, drive, static, ratio * static, x)
+    for j in range(2 * n):
+        e = np.zeros(2 * n)
+        e[j] = step
+        ends = [period_map(modes, drive, static, ratio * static, x + s * e).end for s in (1, -1)]
+        np.testing.assert_allclose(one.slope[:, j], (ends[0] - ends[1]) / (2 * step), atol=3e-8)
+
+
+def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
+    modes, drive, static = basis_of(1.0, 0.02), BaseSine(1.4, 1.1), 0.5
+    found = steady(modes, drive, static, static)
+    values = found.multipliers
+    assert 0.5 < abs(values[0]) < 1
+    state = np.concatenate([found.start.z, found.start.v])
+    kick = 1e-7 * np.array([1.0, 0.3])
+    ends = []
+    for cycles in (1, 2, 3):
+        run = simulate(modes, drive, static, static, cycles, 1, start=Start((state + kick)[:1], (state + kick)[1:]))
+        ends.append(np.array([run.window.modal[-1, 0], run.window.modal_rate[-1, 0]]) - state)
+    # two multipliers: the kick obeys d3 = (m1 + m2) d2 - m1 m2 d1
+    trace, product = np.linalg.solve(np.array([ends[0], -kick]).T, ends[1])
+    assert trace == pytest.approx(np.sum(values).real, rel=1e-5)
+    assert product == pytest.approx(np.prod(values).real, rel=1e-5)
+    np.testing.assert_allclose(ends[2], trace * ends[1] - product * ends[0], atol=1e-5 * np.abs(ends[0]).max())
+
+
+def test_exact_sticking_forgets():
+    """With one mode a stop leaves one number: one multiplier is zero, the other one the run's decay per cycle."""
+    found = steady(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8)
+    assert abs(found.multipliers[1]) < 1e-12
+    state = found.start
+    ends = [simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, k, 1,
+                     start=Start(state.z + 1e-6, state.v)).window.modal[-1, 0] - state.z[0] for k in (2, 3)]
+    assert ends[1] / ends[0] == pytest.approx(abs(found.multipliers[0]), rel=1e-4)
+
+
+def test_exact_figure_16_repeats():
+    h = sqrt(0.5)
+    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
+    drive = BaseSine(1.0, 1.14)
+    found = steady(modes, drive, 3.0, 3.0, cycles=120)
+    assert found.amplitude == pytest.approx((0.69867878 + 0.39299347) / 2, abs=2e-8)
+    assert found.regime == "2 stops"
+
+
+def test_exact_coinciding_events_are_told():
+    modes = basis_of([1.0, 1.0], 0.05, np.eye(2), (1, 1), (1, 0))
+    assert not steady(modes, BaseSine(1.5, 0.9), 0.5, 0.5).alone
+    assert steady(modes, BaseSine(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone

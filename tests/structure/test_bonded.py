@@ -1,0 +1,55 @@
+"""A bonded spring worked into the modes is the same structure as one that had the spring from the start."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.core import ModalBasis
+from patchfem.structure import masses
+from patchfem.structure.bonded import bonded
+from patchfem.structure.response import receptance
+
+
+def one(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):
+    a = np.array
+    return ModalBasis(("axial",), a([omega]), a([zeta]), a([slide]), a([slide]), a([slide]), mass)
+
+
+def test_exact_one_mode():
+    """omega'^2 = omega^2 + k s^2/m, 2 zeta' omega' = 2 zeta omega + c s^2/m."""
+    found = bonded(one(), 5.0, 0.4)
+    assert found.omega[0] == pytest.approx(np.sqrt(9 + 5 * 0.64 / 2), rel=1e-15)
+    assert 2 * found.zeta[0] * found.omega[0] == pytest.approx(0.06 + 0.4 * 0.64 / 2, rel=1e-14)
+    assert found.damping is None and found.slide[0] == 0.8 and found.shapes[0, 0] == 1.0
+
+
+def test_exact_rigid_mode_is_held_by_it():
+    found = bonded(one(omega=0.0, zeta=0.0), 5.0)
+    assert found.omega[0] == pytest.approx(np.sqrt(5 * 0.64 / 2), rel=1e-15) and found.damping is None
+
+
+@given(st.integers(0, 10**6))
+def test_always_equals_a_spring_that_was_there(seed):
+    """Masses with the spring and damper across the interface, and folded in later: same frequencies, same responses."""
+    rng = np.random.default_rng(seed)
+    m, k, c = rng.uniform(0.5, 2, 3), rng.uniform(1, 9, 3), rng.uniform(0, 0.3, 2)
+    springs = [((1, 0), k[0]), ((1, 2), k[1]), ((2, 3), k[2])]
+    dampers = [((1, 0), c[0]), ((2, 3), c[1])]
+    late = bonded(masses.basis(m, springs, dampers, [(3, 1)], 2), 4.0, 0.2)
+    soon = masses.basis(m, [*springs, ((3, 1), 4.0)], [*dampers, ((3, 1), 0.2)], [(3, 1)], 2)
+    np.testing.assert_allclose(late.omega, soon.omega, rtol=1e-12)
+    omega = np.array([0.3, 1.1, 2.7])
+    for row in ("slide", "output"):
+        ours = receptance(late, omega, getattr(late, row), late.base)
+        np.testing.assert_allclose(ours, receptance(soon, omega, getattr(soon, row), soon.base), rtol=1e-9)
+    z = rng.normal(size=3)
+    np.testing.assert_allclose(late.interfaces @ z, np.array([[-1.0, 0, 1]]) @ late.shapes @ z, rtol=1e-9, atol=1e-12)
+
+
+def test_exact_no_spring_changes_nothing():
+    base = masses.basis([1.0, 2.0], [((1, 0), 3.0), ((2, 1), 1.0)], [], [(2, 0)], 1)
+    found = bonded(base, 0.0)
+    np.testing.assert_allclose(found.omega, base.omega, rtol=1e-15)
+    np.testing.assert_allclose(np.abs(found.slide), np.abs(base.slide), rtol=1e-15)
+    assert found.damping is None

@@ -1,0 +1,172 @@
+"""The studies of the comparison integrators keep their word."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from test_studies import study
+
+from patchfem.core import Missing
+
+
+@pytest.fixture(scope="module")
+def failure():
+    return study("integrators/failure.py")
+
+
+def test_exact_two_masses_by_the_event_engine(failure):
+    """The numbers of a second, 40-digit computation."""
+    times = np.array([8.079711463905416, 10.00410372419476, 12.96534318337974, 15.73725378200728, 400.0])
+    found = failure.exact("two", times)
+    assert np.abs(failure.exact("two", np.linspace(0, 8.0797, 50)).slide).max() <= 1e-15
+    assert found.slide == pytest.approx([0, 0.8994115234033145, -0.5914209838254593, 0.8835834423211487,
+                                         -0.37952939486], abs=1e-10)
+    assert np.abs(failure.exact("sdof", np.linspace(199, 200, 4001) * 2 * np.pi).slide).max() == pytest.approx(
+        0.28704671337871602595, abs=1e-7)
+
+
+def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
+    rows, curves = failure.main(draw=False)
+    at = {r.name: r for r in rows}
+    loose, speed = at["Fig 17, 18: displacement 1e-2"], at["Fig 19, 20: velocity 1e-4"]
+    assert (loose.early, loose.moves, loose.force) == pytest.approx((0.1146, 5.5, 2.56), abs=5e-3)
+    assert loose.worst == pytest.approx(5.4, abs=0.05) and loose.failed == 0
+    assert any("wrong by 80 of its limit" in text for text in loose.run.warnings)
+    for tight in (at["displacement 1e-6"], speed):
+        assert tight.early < 0.0095 and 0.3 < tight.failed < 0.37 and 0.15 < tight.jumps < 0.25
+    assert 0.2 < at["force 1e-3"].failed < 0.26 and at["force 1e-3"].jumps > 0.2
+    held, elastic = at["static branch, force 1e-6"], at["Fig 21, 22: elastic 0.01, velocity 1e-6"]
+    assert held.early < 2e-4 and abs(held.error) < 3e-3 and held.jumps < 0.01
+    assert elastic.early == pytest.approx(0.0099, abs=1e-4) and abs(elastic.error) < 5e-3 and elastic.failed == 0
+    assert at["3.12 as printed, eps 0.03"].error < -90
+    caught, asked = curves[1e-3, False], curves[1e-3, True]
+    assert [caught[1], caught[3]] == pytest.approx([0.057, -0.19], abs=5e-3)
+    assert np.all(np.array(caught[4:]) < -0.99)
+    assert asked[4] == pytest.approx(-9e-4, abs=1e-4) and abs(asked[-1]) < 2e-5
+    assert "Newmark" in capsys.readouterr().out
+
+
+def test_exact_the_picture_of_the_failure(failure, tmp_path):
+    rows = [failure.solve(*case) for case in failure.CASES if case[0] in failure.DRAWN]
+    path = failure.picture(rows, {(1e-3, False): [0.1, 0.2], (1e-3, True): [0.1, 0.01]}, tmp_path / "one.svg")
+    text = path.read_text()
+    assert all(title in text for title in failure.DRAWN.values()) and "Newmark, stick speed" in text
+
+
+@pytest.fixture(scope="module")
+def work():
+    return study("integrators/work_precision.py")
+
+
+@pytest.fixture(scope="module")
+def engines(work):
+    return sys.modules["engines"]
+
+
+@pytest.fixture(scope="module")
+def table(work):
+    return json.loads(work.TABLE.read_text())
+
+
+def row(table, where, name, knob):
+    return next(r for r in table["rows"] if (r["problem"], r["engine"], r["knob"]) == (where, name, knob))
+
+
+@pytest.mark.parametrize("where", ["decay", "block", "two"])
+def test_exact_dop853_from_event_to_event(engines, where):
+    one = engines.problem(where)
+    assert one.error(engines.dop853(one, 1e-10)) < 5e-9
+
+
+def test_exact_without_a_longest_step_dop853_passes_over_releases(engines):
+    """No warning, 4 events instead of 240."""
+    one = engines.problem("block")
+    slide, events = engines.counted(one, 1e-8, 1e9)
+    assert events == 4 and one.error(slide) > 0.5
+    assert engines.counted(one, 1e-8, 1 / 8)[1] == 240
+
+
+def test_exact_errors_of_the_saved_table(engines, table):
+    """Errors do not depend on the machine: the cheap rows again."""
+    for where in ("decay", "block", "two"):
+        for name, knobs in (("march", (200, 800)), ("newmark, and force", (200, 800)), ("euler, tanh", (1000,)),
+                            ("duhamel, static branch", (200, 800))):
+            run, _, places = engines.OURS[name]
+            for knob in knobs if where in places else ():
+                one = engines.problem(where)
+                assert one.error(run(one, knob)) == pytest.approx(row(table, where, name, knob)["error"], rel=0.02)
+
+
+def test_exact_sentences_of_the_saved_table(work, table):
+    of = lambda where, name: work.curve(table["rows"], where, name)  # noqa: E731
+    assert {r["problem"] for r in table["rows"]} == {"decay", "block", "two", "patch"}
+    for where in ("block", "two"):
+        second = of(where, "newmark, and force")[0]
+        assert second[0] / second[-1] > 1000  # 64 times the steps
+        assert of(where, "newmark, stick speed")[0].min() > 0.05
+        assert of(where, "exact")[0].max() == work.FLOOR
+        assert of(where, "DOP853 + events")[0].min() < 1e-10 and of(where, "SUNDIALS CVODE")[0].min() < 1e-9
+    assert of("block", "euler, tanh")[0].min() > 0.015  # the law itself
+    assert of("block", "newmark, stick speed")[0][-1] == pytest.approx(1.0, abs=0.01)
+    assert of("patch", "SUNDIALS CVODE")[0].min() < 1e-7  # the march at 204800 steps is the truth to this
+    marched = of("patch", "march")[0]
+    assert marched[0] / marched[-1] > 1e4
+    exact = of("block", "exact")[1][0]
+    quick = work.ratios(table["rows"], "patch", "march")["SUNDIALS CVODE"]
+    assert float(quick[1e-4].strip("<> ")) > 3
+    assert of("block", "DOP853 + events")[1].min() > 4 * exact and of("block", "SUNDIALS CVODE")[1][3] > 2 * exact
+
+
+def test_exact_ratios_of_power_laws(work):
+    """Times c e^-1/2 and 10 c e^-1/2 are ten apart at every error that both reach."""
+    errors = 10.0 ** -np.arange(1, 8)
+    rows = [{"problem": "p", "engine": name, "error": e, "seconds": c * e**-0.5, "knob": 0}
+            for name, c in (("a", 1.0), ("b", 10.0)) for e in errors]
+    rows.append({"problem": "p", "engine": "b", "error": 0.5, "seconds": 1e9, "knob": 1})  # no front
+    rows.append({"problem": "p", "engine": "c", "error": 1e-2, "seconds": 30.0, "knob": 0})
+    found = work.ratios(rows, "p", "a")
+    assert found["b"] == {error: "10" for error in work.EQUAL}
+    assert found["c"][1e-2] == "3" and found["c"][1e-3] == "-"
+
+
+def test_exact_the_picture_of_the_saved_table(work, table, tmp_path):
+    text = work.picture(table, tmp_path / "one.svg").read_text()
+    assert all(work.TITLES[where] in text for where in work.SHOWN)
+    assert all(name in text for name in {r["engine"] for r in table["rows"] if r["problem"] != "decay"})
+
+
+def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, capsys, tmp_path):
+    for _, _, _, _, variable, _ in engines.PEERS.values():
+        monkeypatch.setenv(variable, "/nowhere/python")
+    few = {"newmark, and force": (engines.newmark_cured, (100,), ("block",))}
+    found = work.main(("block",), few, repeats=1, path=tmp_path / "t.json")
+    assert [r["engine"] for r in found["rows"]] == ["newmark, and force"]
+    assert set(found["absent"]) == set(engines.PEERS)
+    said = capsys.readouterr()
+    assert "/nowhere/python" in said.err and "PATCHFEM_SUNDIALS_PYTHON" in said.err
+    assert "skipped: Siconos, theta 1/2 is not installed" in said.out
+
+
+@pytest.mark.parametrize("name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)])
+@pytest.mark.parametrize("where", ["decay", "block", "two"])
+def test_exact_peers_find_the_same_motion(engines, work, name, knob, error, where):
+    ask, _, _, script, variable, remedy = engines.PEERS[name]
+    try:
+        peer = work.Peer(name, f"../integrators/{script}", variable, sys.executable, remedy)
+    except Missing as absent:
+        pytest.skip(str(absent))
+    with peer:
+        one = engines.problem(where)
+        slide, seconds = ask(peer, one, knob)
+    assert one.error(slide) < error and seconds > 0
+
+
+@pytest.mark.slow
+def test_exact_the_patch_by_two_programs(engines):
+    """Elastic-plastic elements by the march and by DOP853 between reversals; with longer steps it misses some."""
+    one = engines.problem("patch")
+    assert one.error(engines.dop853(one, 1e-10)) < 1e-6
+    assert one.error(engines.march(one, 3200)) < 1e-4
+    slide, events = engines.counted(one, 1e-8, 1 / 8)
+    assert events < 202 and one.error(slide) > 1e-2

@@ -1,0 +1,286 @@
+"""[structure] as masses and with a start: what is read, what is refused, and the linear runs against direct solves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scene_texts import LINEAR, STRUCTURE, line_of, only
+
+from patchfem.core import PatchfemError
+from patchfem.scene import SceneError, load, loads
+from patchfem.simulate import plan, run
+from patchfem.simulate_structure import (
+    first_frequency,
+    frequencies,
+    friction_limit,
+    highest_frequency,
+    mode_stiffness,
+    modes_of,
+    motions,
+    moving_mass,
+    start_of,
+)
+
+MASSES = """\
+[structure]
+masses = ["2 kg", "1 kg"]
+output_mass = 2
+[[structure.spring]]
+between = [1, 0]
+stiffness = "3e5 N/m"
+[[structure.spring]]
+between = [1, 2]
+stiffness = "1e5 N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "30 N s/m"
+[[structure.damper]]
+between = [1, 2]
+coefficient = "10 N s/m"
+[drive]
+kind = "base"
+frequency = "40 Hz"
+acceleration = "2 m/s^2"
+cycles = 300
+"""
+RUB = """\
+[[structure.interface]]
+between = [2, 0]
+law = "coulomb"
+static = 0.3
+load = "10 N"
+"""
+M, K, C = np.diag([2.0, 1.0]), np.array([[4e5, -1e5], [-1e5, 1e5]]), np.array([[40.0, -10], [-10, 10]])
+
+
+def driven(text, *sets, **drive):
+    """The scene with another drive, also one that no run can do yet."""
+    scene = loads(text, sets=sets)
+    return replace(scene, drive=scene.drive.model_copy(update=drive))
+
+
+def test_exact_linear_run_of_masses():
+    """Steady amplitude and absolute acceleration of mass 2 by (K + i w C - w^2 M)^-1 M r a."""
+    result = run(plan(loads(MASSES)))
+    w = 2 * np.pi * 40
+    x = np.linalg.solve(K + 1j * w * C - w * w * M, -M @ np.ones(2) * 2.0)
+    value = {name: m.value for name, m in result.measures.items()}
+    assert value["relative_displacement_amplitude"] == pytest.approx(abs(x[1]), rel=1e-9)
+    assert value["absolute_acceleration_peak"] == pytest.approx(abs(2.0 - w * w * x[1]), rel=1e-6)
+    assert value["energy_balance"] < 1e-12 and result.outcome == "steady"
+    both = motions(modes_of(result.plan.scene), result.response.modal)
+    np.testing.assert_allclose(both[:, 1], result.response.output, atol=1e-15)
+
+
+def test_exact_one_mass_is_one_mode():
+    """The same rig as a mass with spring and damper, and as a mode with its frequency and damping."""
+    w = 2 * np.pi * 143
+    mass = f"""\
+[structure]
+masses = ["0.884 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "{0.884 * w * w!r} N/m"
+[[structure.damper]]
+between = [0, 1]
+coefficient = "{2 * 0.003 * w * 0.884!r} N s/m"
+{STRUCTURE[STRUCTURE.index('[drive]'):]}"""
+    ours, want = run(plan(loads(mass))), run(plan(loads(STRUCTURE)))
+    for name, measure in want.measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-9, abs=1e-12), name
+    assert ours.plan.chain["mode"] == pytest.approx(want.plan.chain["mode"], rel=1e-12)
+
+
+def test_exact_bonded_spring_in_a_run():
+    """f2 of the rig without friction: the stuck frequency is sqrt(K + ka); amplitude of the damped oscillator."""
+    text = STRUCTURE.replace("cycles = 30", "cycles = 1500") + '[structure.bonded]\nstiffness = "4e6 N/m"\n'
+    scene = loads(text)
+    result = run(plan(scene))
+    w0, w = 2 * np.pi * 143, 2 * np.pi * 143
+    k = 0.884 * w0 * w0 + 4e6
+    x = 0.884 * 5 * 9.80665 / abs(k - 0.884 * w * w + 2j * 0.003 * w0 * w * 0.884)
+    assert result.measures["relative_displacement_amplitude"].value == pytest.approx(x, rel=1e-9)
+    assert "structure.bonded" in scene.named() and result.plan.chain["bonded"] == 4e6
+    assert highest_frequency(scene) == pytest.approx(np.sqrt(k / 0.884) / (2 * np.pi), rel=1e-12)
+    assert (first_frequency(scene), mode_stiffness(scene)) == (143.0, pytest.approx(0.884 * w0 * w0, rel=1e-14))
+
+
+def test_exact_numbers_for_the_plan():
+    scene = loads(MASSES)
+    found = modes_of(scene)
+    np.testing.assert_allclose(frequencies(scene), found.omega / 2 / np.pi)
+    assert moving_mass(scene) == pytest.approx(1 / found.output[0]**2)
+    assert mode_stiffness(scene) == pytest.approx(moving_mass(scene) * found.omega[0]**2)
+    free = loads(MASSES[:MASSES.index("[[structure.damper")] + MASSES[MASSES.index("[drive]"):],
+                 sets=["structure.spring.0.stiffness=0 N/m"])
+    assert frequencies(free)[0] == 0.0
+    assert first_frequency(free) == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
+    assert plan(free).chain["mode"] == pytest.approx(1.5e5 / (2 / 3)), "modal mass at the output 1/(2/3)"
+    rub = loads(RUB + MASSES)
+    assert friction_limit(rub, 0.0) == pytest.approx(3.0)
+    assert plan(rub).groups["D"] == pytest.approx(3.0 / (moving_mass(rub) * 2.0))
+    second = loads(LINEAR, sets=["structure.mode.axial.frequency=0 Hz"])
+    assert first_frequency(second) == 990.0
+
+
+def test_exact_a_force_acts_where_it_is_said():
+    scene = driven(MASSES, kind="force", force=7.0, mass=None)
+    found = modes_of(scene)
+    np.testing.assert_allclose(found.shapes @ found.base, -np.linalg.solve(M, [0, 1]), rtol=1e-12, atol=1e-15)
+    found = modes_of(driven(MASSES, kind="force", force=7.0, mass=1))
+    np.testing.assert_allclose(found.shapes @ found.base, -np.linalg.solve(M, [1, 0]), rtol=1e-12, atol=1e-15)
+    scene = driven(LINEAR, "structure.mode.second.output=0.5", kind="force")
+    assert modes_of(scene).base.tolist() == [-0.8, -0.5]
+
+
+def test_exact_starts_of_a_scene():
+    begin = '[structure.start]\ndisplacement = ["1 mm", "-2 mm"]\nvelocity = ["0 m/s", "3 mm/s"]\n'
+    scene = loads(MASSES + begin)
+    found = modes_of(scene)
+    start = start_of(scene, found)
+    np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-13)
+    np.testing.assert_allclose(found.shapes @ start.v, [0, 3e-3], rtol=1e-13, atol=1e-18)
+    free = driven(MASSES, kind="free", displacement=1e-3)
+    np.testing.assert_allclose(found.shapes @ start_of(free, found).z, [0, 1e-3], atol=1e-18)
+    free = driven(MASSES, kind="free", displacement=1e-3, mass=1)
+    np.testing.assert_allclose(found.shapes @ start_of(free, found).z, [1e-3, 0], atol=1e-18)
+    step = driven(MASSES, waveform="step", displacement=1e-3, acceleration=None)
+    np.testing.assert_allclose(found.shapes @ start_of(step, found).z, [-1e-3, -1e-3], rtol=1e-13)
+    assert not start_of(loads(MASSES), found).z.any()
+    one = driven(STRUCTURE, kind="free", displacement=1e-3)
+    assert start_of(one, modes_of(one)).z.tolist() == [1e-3]
+    assert "structure.start" in scene.named() and loads(scene.resolved()).structure.start == scene.structure.start
+
+
+@pytest.mark.parametrize("sets, key, says", [
+    (["structure.spring.0.between=[3, 0]"], "structure.spring.0.between", "there is no mass 3: masses has 2"),
+    (["structure.spring.0.between=[1, 1]"], "structure.spring.0.between", "joins mass 1 to itself"),
+    (["structure.damper.0.between=[0, 0]"], "structure.damper.0.between", "joins the base to itself"),
+    (["structure.interface.0.between=[2, 2]"], "structure.interface.0.between", "joins mass 2 to itself"),
+    (["structure.interface.0.between=[0, 9]"], "structure.interface.0.between", "there is no mass 9"),
+    (["structure.interface.0.load=-1 N"], "structure.interface.0.load", "must be >= 0"),
+    (["structure.output_mass=3"], "structure.output_mass", "there is no mass 3"),
+    (["structure.masses=[]"], "structure.masses", "at least one mass is wanted"),
+    (["structure.masses=['1 kg', '0 kg']"], "structure.masses.1", "must be > 0"),
+    (["structure.spring.0.stiffness=-1 N/m"], "structure.spring.0.stiffness", "must be >= 0"),
+    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; one for each"),
+    (["structure.start={}"], "structure.start.displacement", "or structure.start.velocity"),
+    (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
+    (["drive={kind = 'force', mass = 3, force = '1 N', frequency = '1 Hz', cycles = 9}"], "drive.mass", "no mass 3"),
+    (["drive={kind = 'free', displacement = '1 mm', cycles = 9}", "structure.start.velocity=['1 m/s', '0 m/s']"],
+     "structure.start", "[structure.start] and drive.displacement exclude each other"),
+])  # fmt: skip
+def test_refuses_masses_that_are_not_there(sets, key, says):
+    message = only(RUB + MASSES, *sets)
+    assert message.startswith(f"--set: {key}: ") and says in message
+
+
+def test_refuses_at_the_line_of_the_file():
+    text = (RUB + MASSES).replace("between = [2, 0]", "between = [2, 5]")
+    assert only(text).startswith(f"a.toml:{line_of(text, 'between = [2, 5]')}: structure.interface.0.between: ")
+
+
+@pytest.mark.parametrize("text, key, says", [
+    (MASSES + '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "structure.interface",
+     "write [[structure.interface]]"),
+    (MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 0 interfaces"),
+    (RUB + RUB + MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 2 interfaces"),
+    (STRUCTURE + '[structure.start]\nvelocity = ["1 m/s", "2 m/s"]\n', "structure.start.velocity",
+     "2 values for 1 mode; one for each"),
+    (STRUCTURE.replace("cycles", "mass = 1\ncycles").replace('"base"', '"force"').replace(
+        "acceleration", 'force = "1 N"\nacceleration'), "drive.mass", "leave it out"),
+    (STRUCTURE[:STRUCTURE.index("[[")].replace("moving", 'file = "rig.csv"\nmoving') +
+     STRUCTURE[STRUCTURE.index("[drive]"):], "structure.file", "the name ends in '.csv'"),
+])  # fmt: skip
+def test_refuses_what_does_not_go_together(text, key, says):
+    message = only(text)
+    assert f": {key}: " in message and says in message
+
+
+def test_always_a_mass_that_nothing_holds_is_allowed():
+    scene = loads(MASSES[:MASSES.index("[[structure.spring")] + MASSES[MASSES.index("[drive]"):])
+    result = run(plan(scene))
+    base = 2.0 / (2 * np.pi * 40)**2  # relative motion is the base's own, turned round, plus its drift from rest
+    time = result.response.time
+    want = base * (np.sin(2 * np.pi * 40 * time) - 2 * np.pi * 40 * time)
+    np.testing.assert_allclose(result.response.output, want, atol=1e-9 * np.abs(want).max())
+
+
+FILE = """\
+[structure]
+file = "rig.npz"
+[drive]
+kind = "base"
+frequency = "40 Hz"
+acceleration = "2 m/s^2"
+cycles = 300
+"""
+POINT = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+
+
+def write_scene(folder, text):
+    (folder / "scene.toml").write_text(text, "utf-8")
+    return load(folder / "scene.toml")
+
+
+def test_exact_matrices_run_as_masses_do(tmp_path):
+    """M, K, C in a file and the same rig as masses: equal measures; interfaces between numbered coordinates."""
+    np.savez(tmp_path / "rig.npz", M=M, K=K, C=C, output=[0.0, 1.0])
+    ours = run(plan(write_scene(tmp_path, FILE)))
+    for name, measure in run(plan(loads(MASSES))).measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-9, abs=1e-12), name
+    scene = write_scene(tmp_path, RUB + FILE)
+    np.testing.assert_allclose(modes_of(scene).interfaces, modes_of(loads(RUB + MASSES)).interfaces, rtol=1e-9)
+    assert scene.kind == "rig"
+
+
+def test_exact_modes_of_a_file_run_as_written_ones(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "rig.mat", {"frequency": [143.0], "damping": [0.003], "slide": [1.0], "base": [1.0]})
+    text = STRUCTURE[STRUCTURE.index("[drive]"):]
+    scene = write_scene(tmp_path, '[structure]\nfile = "rig.mat"\nmoving_mass = "0.884 kg"\n' + POINT + text)
+    ours, want = run(plan(scene)), run(plan(loads(POINT + STRUCTURE)))
+    for name, measure in want.measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-9, abs=1e-12), name
+    assert ours.plan.groups == pytest.approx(want.plan.groups)
+
+
+def test_exact_responses_of_a_file_run_as_the_mode_behind_them(tmp_path):
+    """Accelerance of one mode (0.884 kg at node 7) written as dataset 58; what is lost is the file's digits."""
+    import pyuff
+
+    f = np.arange(100.0, 200.0, 0.25)
+    w, w0 = 2 * np.pi * f, 2 * np.pi * 143
+    data = -w**2 / 0.884 / (w0**2 - w**2 + 2j * 0.003 * w0 * w)
+    one = {"type": 58, "func_type": 4, "rsp_node": 7, "rsp_dir": 1, "ref_node": 7, "ref_dir": 1, "abscissa_spacing": 1,
+           "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "x": f,
+           "data": data, "ordinate_axis_units_lab": "m/s^2", "orddenom_axis_units_lab": "slug"}
+    pyuff.UFF(str(tmp_path / "rig.uff")).write_sets([one], mode="overwrite")
+    text = '[structure]\nfile = "rig.uff"\nmoving_mass = "0.884 kg"\nslide_at = "7:+x"\n' + POINT
+    ours = run(plan(write_scene(tmp_path, text + STRUCTURE[STRUCTURE.index("[drive]"):])))
+    for name, measure in run(plan(loads(POINT + STRUCTURE))).measures.items():
+        assert ours.measures[name].value == pytest.approx(measure.value, rel=1e-5, abs=1e-12), name
+    assert any("'slug' is not known" in line for line in ours.warnings)
+
+
+def test_refuses_files_at_the_line_of_the_scene(tmp_path):
+    np.savez(tmp_path / "rig.npz", M=M, K=K)
+    with pytest.raises(PatchfemError) as caught:
+        plan(write_scene(tmp_path, FILE))
+    assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output")
+    np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
+    with pytest.raises(PatchfemError, match=r"structure\.file: lacks slide"):
+        modes_of(write_scene(tmp_path, POINT + FILE))
+    late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
+    with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values stand for 2 modes or masses"):
+        start_of(late, modes_of(late))
+    with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
+        write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
+    for text, says in ((FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),
+                       (FILE.replace("rig.npz", "rig.uff"), "structure.slide_at: missing"),
+                       (FILE.replace("[drive]", 'slide_at = "1:x"\n[drive]'), "holds the array slide"),
+                       (RUB + FILE.replace("rig.npz", "rig.uff"), "a universal file has nodes")):
+        with pytest.raises(SceneError) as caught:
+            loads(text)
+        assert says in str(caught.value)
