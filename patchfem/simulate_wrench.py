@@ -198,7 +198,8 @@ class WrenchRun(Run):
         work = self._works(rows)
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
-        digit = np.abs(rows[:-1, :n // 2]) @ np.abs(self.modes.slide)
+        digit = np.abs(rows[:, :n // 2]) @ np.abs(self.modes.slide)
+        digit = np.maximum(digit[1:], digit[:-1]) + self.prop.beta[0, 0] * size
         noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * digit) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
