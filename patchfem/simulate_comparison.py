@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from . import simulate_drive
+from . import simulate_drive, simulate_events
 from .core import Outcome, PatchfemError
 from .response.measures import (
     harmonic,
@@ -53,7 +53,7 @@ def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=No
     bears = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
     laws, start, begin = laws_of(scene, bears), start_of(scene, modes), perf_counter()
     done = _integrated(scene, settings, modes, drive, laws, start)
-    response = _with_slip(done.response(modes, drive.moving), laws)
+    response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
     n, window = settings.steps, settings.window
     first = max(0, response.time.size - 1 - window * n)
     kept = _cut(response, slice(first, None))
@@ -61,17 +61,19 @@ def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=No
     last = min(window, len(extremes))
     book = _book(done)
     values = run_measures(kept, extremes, book, drive, last)
-    stuck = False
+    stuck, own = False, {}
     if scene.friction is None:
         values.pop("friction_force_peak")
     else:
         values |= _rubbing(scene, kept, drive, n, bears) | other_measures(kept, drive, n)
         values |= {"friction_work": book["friction"], "energy_dissipated": book["friction"], "energy_created": 0.0}
-        stuck = values["slip_amplitude"] == 0.0
+        stuck = simulate_events.all_stick(values, kept, 0.0)
+        rings, own = simulate_events.rings(kept, modes, drive)
+        values |= rings
     outcome = _outcome(scene, done, response)
     return Raw(values, response, kept, window_amplitudes(extremes, window),
                steady_amplitude(*window_ends(extremes, phasors, window)), outcome or (Outcome.STUCK if stuck else None),
-               [], book, perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings)
+               [], book, perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
 
 
 def _integrated(scene, settings, modes, drive, laws, start):
@@ -97,16 +99,31 @@ def _integrated(scene, settings, modes, drive, laws, start):
     return euler.run(modes, drive, laws, duration, settings.steps, start)
 
 
+def _with_interfaces(response, modes):
+    """With slides, slide_rates and forces (k, i) of every interface where there are several."""
+    from dataclasses import replace
+
+    extra = {name: response.extra[name] for name in ("residual", "iterations")}
+    if len(modes.interfaces) > 1:
+        faces = modes.interfaces.T
+        extra |= {"slides": response.modal @ faces, "slide_rates": response.modal_rate @ faces,
+                  "forces": response.extra["forces"].T}
+    return replace(response, extra=extra)
+
+
 def _with_slip(response, laws):
-    """The irreversible slip of an elastic-plastic interface in place of its slide."""
+    """The irreversible slip of elastic-plastic interfaces in place of their slide."""
     from dataclasses import replace
 
     from .dynamics.point_laws import ElasticPlastic
 
+    give = np.array([law.length / law.limit if isinstance(law, ElasticPlastic) else 0.0 for law in laws])
+    if not give.any():
+        return response
     extra = response.extra
-    if not laws or not isinstance(laws[0], ElasticPlastic):
-        return replace(response, extra=extra)
-    return replace(response, slip=response.slide - response.force * laws[0].length / laws[0].limit, extra=extra)
+    if "slides" in extra:
+        extra = extra | {"slips": extra["slides"] - extra["forces"] * give}
+    return replace(response, slip=response.slide - response.force * give[0], extra=extra)
 
 
 def _cut(response, part):

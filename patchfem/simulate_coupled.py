@@ -12,7 +12,9 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     """Run a plan of kind rig or linear; arguments as `simulate.run` has them, patch and coarse of its [contact]."""
     from . import simulate_rig as rig
     from .response.errors import change, with_errors
+    from .simulate_events import events_of, with_own
     from .simulate_interfaces import viewed
+    from .simulate_outcome import changing_note, settle
     from .simulate_structure import notes_of
 
     scene = viewed(what.scene)
@@ -54,7 +56,10 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         lowest = levels.onset(scene, raw.levels, raw.slips, scene.accuracy.tolerance)
         found, extra = found | levels.measures(raw.levels, lowest), extra | {"levels": raw.levels}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
-    outcome, found = rig.settle(raw, without_errors(found, estimated), scene.accuracy.tolerance)
+    found = with_own(found, raw.own)
+    outcome, found = settle(raw, without_errors(found, estimated), scene, drive)
+    if scene.friction is not None:
+        extra["events"] = events_of(raw.window, drive, raw.log, raw.held)
     fields = {}
     if patch is not None:
         from .simulate_measures import measures
@@ -71,7 +76,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         warnings = [*warnings, *unripe(law, float(np.abs(raw.window.slide_rate).max())),
                     *creeping(law, outcome, found)]
     warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
-    warnings = [*warnings, *raw.notes, *([raw.message] if raw.message else [])]
+    warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 
 

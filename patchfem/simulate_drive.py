@@ -55,6 +55,11 @@ def sweep_duration(drive) -> float:
     return abs(np.log2(drive.to / drive.from_)) / drive.log_rate
 
 
+def levelled(scene) -> bool:
+    """Whether the drive is raised in levels."""
+    return scene.drive.kind == "base" and scene.drive.waveform == "levels"
+
+
 def cycles_per_level(scene) -> float:
     """Drive cycles of each level: whole ones, so that a level begins where the sine does."""
     drive = scene.drive
@@ -64,7 +69,7 @@ def cycles_per_level(scene) -> float:
 
 def cycles_of(scene, drive) -> float:
     """Length of the run in cycles of the drive; of levels, all of them."""
-    if scene.drive.kind == "base" and scene.drive.waveform == "levels":
+    if levelled(scene):
         return cycles_per_level(scene) * len(scene.drive.levels)
     if scene.drive.cycles is not None:
         return scene.drive.cycles

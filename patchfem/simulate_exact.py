@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from . import simulate_drive, simulate_levels
+from . import simulate_drive, simulate_events, simulate_levels
 from .core import BaseSine, Outcome, Start
 from .response.levels import Level
 from .response.measures import (
@@ -34,10 +34,13 @@ def run_exact(scene, settings, modes, drive, load: float, start=None, progress=N
         done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
         levels, slips = (), None
     values, stuck = _values(scene, settings, drive, done, load)
+    rubs = scene.friction is not None
+    rings, own = simulate_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
+    values |= rings
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
                steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
-               done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log)
+               done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log, own=own)
 
 
 def _forces(scene, modes, load: float, share: float) -> tuple:
@@ -90,8 +93,8 @@ def _values(scene, settings, drive, done, load: float) -> tuple:
         omega = simulate_drive.omega_of(drive)
         q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
         values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
-    values |= other_measures(done.window, drive, 400)
-    others = np.ptp(done.window.extra["slides"], axis=0).any() if "slides" in done.window.extra else False
+    values |= other_measures(done.window, drive, 400, done.log)
+    others = any(simulate_events.moving(done.window, drive, done.log)[1:])
     return values, done.stick >= span * (1 - 1e-12) and not others
 
 
@@ -121,7 +124,7 @@ def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tupl
 
 
 def _joined(parts, each: float):
-    """Runs of `each` [s] one after the other as one EventRun; its window, loop and log are those of the last."""
+    """Runs of `each` [s] one after the other as one EventRun; its window and loop are those of the last."""
     shift = [k * each for k in range(len(parts))]
     last = parts[-1]
     columns = {name: np.concatenate([getattr(p.response, name) for p in parts])
@@ -133,5 +136,6 @@ def _joined(parts, each: float):
     ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
     ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
     return replace(last, response=response, window=window, ledger=ledger,
+                   log=simulate_events.joined_logs([p.log for p in parts], shift),
                    amplitudes=np.concatenate([p.amplitudes for p in parts]),
                    phasors=np.concatenate([p.phasors for p in parts]), events=sum(p.events for p in parts))

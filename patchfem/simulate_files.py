@@ -118,8 +118,11 @@ def _histories(result: Result) -> tuple:
                 **{name: values for name, values in across.items() if values is not None}}, None
     out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
-    if kind == "rig":
-        out |= dict(zip(LEDGER, r.extra["ledger"])) if "ledger" in r.extra else {}
+    if kind == "rig" and "ledger" in r.extra:
+        out |= dict(zip(LEDGER, r.extra["ledger"]))
+    if result.plan.scene.structure.interface:
+        out |= _between(result)
+    elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
     from .simulate_structure import modes_of, motions
@@ -128,16 +131,50 @@ def _histories(result: Result) -> tuple:
     return out, (list(modes.names), motions(modes, r.modal))
 
 
+def _between(result: Result) -> dict:
+    """Histories (i, k) of the interfaces of a rig of masses, those of its output beside them."""
+    r, scene = result.response, result.plan.scene
+    columns = {"relative_displacement": ("slides", r.slide), "relative_velocity": ("slide_rates", r.slide_rate),
+               "friction_force": ("forces", r.force)}
+    loads = np.array([one.load for one in scene.structure.interface])
+    return {"output_displacement": r.output, "output_velocity": r.output_rate,
+            "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
+            **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
+               for name, (many, one) in columns.items()}}
+
+
+def interface_names(scene) -> list:
+    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
+    found = [] if scene.structure is None else [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]
+
+
 def _write_netcdf(result: Result, path: Path, text: str) -> None:
-    from .export.netcdf import dataset, write
+    from .export import netcdf
 
     histories, modal = _histories(result)
-    patch = result.patch
+    patch, extra = result.patch, result.extra
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
     strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
-    levels = _levels(result.extra["levels"]) if "levels" in result.extra else None
-    write(dataset(histories, modal, fields, x, weight, strips, levels), path, summary_of(result), text, versions())
+    levels = _levels(extra["levels"]) if "levels" in extra else None
+    names = interface_names(result.plan.scene) if histories else []
+    data = netcdf.dataset(histories, modal, fields, x, weight, strips, levels, names)
+    if "events" in extra:
+        from .response.events import MEANINGS
+
+        e = extra["events"]
+        data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
+    if "curve" in extra:
+        data = netcdf.with_curve(data, extra["curve"])
+    if "regime" in extra:
+        data = data.assign_attrs(regime=extra["regime"], largest_multiplier=_multiplier(extra))
+    netcdf.write(data, path, summary_of(result), text, versions())
+
+
+def _multiplier(extra: dict) -> float:
+    """Largest |Floquet multiplier|."""
+    return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
 
 
 def _levels(levels) -> dict:
@@ -160,6 +197,13 @@ def report_data(result: Result) -> dict:
     data = {"name": scene.path.stem, "summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
             "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
             "x": None if result.patch is None else result.patch.x, "versions": versions()}
+    if "curve" in result.extra:
+        data["curve"] = result.extra["curve"]
+    if "levels" in result.extra:
+        data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors}
+                          for one in result.extra["levels"]]
+    if "regime" in result.extra:
+        data["steady"] = {"regime": result.extra["regime"], "multiplier": _multiplier(result.extra)}
     if r is not None:
         slow = result.plan.kind == "bench"
         data["history"] = {"time": r.time, "displacement": r.slide if slow else r.output, "force": r.force}

@@ -121,17 +121,25 @@ def other_windows(window) -> list:
                     force=extra["forces"][:, k], slip=slips[:, k]) for k in range(1, slips.shape[1])]
 
 
-def other_measures(window, drive, steps: int) -> dict:
+def other_measures(window, drive, steps: int, log=None) -> dict:
     """Measures of the interfaces after the first, their number behind the name: slip_amplitude_2, stick_fraction_2,
-    friction_force_peak_2, loop_area_2 (by the trapezoidal rule)."""
+    friction_force_peak_2, loop_area_2 (by the trapezoidal rule, which leaves nothing out where the friction is constant
+    in slip). With the log of an exact run the stick fraction is that of its events."""
+    from .response.events import stuck_time
     from .response.measures import slip_measures
 
-    out = {}
+    out, events = {}, None
+    if log is not None and "slides" in window.extra:
+        from .simulate_events import of_log
+
+        events = of_log(log)
     for k, one in enumerate(other_windows(window), 2):
-        found = slip_measures(one, drive, steps)
+        found, length = slip_measures(one, drive, steps), one.time[-1] - one.time[0]
         found.pop("slip_start_phase", None)
-        span = max((one.time[-1] - one.time[0]) / drive.period, 1e-300)
+        if events is not None:
+            held = stuck_time(events, k, one.time[0], one.time[-1], bool(np.ptp(one.slip)))
+            found["stick_fraction"] = min(held / length, 1.0)
         found |= {"friction_force_peak": float(np.abs(one.force).max()),
-                  "loop_area": float(np.trapezoid(one.force, one.slide)) / span}
+                  "loop_area": float(np.trapezoid(one.force, one.slide)) / max(length / drive.period, 1e-300)}
         out |= {f"{name}_{k}": value for name, value in found.items()}
     return out

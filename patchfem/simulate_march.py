@@ -8,6 +8,7 @@ import numpy as np
 
 from .compiled import load_kernels
 from .core import BaseSine, Missing, ModalBasis, Outcome, Response
+from .response.measures import STICK
 from .simulate_models import (
     ContactModel,
     coulomb_model,
@@ -25,6 +26,7 @@ __all__ = ["ContactModel", "MarchResult", "Run", "coulomb_model", "growth_number
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
+MOST_TURNS = 100  # of them in a cycle
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,7 +116,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
     """
 
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
-    total, n = round(cycles * steps_per_cycle), modes.omega.size
+    total = round(cycles * steps_per_cycle)
     last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
     asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
     size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
@@ -122,7 +124,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
         if len(last) == last.maxlen and samples < MOST_KEPT:
-            pick = _thinned(last[0][1], n)
+            pick = _thinned(last[0][1], run)
             kept.append(last[0][1][pick])
             kept_at.append(last[0][0] + pick)
             samples += len(pick)
@@ -280,6 +282,11 @@ class Run:
             self.message = (f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of the "
                             "friction limit; raise accuracy.steps_per_cycle")
 
+    def watched(self, rows) -> tuple:
+        """(rates, slips) (k, i) of the interfaces in booked rows."""
+        n = 2 * self.modes.omega.size
+        return rows[:, n + 1:n + 2], rows[:, n + 3:n + 4]
+
     def motion(self) -> float:
         """Kinetic and elastic energy of the modes [J]."""
         return 0.5 * self.modes.mass * float(np.sum(self.state[1]**2 + (self.modes.omega * self.state[0])**2))
@@ -300,12 +307,19 @@ class Run:
         return book
 
 
-def _thinned(rows, n) -> np.ndarray:
-    """Numbers of the samples of a cycle worth keeping: its first, and every reversal of the slide."""
-    v = rows[:-1, 2 * n + 1]
-    turn = np.flatnonzero(v[:-1] * v[1:] <= 0)
-    return np.unique(np.concatenate([[0], turn[:20]]))
-
+def _thinned(rows, run) -> np.ndarray:
+    """Numbers of the samples of a cycle worth keeping: its first, every reversal of the output and of a slide, every
+    stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
+    n = run.modes.omega.size
+    speeds, slips = run.watched(rows)
+    speeds = np.column_stack([speeds, rows[:, n:2 * n] @ run.modes.output])
+    still = np.abs(speeds) <= 1e-13 * np.abs(rows[:, n:2 * n]).max(initial=0.0)
+    way = np.where(still, 0.0, np.sign(speeds))
+    moved = np.abs(np.diff(slips, axis=0))
+    slipping = moved > np.maximum(STICK * moved.max(axis=0, initial=0.0), 1e-13 * np.abs(rows[:, :n]).max(initial=0.0))
+    turn = (way[1:] != way[:-1]).any(axis=1)
+    turn[1:] |= (slipping[1:] != slipping[:-1]).any(axis=1)
+    return np.unique(np.concatenate([[0], np.flatnonzero(turn)[:MOST_TURNS]]))
 
 def _extremes(rows, modes, dt) -> tuple:
     """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""

@@ -7,10 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from . import simulate_drive
-from .core import Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
+from .core import Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
-    classify,
     harmonic,
     interface_loop,
     ledger_measures,
@@ -29,6 +28,7 @@ from .simulate_wrench_scene import acts
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 COMPARED = ("duhamel", "newmark", "euler")
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
+LEAST_KEPT = 100  # samples of a run that has no cycles
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
 
 
@@ -49,7 +49,8 @@ class Settings:
 class Raw:
     """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
     error) or (None, None), snapshots; levels: of a run in levels, slips: as `simulate_levels.onset` asks;
-    log: events of the exact engine; notes: warnings of the method."""
+    log: events of the exact engine; notes: warnings of the method; held: slip [m] below which a cycle sticks; own: what
+    the run itself leaves open of its measures."""
 
     values: dict
     response: Response
@@ -67,6 +68,8 @@ class Raw:
     slips: object = None
     log: object = None
     notes: tuple = ()
+    held: float = 0.0
+    own: dict | None = None
 
 
 def modes_of(scene) -> ModalBasis:
@@ -114,6 +117,8 @@ def choose(scene, per_point: bool = False) -> Settings:
     engine = engine_of(scene, drive, side)
     cycles = simulate_drive.cycles_of(scene, drive)
     window = int(max(1, min(10, cycles // 10)))
+    if simulate_drive.levelled(scene):
+        window = min(window, int(simulate_drive.cycles_per_level(scene)))
     fastest = max(simulate_drive.fastest(drive), highest_frequency(scene) * drive.period)
     if scene.normal is not None and scene.normal.amplitude:
         fastest = max(fastest, scene.normal.frequency * drive.period)
@@ -122,6 +127,8 @@ def choose(scene, per_point: bool = False) -> Settings:
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
     if accuracy.steps_per_cycle is None and engine == "march":
         steps = max(steps, unique_steps(scene, drive))
+    if not simulate_drive.sinusoidal(drive) and accuracy.steps_per_cycle is None:
+        steps = max(steps, int(np.ceil(LEAST_KEPT / cycles)))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
     if engine in COMPARED:
         steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
@@ -275,7 +282,7 @@ def _ledger(ledger) -> dict:
 
 def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
     """One march at settings.steps per cycle."""
-    from . import simulate_levels
+    from . import simulate_events, simulate_levels
     from . import simulate_march as hub
     from .simulate_interfaces import joined, model_of, other_measures
     from .simulate_march import Mark
@@ -308,7 +315,11 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
-    stuck = values.get("slip_amplitude", np.inf) < held
+    rings, own = {}, {}
+    if scene.friction is not None:
+        rings, own = simulate_events.rings(done.window, modes, drive, None, held)
+    stuck = simulate_events.all_stick(values, done.window, held) and scene.friction.law != "tanh"
+    values |= rings
     levels, slips = (), None
     if marks:
         levels = simulate_levels.rows(scene, done.marks, drive, held, rubbing)
@@ -321,7 +332,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
                steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,
-               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message, levels, slips)
+               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message, levels, slips,
+               held=held, own=own)
 
 
 def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -> dict:
@@ -371,18 +383,3 @@ def created_warning(scene, book: dict, cycles: float) -> list:
         return []
     return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
             "it dissipated; reading = \"stretch\" creates none"]
-
-
-def settle(raw: Raw, measures: dict, tolerance: float) -> tuple:
-    """(outcome, measures with the steady estimate where there is one)."""
-    if raw.outcome is not None:
-        return raw.outcome, measures
-    outcome = classify(raw.amplitudes, tolerance)
-    if outcome is Outcome.GROWS:
-        return outcome, {k: replace(m, error=None) for k, m in measures.items()}
-    steady, error = raw.steady
-    if outcome is Outcome.TRANSIENT and steady is not None:
-        base = measures["relative_displacement_amplitude"]
-        total = error + (base.error or 0.0) * steady / max(abs(base.value), 1e-300)
-        measures = measures | {"relative_displacement_amplitude_steady": Measure(steady, "m", float(total), base.floor)}
-    return outcome, measures

@@ -146,6 +146,12 @@ class SlotRun(Run):
     def _works(self, rows) -> np.ndarray:
         return rows[:-1, 2 * self.modes.omega.size + 6]
 
+    def watched(self, rows) -> tuple:
+        """(rates, slips) (k, e) of the patch and of all elements."""
+        rate, slip = super().watched(rows)
+        parts = rows[:, 2 * self.modes.omega.size + 10:].reshape(len(rows), len(self.kinds), 4)
+        return np.column_stack([rate, parts[:, :, 1]]), np.column_stack([slip, parts[:, :, 3]])
+
     def strained(self) -> float:
         """Energy of the patch, of the interfaces and of the springs [J]."""
         slide = self.model.rows @ self.state[0]

@@ -1,5 +1,6 @@
 """List of the events of a run: what happened at which interface, when and where."""
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ ROOM = 400_000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventLog:
-    """Events in order, at most ROOM of them; count: how many there were.
+    """Events in order, the last ROOM of them at most; count: how many there were.
 
     time (k,) [s]; phase (k,) of the drive [rad]; interface (k,), -1 for a border of two segments of the drive; what
     (k,): STOP 0, RELEASE +1 or -1 and REVERSAL +2 or -2 (the sign of the slip that follows), BORDER 9; slide (k,) [m].
@@ -31,20 +32,19 @@ class EventLog:
         if kept == len(self.time):
             return self
         return EventLog(self.time[:kept], self.phase[:kept], self.interface[:kept], self.what[:kept],
-                        self.slide[:kept], kept)
+                        self.slide[:kept], self.count - len(self.time) + kept)
 
 
 class Recorder:
     """Events as they come."""
 
     def __init__(self):
-        self.rows, self.count = [], 0
+        self.rows, self.count = deque(maxlen=ROOM), 0
 
     def add(self, time: float, phase: float, interface: int, what: int, slide: float) -> None:
         """Note one event."""
         self.count += 1
-        if len(self.rows) < ROOM:
-            self.rows.append((time, phase, interface, what, slide))
+        self.rows.append((time, phase, interface, what, slide))
 
     def log(self) -> EventLog:
         """Everything noted."""

@@ -11,6 +11,7 @@ from .event_list import RELEASE, EventLog
 from .events import Engine
 
 SAMPLES = 400  # per drive cycle in the kept window
+LEAST = 101  # of a run that has no cycles
 _TOGETHER = 512  # pieces
 
 
@@ -159,7 +160,7 @@ class _Book:
         book = dict(zip(("work_in", "viscous", "power", "friction"), map(float, self.ledger)))
         book |= {"stored": stored - self.begun, "peak_stored": max(self.peak, stored)}
         first = max(0.0, self.end - self.window * period)
-        number = max(2, round((self.end - first) / period * SAMPLES) + 1)
+        number = max(LEAST, round((self.end - first) / period * SAMPLES) + 1)
         events = recent.time[recent.first & (recent.time > first) & (recent.time < self.end)]
         times = np.unique(np.concatenate([np.linspace(first, self.end, number), events,
                                           np.nextafter(events, -np.inf)]))

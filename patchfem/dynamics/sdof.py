@@ -7,9 +7,10 @@ from math import ceil, inf, pi
 
 import numpy as np
 
-from ..core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start
+from ..core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from . import sdof_kernels
-from .histories import SAMPLES, EventRun
+from .event_list import BORDER, ROOM, EventLog
+from .histories import LEAST, SAMPLES, EventRun
 from .sdof_samples import Scene, force, panels, peak_acceleration, position, response, states
 
 COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
@@ -104,6 +105,7 @@ class _Run:
         self.phasors = np.zeros(number, complex)
         self.book, self.peak, self.begun, self.end = np.zeros(10), 0.0, 0.0, self.duration
         self.recent, self.corners, self.outcome, self.kept = np.empty((0, sdof_kernels.ROW)), [], None, 0
+        self.listed, self.noted, self.before = [], 0, None
 
     def go(self, engine, z: float, v: float, far: float, progress) -> None:
         """All events from state (z, v)."""
@@ -111,6 +113,7 @@ class _Run:
         self.state, clock = np.zeros(9), (self.period, far, 0.0, 1.0)
         self.begun = 0.5 * scene.modes.mass * (v * v + scene.w**2 * z * z)
         engine.enter(self.state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
+        self.before = (np.sign(v), 0.0)
         while code == sdof_kernels.FULL:
             code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, clock, self.state, rows,
                                       self.extremes, self.book)
@@ -130,12 +133,40 @@ class _Run:
         self.peak = max(self.peak, float((v * v + beta * z * z).max()),
                         float((rows[:, 5]**2 + beta * rows[:, 4]**2).max()))
         self._add_phasors(rows)
+        self._note(rows)
         if self.kept < CORNERS:
             self.corners.append(rows)
             self.kept += len(rows)
         self.recent = np.concatenate([self.recent, rows])
         old = np.searchsorted(self.recent[:, 0], self.recent[-1, 0] - (self.window + 1) * self.period)
         self.recent = self.recent[max(old - 1, 0):]
+
+    def _note(self, rows) -> None:
+        """Keep the changes of direction and of segment as rows (time, phase, interface, what, slide)."""
+        rows, slide = rows[rows[:, 2] > 0], self.scene.slide
+        if not len(rows):
+            return
+        way, segment = (np.concatenate([[first], rows[:, k]]) for first, k in zip(self.before, (3, 9)))
+        self.before = way[-1], segment[-1]
+        old, new = np.sign(slide) * way[:-1], np.sign(slide) * way[1:]
+        what = np.where(new == 0, 0, np.where(old == 0, 1, 2)) * new
+        turned = (old != new) & (self.scene.friction[0] > 0)
+        crossed = segment[1:] != segment[:-1]
+        zero = np.zeros(len(rows))
+        found = np.stack([rows[:, 0], rows[:, 1], zero, what, slide * rows[:, 4]], axis=1)
+        border = np.stack([rows[:, 0], rows[:, 1], zero - 1, zero + BORDER, zero], axis=1)
+        both = np.stack([border, found], axis=1)[np.stack([crossed, turned], axis=1)]
+        self.noted += len(both)
+        self.listed.append(both)
+        while len(self.listed) > 1 and sum(map(len, self.listed[1:])) > ROOM:
+            self.listed.pop(0)
+
+    def log(self) -> EventLog:
+        """The last events."""
+        rows = np.concatenate([np.empty((0, 5)), *self.listed])[-ROOM:]
+        time, phase, interface, what, slide = rows.T
+        return EventLog(frozen_array(time), frozen_array(phase), frozen_array(interface, np.int64),
+                        frozen_array(what, np.int64), frozen_array(slide), self.noted).until(self.end)
 
     def _add_phasors(self, rows) -> None:
         per = self.period / 64
@@ -168,7 +199,7 @@ class _Run:
         count = 1 if scene.friction[0] == 0 else int(self.book[4])
         stuck = float((high - low)[rows[:, 3] == 0].sum())
         return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
-                        self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period)
+                        self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period, self.log())
 
     def _starts(self, first: float):
         rows = self.recent
@@ -178,7 +209,7 @@ class _Run:
     def sample(self, first: float, end: float) -> Response:
         """Uniform samples on [first, end] and both sides of every event."""
         rows, scene = self.recent, self.scene
-        grid = np.linspace(first, end, max(2, round((end - first) / self.period * SAMPLES) + 1))
+        grid = np.linspace(first, end, max(LEAST, round((end - first) / self.period * SAMPLES) + 1))
         events = rows[(rows[:, 0] > first) & (rows[:, 0] < end), 0] if scene.friction[0] > 0 else np.empty(0)
         time = np.sort(np.concatenate([grid, events, np.nextafter(events, -np.inf)]))
         time = time[np.concatenate([[True], np.diff(time) > 0])]

@@ -21,6 +21,8 @@ LONG = {
     "energy_stored": ("J", "elastic energy of the interface"),
     "energy_dissipated": ("J", "energy dissipated by friction since the start"),
     "energy_created": ("J", "energy that a law without passivity has created since the start"),
+    "output_displacement": ("m", "displacement of the output relative to the base"),
+    "output_velocity": ("m s-1", "velocity of the output relative to the base"),
     "modal_coordinate": ("m", "modal coordinate"),
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
     "strip_normal_stress": ("Pa", "normal stress at the nodes of every strip, compression positive"),
@@ -30,21 +32,28 @@ LONG = {
     "weight": ("m2", "nodal area of all pairs"),
 }
 
+BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to the second",
+           "relative_velocity": "velocity of the first mass of an interface relative to the second",
+           "friction_force": "friction force of an interface, positive against positive slip",
+           "normal_load": "normal load on an interface"}
+
 
 def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None,
-            levels: dict | None = None) -> xr.Dataset:
+            levels: dict | None = None, interfaces: tuple = ()) -> xr.Dataset:
     """Dataset of a run.
 
-    histories: name -> (k,) with "time"; modal: (names, (k, n)) or None; fields: name -> (f, m) with "time", or {};
-    x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a patch in strips; levels: name ->
-    (unit, (l,)) of a run in levels.
+    histories: name -> (k,), or (i, k) of the interfaces so named, with "time"; modal: (names, (k, n)) or None; fields:
+    name -> (f, m) with "time", or {}; x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a
+    patch in strips; levels: name -> (unit, (l,)) of a run in levels.
     """
     data, coords = {}, {}
     if histories:
         coords["time"] = ("time", histories["time"], {"units": "s", "standard_name": "time"})
         for name, values in histories.items():
             if name != "time":
-                data[name] = ("time", values, _attributes(name))
+                data[name] = (("interface", "time")[-np.ndim(values):], values, _attributes(name, np.ndim(values)))
+    if interfaces:
+        coords["interface"] = ("interface", list(interfaces), {"long_name": "the two masses of it, 0 is the base"})
     if modal is not None:
         coords["mode"] = ("mode", list(modal[0]), {"long_name": "mode"})
         data["modal_coordinate"] = (("time", "mode"), modal[1], _attributes("modal_coordinate"))
@@ -68,8 +77,44 @@ def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | Non
     return xr.Dataset(data, coords)
 
 
-def _attributes(name: str) -> dict:
+def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, meanings, source: str) -> xr.Dataset:
+    """With the table of events (e,): time [s], number of the interface from 1 (0: of the drive), kind as a flag of
+    `meanings`, slide [m]; count: how many there were, the last of them are kept."""
+    flags = {"long_name": "what happened, up: towards positive slip", "flag_meanings": " ".join(meanings),
+             "flag_values": np.arange(len(meanings), dtype=np.int8)}
+    about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
+    return data.assign({
+        "event_time": ("event", time, about),
+        "event_interface": ("event", np.asarray(interface, np.int32),
+                            {"units": "1", "long_name": "number of the interface from 1, 0 for a border of the drive"}),
+        "event_kind": ("event", np.asarray(kind, np.int8), flags),
+        "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event"})})
+
+
+def with_curve(data: xr.Dataset, curve: dict) -> xr.Dataset:
+    """With a curve of steady motions (c,): frequency [Hz], level, amplitude [m], regime, multiplier, and its folds."""
+    names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
+    point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
+    out = {"curve_frequency": (point, curve["frequency"], {"units": "Hz", "long_name": "drive frequency"}),
+           "curve_level": (point, curve["level"], {"units": "m s-2", "long_name": "drive: acceleration of the base, or "
+                                                                                  "force over the modal mass"}),
+           "curve_amplitude": (point, curve["amplitude"], {"units": "m", "long_name": "half peak-to-peak at the output "
+                                                                                      "of the steady motion"}),
+           "curve_regime": (point, number.astype(np.int8), {"flag_values": np.arange(len(names), dtype=np.int8),
+                                                            "flag_meanings": " ".join(meanings),
+                                                            "long_name": "regime of the steady motion"}),
+           "curve_multiplier": (point, curve["multiplier"], {"units": "1", "long_name": "largest Floquet multiplier"})}
+    if len(curve.get("folds", ())):
+        over, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
+        out["curve_fold"] = ("fold", np.asarray(curve["folds"], float),
+                             {"units": unit, "long_name": f"{over} at which the curve turns back"})
+    return data.assign(out)
+
+
+def _attributes(name: str, dimensions: int = 1) -> dict:
     unit, text = LONG[name]
+    if dimensions == 2 and name in BETWEEN:
+        text = BETWEEN[name]
     return {"units": unit, "long_name": text}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import pictures
+from . import curves, pictures
 
 CSS = """
 :root{--ink:#1c2430;--soft:#5d6877;--line:#dfe4ea;--tint:#f4f7fa;--accent:#1f5f99}
@@ -128,7 +128,7 @@ def verdict(data: dict) -> str:
     text = "; ".join(parts)
     if part_of_cycle(data) and text:
         text = f"in {cycles(data):.2g} of a cycle {text}"
-    answer = f"<b>{escape(outcome)}</b>: {escape(data['sentence'])}"
+    answer = f"<b>{escape(outcome)}</b>: {escape(data['sentence'])}{escape(curves.regime(data.get('steady')))}"
     return f"{answer} {text[0].upper() + text[1:]}." if text else answer
 
 
@@ -145,6 +145,8 @@ def page(data: dict) -> str:
     parts += [_placed(number, *shown) for number, shown in enumerate(figures(data))]
     if "measured" in data:
         parts.append(_table_one(data))
+    if "levels" in data:
+        parts.append(_table_of_levels(data["levels"]))
     parts += [_measures(data), _cost(data)]
     parts.append(f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>")
     parts.append(f"<details><summary>Scene in SI, every default written out</summary><pre>{escape(data['resolved'])}"
@@ -165,8 +167,20 @@ def _placed(number: int, svg: str, caption: str) -> str:
 
 def figures(data: dict) -> list:
     """[(svg, caption)] of the pictures that this run has something to show in."""
-    drawn = [draw(data) for draw in (_interface, _bodies, _loop, _histories, _measured)]
+    drawn = [draw(data) for draw in (_curve, _levels, _interface, _bodies, _loop, _histories, _measured)]
     return [shown for shown in drawn if shown is not None]
+
+
+def _curve(data: dict) -> tuple | None:
+    found = data.get("curve")
+    return None if found is None else (curves.curve(found), curves.caption(found))
+
+
+def _levels(data: dict) -> tuple | None:
+    if "levels" not in data:
+        return None
+    return curves.levels(data["levels"]), ("Amplitude at the end of every level, the state carried from one to the "
+                                           "next; arrows show the order of the test.")
 
 
 def _interface(data: dict) -> tuple | None:
@@ -272,6 +286,27 @@ def _table_one(data: dict) -> str:
         return "<p class=soft>No measured row has this frequency and input.</p>"
     return ("<h2>Against the measurement</h2><table><tr><th>reading<th class=n>measured<th class=n>computed"
             f"<th class=n>ratio</tr>{''.join(rows)}</table><p class=soft>{escape(_unsettled(data).strip())}</p>")
+
+
+def _table_of_levels(levels: list) -> str:
+    """Drive, amplitude, acceleration and whether it held, of every level."""
+    rows = []
+    for number, one in enumerate(levels, 1):
+        cells = []
+        for name in ("relative_displacement_amplitude", "absolute_acceleration_peak"):
+            value, error = one["values"].get(name), one["errors"].get(name)
+            unit = "m" if name.startswith("rel") else "m s-2"
+            cells.append("&ndash;" if value is None else pair(name, measure(value, unit, error)))
+        rows.append(f"<tr><td class=n>{number}</td><td class=n>{one['drive'] / G:.4g} g</td>"
+                    + "".join(f"<td class=n>{cell}</td>" for cell in cells)
+                    + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
+    return ("<h2>Levels</h2><table><tr><th class=n>level<th class=n>base acceleration<th class=n>half peak-to-peak"
+            f"<th class=n>peak acceleration<th>interface</tr>{''.join(rows)}</table>")
+
+
+def measure(value: float, unit: str, error: float | None) -> dict:
+    """A measure as the summary has it."""
+    return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
 def _measures(data: dict) -> str:

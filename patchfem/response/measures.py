@@ -13,6 +13,7 @@ UNITS = {
     "equivalent_stiffness": "N m-1", "equivalent_damping": "1", "energy_balance": "1", "drift_per_cycle": "m",
     "normal_load": "N", "friction_ratio_end": "1", "friction_ratio_peak": "1",
     "friction_work": "J", "energy_stored": "J", "energy_dissipated": "J", "energy_created": "J",
+    "ring_frequency": "Hz", "ring_damping": "1",
     "onset_level": "m s-2", "jump_level": "m s-2", "level_hysteresis": "m",
 }
 FLOORS = {
@@ -21,8 +22,26 @@ FLOORS = {
     "equivalent_stiffness": 1.0, "equivalent_damping": 1e-8, "energy_balance": 1e-8, "drift_per_cycle": 1e-11,
     "friction_ratio_end": 1e-9, "friction_ratio_peak": 1e-9,
     "friction_work": 1e-10, "energy_stored": 1e-10, "energy_dissipated": 1e-10, "energy_created": 1e-10,
+    "ring_frequency": 1e-3, "ring_damping": 1e-6,
 }
+ROUND = 1e-13  # of the largest coordinate
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
+
+
+def of_first(name: str) -> str:
+    """The name of a measure without the number of its interface: slip_amplitude_2 is slip_amplitude."""
+    head, _, number = name.rpartition("_")
+    return head if number.isdigit() else name
+
+
+def unit_of(name: str) -> str:
+    """Unit of a measure of any interface."""
+    return UNITS[of_first(name)]
+
+
+def floor_of(name: str) -> float:
+    """Absolute floor of a measure of any interface."""
+    return FLOORS.get(of_first(name), 0.0)
 
 
 def energy_balance(book: dict) -> float:
@@ -73,7 +92,7 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     times = window.time[len(speed) - len(rows):]
     table = rows.reshape(cycles, -1)
     peak = np.abs(table).max(axis=1, keepdims=True)
-    if not peak.any():
+    if np.ptp(slip) <= slip_noise(window):
         return out | {"stick_fraction": 1.0}
     share = np.abs(table) / np.where(peak > 0, peak, np.inf)
     out["stick_fraction"] = float(np.mean(share < STICK))
@@ -85,6 +104,11 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
         phases = 2 * np.pi / drive.period * (times[rise] + step * (0.5 + part))
         out["slip_start_phase"] = circular_mean(phases)
     return out
+
+
+def slip_noise(window: Response) -> float:
+    """Range [m] below which slip is the last digit of the coordinates."""
+    return ROUND * float(np.abs(window.modal).max(initial=0.0))
 
 
 def circular_mean(phases) -> float:
@@ -172,15 +196,15 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
     a, p = np.asarray(amplitudes, float), np.asarray(phasors, complex)
     if a.size < 5 or not np.all(np.abs(p[-5:]) > 0):
         return None, None
-    a, p = a[-5:], p[-5:]
-    shape = a / np.abs(p)
+    shape = a[-2:] / np.abs(p[-2:])
     ends = []
     for k in range(3):
         rest = tail(p[p.size - 3 - k:p.size - k])
         if rest is None:
             return None, None
         ends.append(abs(p[p.size - 1 - k] + rest))
-    shrink = min(abs(p[-1] - p[-2]) / abs(p[-2] - p[-3]), 0.9995)
+    before, change = abs(p[-2] - p[-3]), abs(p[-1] - p[-2])
+    shrink = min(change / before, 0.9995) if before > 0 else 0.9995 * (change > 0)
     settle = (shape[-1] - shape[-2]) * shrink / (1 - shrink)
     value = ends[0] * (shape[-1] + settle)
     error = 6 * (max(ends) - min(ends)) * shape[-1] + 2 * abs(settle) * ends[0] + 1e-9 * value

@@ -1,0 +1,113 @@
+"""Events of a run as a table, from the samples of a march or a comparison method; stick intervals between events."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .measures import STICK
+
+STOP, RELEASE_UP, RELEASE_DOWN, REVERSAL_UP, REVERSAL_DOWN, BORDER = range(6)
+MEANINGS = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
+MOST = 100_000
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Events:
+    """The last events of a run, at most MOST of them, in order; count: how many there were.
+
+    time (k,) [s]; interface (k,), from 1, 0 for a border of the drive; kind (k,) as MEANINGS, up: towards positive
+    slip; slide (k,) [m]; source: a sentence on where they come from.
+    """
+
+    time: np.ndarray
+    interface: np.ndarray
+    kind: np.ndarray
+    slide: np.ndarray
+    count: int
+    source: str = ""
+
+
+def table(rows, count: int | None = None, source: str = "") -> Events:
+    """Events of rows (time, interface, kind, slide) in any order; the last MOST are kept."""
+    rows = np.array(rows, float).reshape(-1, 4)
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    count, rows = len(rows) if count is None else count, rows[-MOST:]
+    return Events(rows[:, 0].copy(), rows[:, 1].astype(np.int32), rows[:, 2].astype(np.int8), rows[:, 3].copy(), count,
+                  source)
+
+
+def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
+    """Events seen in samples: stop and release where the slip speed passes 1e-2 of its peak in the cycle, reversals
+    where it changes sign without a stop between samples.
+
+    time (k,) [s]; slips, slides (k, i) irreversible and whole motion [m]; held [m]: a cycle that slips less sticks;
+    borders [s] of the drive.
+    """
+    rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
+    for number in range(slips.shape[1]):
+        rows += _one(time, slips[:, number], slides[:, number], period, held, number + 1)
+    return table(rows, source="detected in the samples of the last cycles: slip speed below or above 1e-2 of its peak "
+                              "in the cycle")
+
+
+def states(time, slip, period: float, held: float = 0.0) -> tuple:
+    """((k - 1,) speed over its peak in the cycle, (k - 1,) +1, -1 slipping, 0 sticking) between the samples."""
+    step = np.diff(time)
+    rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
+    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
+    peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
+    np.maximum.at(peak, cycle, np.abs(rate))
+    for side in (slip[:-1], slip[1:]):
+        np.minimum.at(low, cycle, side)
+        np.maximum.at(high, cycle, side)
+    peak[high - low <= held] = np.inf
+    share = rate / np.where(peak > 0, peak, np.inf)[cycle]
+    return share, np.where(np.abs(share) >= STICK, np.sign(share), 0).astype(int)
+
+
+def _one(time, slip, slide, period: float, held: float, number: int) -> list:
+    share, state = states(time, slip, period, held)
+    at, out = (time[1:] + time[:-1]) / 2, []
+    for k in np.flatnonzero(state[1:] != state[:-1]):
+        before, after = state[k], state[k + 1]
+        if before and after:
+            kind, level = (REVERSAL_UP if after > 0 else REVERSAL_DOWN), 0.0
+        else:
+            way = before or after
+            kind, level = (STOP if after == 0 else RELEASE_UP if after > 0 else RELEASE_DOWN), way * STICK
+        rise = share[k + 1] - share[k]
+        part = np.clip((level - share[k]) / rise, 0, 1) if rise else 0.5
+        when = at[k] + part * (at[k + 1] - at[k])
+        out.append((when, number, kind, np.interp(when, time, slide)))
+    return out
+
+
+def sticks(events: Events, begin: float, end: float, moves) -> list:
+    """[(from, to)] [s] within [begin, end] between events while the first interface sticks; of several sets of stuck
+    interfaces those of the one that lasts longest.
+
+    moves (i,): whether an interface without any event slips all the time.
+    """
+    count = len(moves)
+    sliding = [bool(m) for m in moves]
+    for number in range(count):
+        mine = events.kind[events.interface == number + 1]
+        if mine.size:
+            sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
+    found, last = {}, -np.inf
+    for when, number, kind in [*zip(events.time, events.interface, events.kind), (np.inf, 0, BORDER)]:
+        a, b = max(last, begin), min(when, end)
+        if b > a and not sliding[0]:
+            found.setdefault(tuple(sliding), []).append((float(a), float(b)))
+        if number:
+            sliding[number - 1] = kind != STOP
+        last = when
+    return max(found.values(), key=lambda spans: sum(b - a for a, b in spans), default=[])
+
+
+def stuck_time(events: Events, number: int, begin: float, end: float, moves: bool) -> float:
+    """Time [s] within [begin, end] during which interface `number` (from 1) sticks; moves: as in `sticks`."""
+    mine = events.interface == number
+    one = Events(events.time[mine], np.ones(mine.sum(), np.int32), events.kind[mine], events.slide[mine],
+                 events.count)
+    return sum(b - a for a, b in sticks(one, begin, end, [moves]))
