@@ -82,7 +82,7 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
         draft.say(key, "beside strips takes law 'coulomb', 'tanh', 'elastic-plastic' or 'nonlocal' of reading "
                        "'stretch' with order = 1; not yet built")  # fmt: skip
     accuracy = draft.tables.accuracy
-    if accuracy is not None and accuracy.method not in ("auto", "march", None):
+    if accuracy is not None and accuracy.method not in ("auto", "march", "exact", None):
         draft.say("accuracy.method", f"'{accuracy.method}' beside strips that yaw: use 'march'; not yet built")
 
 

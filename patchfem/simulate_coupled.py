@@ -31,9 +31,13 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
         share, rough = _shares(scene, patch, coarse[0] if estimate else None)
-        raw = run_exact(scene, settings, modes, drive, load, rig.start_of(scene, modes), progress, share, say)
+        start = rig.start_of(scene, modes)
+        raw = run_exact(scene, settings, modes, drive, load, start, progress, share, say, patch)
         seconds["march"] = raw.seconds
-        errors = []
+        errors = [rig.sampled(raw.values)] if rig.yaws(scene) else []
+        if rig.yaws(scene) and estimate and coarse[0] is not None:  # the loads of the strips are those of the mesh
+            other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, start, None, 1.0, say, coarse[0])
+            errors, seconds["error"] = [*errors, change(raw.values, other.values)], other.seconds
         if rough is not None:
             other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, None, rough)
             errors, seconds["error"] = [change(raw.values, other.values)], other.seconds

@@ -106,7 +106,8 @@ def as_one(response, loads, offsets):
     """Histories of strips as those of the patch: slide, speed and slip averaged with the loads, the resultant force;
     `extra` keeps the strips and has yaw_moment (k,) [N m], sum y f of the friction about +z on the upper piece."""
     extra, share = response.extra, np.asarray(loads) / np.sum(loads)
-    slides, rates, forces, slips = (extra[name] for name in ("slides", "slide_rates", "forces", "slips"))
+    slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
+    slips = extra.get("slips", slides)
     return replace(response, slide=slides @ share, slide_rate=rates @ share, force=forces.sum(axis=1),
                    slip=slips @ share, extra=extra | {"yaw_moment": forces @ np.asarray(offsets)})
 

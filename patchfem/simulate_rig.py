@@ -183,8 +183,8 @@ def no_closed_form(scene, drive, shear: str) -> str:
         return f"with {shear}"
     if acts(scene):
         return "under a load that changes"
-    if yaws(scene):
-        return "with strips that yaw"
+    if yaws(scene) and scene.drive.waveform == "levels":
+        return "with strips that yaw, level by level"
     if not drive.segments:
         return f"under a drive of waveform '{scene.drive.waveform}'"
     if structure.stiffening is not None:
@@ -273,6 +273,13 @@ def contact_model(scene, settings: Settings, patch, drive):
         pattern = (x, sigma) if shape_side(contact) == "lower" else None
         return hub.points_model(law, weight, sigma, None, pattern)
     return hub.points_model(law, [1.0], [load])
+
+
+def sampled(values: dict) -> dict:
+    """Errors of measures of strips that are read off 400 samples a cycle, by the trapezoidal rule."""
+    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
+    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
+            else 1e-9 * abs(value) for name, value in values.items()}
 
 
 def _ledger(ledger) -> dict:
