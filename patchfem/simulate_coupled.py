@@ -12,6 +12,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     """Run a plan of kind rig or linear; arguments as `simulate.run` has them, patch and coarse of its [contact]."""
     from . import simulate_rig as rig
     from .response.errors import change, with_errors
+    from .simulate_drive import refuse_rest
     from .simulate_events import events_of, with_own
     from .simulate_interfaces import viewed
     from .simulate_outcome import changing_note, settle
@@ -20,6 +21,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     scene = viewed(what.scene)
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
     warnings = [*warnings, *notes_of(scene)]
+    if rig.start_of(scene, modes) is None:
+        refuse_rest(scene, modes)
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
     lumps = scene.friction is not None and scene.friction.law != "convolution"
     moves = rig.acts(scene) or rig.yaws(scene)

@@ -34,6 +34,13 @@ def yaws(scene) -> bool:
     return strips and scene.friction is not None and any(mode.yaw for mode in scene.structure.mode)
 
 
+def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
+    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
+    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
+    yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
+    return basis.slide - np.outer(offsets, yaw)
+
+
 def strip_loads(patch) -> np.ndarray:
     """Normal load of every strip of a solved patch (s,) [N]."""
     return patch.strips.force.sum(axis=1)

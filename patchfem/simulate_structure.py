@@ -35,13 +35,13 @@ def modes_of(scene) -> ModalBasis:
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
     """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
-    from .simulate_interfaces import yaws
+    from .simulate_interfaces import strip_rows, yaws
 
     if not yaws(scene):
         return found
     count, width = scene.contact.strips.count, scene.contact.width
     offsets = (np.arange(count) + 0.5) * (width / count) - width / 2
-    return replace(found, faces=frozen_array(found.slide - np.outer(offsets, found.yaw)))
+    return replace(found, faces=frozen_array(strip_rows(found, offsets)))
 
 
 def _unbonded(scene) -> ModalBasis:

@@ -81,13 +81,6 @@ def rows_of(modes: ModalBasis) -> np.ndarray:
                      for part in (modes.slide, modes.normal, modes.pitch)])
 
 
-def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
-    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
-    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
-    yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
-    return basis.slide - np.outer(offsets, yaw)
-
-
 def contact_frequencies(modes: ModalBasis, atlas: Atlas) -> np.ndarray:
     """Natural frequencies [rad/s] of the modes on the preloaded contact set, without friction: what a step must
     resolve."""

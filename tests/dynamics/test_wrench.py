@@ -17,6 +17,7 @@ from patchfem.friction.law import Bonds
 from patchfem.friction.local import ElasticPlastic
 from patchfem.friction.recursion import Recursion, pressed
 from patchfem.response.measures import energy_balance
+from patchfem.simulate_interfaces import strip_rows
 
 MASS, LOAD, STILL = 0.884, 116.0, BaseSine(0.0, 2 * np.pi * 143)
 LAWS = {"coulomb": wrench.coulomb(0.3), "weaker": wrench.coulomb(0.3, 0.2), "tanh": wrench.rate(0.3, 1e-3),
@@ -275,7 +276,7 @@ def test_exact_strips_slide_by_yaw():
     turning = ModalBasis(basis.names, basis.omega, basis.zeta, basis.slide, basis.base, basis.output, MASS,
                          yaw=np.array([2.0]))
     offsets = np.array([-1e-3, 0.0, 1e-3])
-    rows = wrench.strip_rows(turning, offsets)
+    rows = strip_rows(turning, offsets)
     assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
     friction = np.array([1.0, 2.0, 5.0])  # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
     assert -(rows[:, 0] - 1) @ friction == pytest.approx(2.0 * (offsets @ friction))
