@@ -18,4 +18,4 @@ Read the package in the order of the physics; each stage imports `core` and itse
 14. `simulate`   the page where the stages meet
 """
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"

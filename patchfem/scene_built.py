@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
     "structure.mode.lateral": "",
-    "structure.mode.yaw": "",
     "wear": "",
 }
 
@@ -56,6 +55,8 @@ def combinations(draft: Draft, kind: str) -> None:
         _under_changing_load(draft, law, shear, cause)
     if kind == "rig" and law.law == "nonlocal" and law.breakaway and law.order != 1:
         draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
+    if kind == "rig":
+        _yawing(draft, law, contact)
     if shear:
         _behind_shear(draft, law, shear)
     if contact is not None:
@@ -64,6 +65,25 @@ def combinations(draft: Draft, kind: str) -> None:
             draft.say("contact.strips", f"beside {shear}: leave one of them out; not yet built")
         elif contact.strips is not None and law.law == "convolution":
             draft.say("contact.strips", "beside law 'convolution': leave it out; not yet built")
+
+
+def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
+    """A yaw needs strips to turn, and laws that a strip can have."""
+    structure = draft.tables.structure
+    turning = [k for k, mode in enumerate(structure.mode if structure is not None else ()) if mode.yaw]
+    if not turning:
+        return
+    key = f"structure.mode.{turning[0]}.yaw"
+    if contact is None or contact.strips is None:
+        draft.say(key, "turns the patch about its normal: name [contact.strips], which slide each by themselves")
+        return
+    listed = law.law == "nonlocal" and (law.reading == "report" or law.order not in (1, None))
+    if listed or law.law == "convolution":
+        draft.say(key, "beside strips takes law 'coulomb', 'tanh', 'elastic-plastic' or 'nonlocal' of reading "
+                       "'stretch' with order = 1; not yet built")  # fmt: skip
+    accuracy = draft.tables.accuracy
+    if accuracy is not None and accuracy.method not in ("auto", "march", "exact", None):
+        draft.say("accuracy.method", f"'{accuracy.method}' beside strips that yaw: use 'march'; not yet built")
 
 
 def _changing_load(draft: Draft) -> str:

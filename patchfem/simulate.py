@@ -69,7 +69,8 @@ def _loose(result: Result) -> list:
         remedies.append("the mesh that the tolerance chose reaches no further, their errors stand")
     elif scene.contact is not None:
         remedies.append("lower contact.element_size")
-    remedies += ["raise accuracy.steps_per_cycle"] if result.plan.kind in ("rig", "bench") else []
+    finer = "harmonics" if result.extra.get("engine") == "harmonic" else "steps_per_cycle"
+    remedies += [f"raise accuracy.{finer}"] if result.plan.kind in ("rig", "bench") else []
     return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; "
             f"{' or '.join(remedies)}"]
 

@@ -12,6 +12,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     """Run a plan of kind rig or linear; arguments as `simulate.run` has them, patch and coarse of its [contact]."""
     from . import simulate_rig as rig
     from .response.errors import change, with_errors
+    from .simulate_drive import refuse_rest
     from .simulate_events import events_of, with_own
     from .simulate_interfaces import viewed
     from .simulate_outcome import changing_note, settle
@@ -20,9 +21,12 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     scene = viewed(what.scene)
     settings, drive, modes = rig.choose(scene, per_point), rig.drive_of(scene), rig.modes_of(scene)
     warnings = [*warnings, *notes_of(scene)]
+    if rig.start_of(scene, modes) is None:
+        refuse_rest(scene, modes)
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
     lumps = scene.friction is not None and scene.friction.law != "convolution"
-    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not rig.acts(scene):
+    moves = rig.acts(scene) or rig.yaws(scene)
+    if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not moves:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if settings.engine == "exact":
@@ -30,9 +34,13 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 
         load = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
         share, rough = _shares(scene, patch, coarse[0] if estimate else None)
-        raw = run_exact(scene, settings, modes, drive, load, rig.start_of(scene, modes), progress, share, say)
+        start = rig.start_of(scene, modes)
+        raw = run_exact(scene, settings, modes, drive, load, start, progress, share, say, patch)
         seconds["march"] = raw.seconds
-        errors = []
+        errors = [rig.sampled(raw.values)] if rig.yaws(scene) else []
+        if rig.yaws(scene) and estimate and coarse[0] is not None:  # the loads of the strips are those of the mesh
+            other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, start, None, 1.0, say, coarse[0])
+            errors, seconds["error"] = [*errors, change(raw.values, other.values)], other.seconds
         if rough is not None:
             other = run_exact(scene, settings, modes, drive, coarse[0].pressure.load, None, None, rough)
             errors, seconds["error"] = [change(raw.values, other.values)], other.seconds

@@ -129,8 +129,8 @@ def fastest(drive) -> float:
 def refuse_rest(scene, modes: ModalBasis) -> None:
     """PatchfemError where nothing moves: a drive that pushes no mode."""
     if scene.drive.kind != "free" and not np.any(modes.base):
-        raise PatchfemError(f"{scene.path}: structure.mode.base: the drive pushes no mode, so nothing moves; give the "
-                            "base of a mode")
+        raise PatchfemError(f"{scene.where('drive.kind')}: the drive pushes no mode, so nothing moves; give a mode its "
+                            "share of it, base or output")
 
 
 def sinusoidal(drive) -> bool:

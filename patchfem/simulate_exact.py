@@ -18,21 +18,23 @@ from .response.measures import (
     window_amplitudes,
     window_ends,
 )
-from .simulate_interfaces import limits, loads_of, other_measures
+from .simulate_interfaces import as_one, limits, loads_of, other_measures, strip_loads, yaws
 from .simulate_structure import mode_stiffness
 
 
-def run_exact(scene, settings, modes, drive, load: float, start=None, progress=None, share: float = 1.0, say=None):
+def run_exact(scene, settings, modes, drive, load: float, start=None, progress=None, share: float = 1.0, say=None,
+              patch=None):
     """simulate_rig.Raw of a Coulomb scene, or of a structure without friction; load [N] of [contact] or [normal];
-    share: of mu N that the law keeps."""
+    share: of mu N that the law keeps; patch: the solved Patch, of which strips that yaw take their loads."""
     from .simulate_rig import Raw
 
-    begin, forces = perf_counter(), _forces(scene, load, share)
+    begin, forces = perf_counter(), _forces(scene, modes, load, share, patch)
     if simulate_levels.ends(scene):
         done, levels, slips = _levels(scene, settings, modes, drive, forces, start, progress, say)
     else:
         done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
         levels, slips = (), None
+        done = _over_strips(done, patch) if yaws(scene) else done
     values, stuck = _values(scene, settings, drive, done, load)
     rubs = scene.friction is not None
     rings, own = simulate_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
@@ -43,16 +45,29 @@ def run_exact(scene, settings, modes, drive, load: float, start=None, progress=N
                done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log, own=own)
 
 
-def _forces(scene, load: float, share: float) -> tuple:
+def _forces(scene, modes, load: float, share: float, patch=None) -> tuple:
     """(static, kinetic) friction [N] of every interface (i,)."""
+    if yaws(scene):
+        return tuple(np.array(column) for column in zip(*(limits(scene, 0, n) for n in strip_loads(patch))))
     if scene.friction is None:
-        return np.zeros(1), np.zeros(1)
+        return (np.zeros(len(modes.interfaces)),) * 2
     if scene.structure.interface:
         pairs = [limits(scene, k, n) for k, n in enumerate(loads_of(scene))]
     else:
         static, kinetic = limits(scene, 0, load)
         pairs = [(static * share, kinetic if scene.friction.kinetic is not None else static * share)]
     return tuple(np.array(column) for column in zip(*pairs))
+
+
+def _over_strips(done, patch):
+    """An EventRun of strips as that of the patch: loops from the samples of the window, both sides of every event."""
+    loads, offsets = strip_loads(patch), patch.strips.offsets
+    window = as_one(done.window, loads, offsets)
+    gaps = np.diff(window.time)
+    weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
+    held = ~window.extra["slide_rates"].any(axis=1)
+    return replace(done, response=as_one(done.response, loads, offsets), window=window, stick=float(weight[held].sum()),
+                   loop=(window.time, weight, window.slide, window.slide_rate, window.force))
 
 
 def _go(scene, modes, drive, forces, cycles: float, window: int, start, progress, say):
@@ -88,12 +103,15 @@ def _values(scene, settings, drive, done, load: float) -> tuple:
     if done.starts.size and simulate_drive.sinusoidal(drive):
         values["slip_start_phase"] = circular_mean(done.starts)
     time, weight, slide, rate, force = done.loop
-    work = float(weight @ (force * rate)) * drive.period / span
+    power = force * rate
+    if yaws(scene):  # of every strip: a yaw works besides the mean slide
+        power = (done.window.extra["forces"] * done.window.extra["slide_rates"]).sum(axis=1)
+    work = float(weight @ power) * drive.period / span
     if simulate_drive.whole(span, drive):
         omega = simulate_drive.omega_of(drive)
         q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
         values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
-    values |= other_measures(done.window, drive, 400, done.log)
+    values |= {} if yaws(scene) else other_measures(done.window, drive, 400, done.log)
     others = any(simulate_events.moving(done.window, drive, done.log)[1:])
     return values, done.stick >= span * (1 - 1e-12) and not others
 

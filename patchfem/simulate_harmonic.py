@@ -14,7 +14,8 @@ from .simulate_harmonic_point import Periodic, point
 from .simulate_harmonic_stability import with_stability
 
 __all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "Periodic", "Spring", "Stretch", "Tanh", "backbone",
-           "branches", "law_of_model", "levels", "periodic_response", "point", "regime", "response", "with_stability"]
+           "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime", "response",
+           "with_stability"]
 
 
 STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
@@ -41,6 +42,19 @@ def regime(periodic: Periodic) -> tuple:
     share = slips / whole if whole else 0.0
     return ("no friction" if not whole else "stuck" if not slips else "slides" if share > 1 - 1e-12 else
             "partial slip"), share
+
+
+def cycle_energy(periodic: Periodic, modes) -> dict:
+    """Work of the drive, viscous loss and work of the rows' laws in a cycle [J], by Parseval; `balance` [1]: what is
+    missing, over the work of the drive. A spring among the laws adds nothing."""
+    k = np.arange(periodic.modal.shape[0])
+    speed = 1j * (k * periodic.omega)[:, None] * periodic.modal
+    half = np.pi / periodic.omega
+    work = -modes.mass * half * float((1j * periodic.level * (speed[1] @ modes.base)).real)
+    viscous = modes.mass * half * float(np.einsum("ka,ab,kb->", speed.conj(), modes.dampers, speed).real)
+    friction = np.pi * float(np.sum(k * (periodic.coefficients.conj() * periodic.forces).imag))
+    return {"work_in": work, "viscous": viscous, "friction": friction,
+            "balance": abs(work - viscous - friction) / max(abs(work), 1e-300)}
 
 
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:

@@ -1,5 +1,7 @@
 """From the harmonics of the slides to those of the forces and back: alternating frequency and time over all rows."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from .core import PatchfemError, frozen_array
@@ -73,59 +75,63 @@ class Group:
         return analysis(self.forces(q, omega, samples), harmonics)
 
     def __call__(self, q, omega: float) -> Fold:
-        rows, h = len(self.rows), q.shape[1] - 1
-        force = np.empty((rows, h + 1), complex)
-        slope = np.empty((rows, h + 1, 2 * h + 1), complex)
-        rate = None
-        for i, (track, laws) in enumerate(zip(self.tracks(q, omega), self.laws)):
-            force[i], slope[i], moved = fold(track, [law.sample(track) for law in laws], h)
-            if moved is not None:
-                rate = np.zeros((rows, h + 1), complex) if rate is None else rate
-                rate[i] = moved
-        return Fold(force, slope, rate)
+        tracks = self.tracks(q, omega)
+        return fold(tracks, [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)])
 
 
-def fold(track: Track, sampled: list, harmonics: int) -> tuple:
-    """(force (H + 1,), slope (H + 1, 2 H + 1), d force/d omega (H + 1,) or None) of the laws of one row.
+def fold(tracks: list, sampled: list) -> Fold:
+    """Harmonics of the forces and of their slopes from the laws sampled along the tracks of i rows.
 
     The local slope K(theta) enters by its harmonics up to 2 H, a Toeplitz and a Hankel part; a turning point s by the
-    harmonics of its share and the basis at its angle: no product over the samples.
+    harmonics of its share and the basis at its angle: no product over the samples, one transform for all rows.
     """
-    h = harmonics
-    slopes = [s.slope for s in sampled if s.slope is not None]
-    rates = [s.by_rate for s in sampled if s.by_rate is not None]
-    holds = [s.hold for s in sampled if s.hold is not None]
-    lines = [sum(s.force for s in sampled)[None]]
-    lines += [sum(slopes)[None]] if slopes else []
-    lines += [sum(rates)[None]] if rates else []
-    lines += [sum(holds)] if holds else []
-    found = analysis(np.concatenate(lines), 2 * h)
-    at, slope, moved = 1, np.zeros((h + 1, 2 * h + 1), complex), None
-    if slopes:
-        slope += local(found[at])
-        at += 1
-    if rates:
-        turned = local(found[at])
-        k = np.arange(h + 1) * track.omega
-        slope[:, 1:h + 1] += turned[:, h + 1:] * k[1:]
-        slope[:, h + 1:] -= turned[:, 1:h + 1] * k[1:]
-        moved = turned @ np.concatenate([np.zeros(1), (1j * np.arange(1, h + 1) * track.x[1:]).real,
-                                         (1j * np.arange(1, h + 1) * track.x[1:]).imag])
-        at += 1
-    if holds and len(holds[0]):
-        phase = np.arange(h + 1) * track.turning[0][:, None]
-        basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
-        slope += found[at:, :h + 1].T @ basis
-    return found[0, :h + 1], slope, moved
+    x, samples, omega = np.array([t.x for t in tracks]), tracks[0].samples, tracks[0].omega
+    rows, h = len(tracks), x.shape[1] - 1
+
+    def added(name):
+        return [_sum([getattr(s, name) for s in laws if getattr(s, name) is not None]) for laws in sampled]
+
+    rates, holds = added("by_rate"), added("hold")
+    moving = any(r is not None for r in rates)
+    lines = [*added("force"), *added("slope"), *(rates if moving else ())]
+    lines = [np.zeros(samples) if line is None else line for line in lines]
+    found = analysis(np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h)
+    slope, rate = local(found[rows:2 * rows]), None
+    at = (3 if moving else 2) * rows
+    if moving:
+        turned, k = local(found[2 * rows:at]), np.arange(1, h + 1)
+        slope[..., 1:h + 1] += turned[..., h + 1:] * (k * omega)
+        slope[..., h + 1:] -= turned[..., 1:h + 1] * (k * omega)
+        speed = 1j * k * x[:, 1:]
+        rate = np.einsum("ikl,il->ik", turned, np.concatenate([np.zeros((rows, 1)), speed.real, speed.imag], axis=1))
+    for i, (track, hold) in enumerate(zip(tracks, holds)):
+        if hold is not None and len(hold):
+            phase = np.arange(h + 1) * track.turning[0][:, None]
+            basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
+            slope[i] += found[at:at + len(hold), :h + 1].T @ basis
+            at += len(hold)
+    return Fold(found[:rows, :h + 1], slope, rate)
+
+
+def _sum(arrays: list):
+    return None if not arrays else arrays[0] if len(arrays) == 1 else sum(arrays)
+
+
+@lru_cache(maxsize=16)
+def _places(h: int) -> tuple:
+    row, column = np.arange(h + 1)[:, None], np.arange(h + 1)[None, :]
+    return row - column + 2 * h, row + column + 2 * h
 
 
 def local(k) -> np.ndarray:
-    """Jacobian (H + 1, 2 H + 1) of the harmonics of K(theta) q(theta) to those of q; k (2 H + 1,) harmonics of K."""
-    h = k.size // 2
-    two = np.concatenate([k[:0:-1].conj() / 2, [k[0]], k[1:] / 2])  # of exp(i m theta), m = -2 H..2 H
-    row, column = np.arange(h + 1)[:, None], np.arange(h + 1)[None, :]
-    less, more = two[row - column + 2 * h], two[row + column + 2 * h]
-    out = np.concatenate([less + more, 1j * (less - more)[:, 1:]], axis=1)
-    out[:, 0] = k[:h + 1]
-    out[0] = out[0].real / [1.0, *[2.0] * (2 * h)]
+    """Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta) to those of q; k (i, 2 H + 1) those of K."""
+    h = k.shape[1] // 2
+    two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)  # of exp(i m theta), m = -2 H..2 H
+    less, more = (two[:, place] for place in _places(h))
+    out = np.empty((len(k), h + 1, 2 * h + 1), complex)
+    out[..., :h + 1] = less + more
+    out[..., h + 1:] = 1j * (less - more)[..., 1:]
+    out[..., 0] = k[:, :h + 1]
+    out[:, 0] = out[:, 0].real
+    out[:, 0, 1:] /= 2
     return out

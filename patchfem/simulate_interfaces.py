@@ -28,6 +28,24 @@ def loads_of(scene) -> list:
     return [scene.normal.load] if scene.normal is not None else []
 
 
+def yaws(scene) -> bool:
+    """Whether strips slide each by themselves: modes that yaw the patch about its normal, over [contact.strips]."""
+    strips = scene.contact is not None and scene.contact.strips is not None
+    return strips and scene.friction is not None and any(mode.yaw for mode in scene.structure.mode)
+
+
+def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
+    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
+    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
+    yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
+    return basis.slide - np.outer(offsets, yaw)
+
+
+def strip_loads(patch) -> np.ndarray:
+    """Normal load of every strip of a solved patch (s,) [N]."""
+    return patch.strips.force.sum(axis=1)
+
+
 def limits(scene, number: int, load: float) -> tuple:
     """(static, kinetic) friction force [N] of a Coulomb interface."""
     from .simulate_acting import acting
@@ -49,7 +67,8 @@ def model_of(scene, settings, patch, modes: ModalBasis, drive, start):
 
     rows, elements = [*modes.interfaces], []
     if many:
-        elements += [_element(scene, k, drive, start) for k in range(len(structure.interface))]
+        loads = strip_loads(patch) if patch is not None else loads_of(scene)
+        elements += [_element(scene, k, load, drive, start) for k, load in enumerate(loads)]
     if interlocked:
         elements.append(slots.interlock(0, structure.bonded.stiffness, structure.bonded.wavelength))
     if structure.stiffening is not None:
@@ -60,13 +79,13 @@ def model_of(scene, settings, patch, modes: ModalBasis, drive, start):
     return slots.SlotsModel(beside, tuple(elements), np.array(rows), size)
 
 
-def _element(scene, number: int, drive, start):
+def _element(scene, number: int, load: float, drive, start):
     from . import simulate_slots as slots
     from .simulate_acting import acting
     from .simulate_rig import law_of
 
     seen = acting(viewed(scene, number))
-    f, load = seen.friction, seen.normal.load
+    f = seen.friction
     if f.law == "coulomb":
         return slots.coulomb(number, *limits(scene, number, load))
     if f.law == "tanh":
@@ -75,9 +94,29 @@ def _element(scene, number: int, drive, start):
         return slots.elastic_plastic(number, f.static * load, f.bond_length)
     if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1:
         return slots.bonds(number, law_of(seen, simulate_drive.peak_speed(drive, start)), load)
-    at = scene.where(f"structure.interface.{number}.law")
+    at = scene.where(f"structure.interface.{number}.law" if scene.structure.interface else "friction.law")
     raise PatchfemError(f"{at}: '{f.law}' of reading '{f.reading}' and order {f.order:g} beside other interfaces: not "
                         "yet built; use reading = \"stretch\" with order = 1")
+
+
+def joined(done, patch):
+    """A MarchResult of strips as that of the patch."""
+    loads, offsets = strip_loads(patch), patch.strips.offsets
+    window = as_one(done.window, loads, offsets)
+    marks = tuple(replace(mark, window=as_one(mark.window, loads, offsets)) for mark in done.marks)
+    marks = tuple(replace(mark, step_force=(mark.window.force[1:] + mark.window.force[:-1]) / 2) for mark in marks)
+    return replace(done, response=as_one(done.response, loads, offsets), window=window, marks=marks,
+                   step_force=(window.force[1:] + window.force[:-1]) / 2)
+
+
+def as_one(response, loads, offsets):
+    """Histories of strips as those of the patch: slide, speed and slip averaged with the loads, the resultant force;
+    `extra` keeps the strips and has yaw_moment (k,) [N m], sum y f of the friction about +z on the upper piece."""
+    extra, share = response.extra, np.asarray(loads) / np.sum(loads)
+    slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
+    slips = extra.get("slips", slides)
+    return replace(response, slide=slides @ share, slide_rate=rates @ share, force=forces.sum(axis=1),
+                   slip=slips @ share, extra=extra | {"yaw_moment": forces @ np.asarray(offsets)})
 
 
 def other_windows(window) -> list:

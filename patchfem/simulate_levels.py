@@ -6,7 +6,6 @@ import numpy as np
 
 from . import simulate_drive
 from .core import Measure
-from .dynamics.drives import Piecewise
 from .response.levels import KEPT, Level, bracket, hysteresis, jump
 from .response.measures import run_measures
 
@@ -64,7 +63,7 @@ def onset(scene, levels, slips, tolerance: float) -> tuple | None:
     return (low + high) / 2, (high - low) / 2
 
 
-def drive_with(drive: Piecewise, number: int, level: float) -> Piecewise:
+def drive_with(drive, number: int, level: float):
     """The drive with the level of this number [m s-2] in place of its own, and none after it."""
     return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
 

@@ -192,7 +192,11 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
     settings = choose(scene, per_point)
     drive = drive_of(scene)
     if settings.engine == "exact":
-        return "exact", int(4 * settings.cycles), 2e-4 * 4 * settings.cycles * unknowns["modes"]
+        each = 1e-4 if unknowns["modes"] == 1 else 4e-4 + 1e-4 * unknowns["modes"]
+        return "exact", int(4 * settings.cycles), each * settings.cycles
+    if settings.engine == "harmonic":
+        points = 1 if scene.drive.waveform == "sine" else 120
+        return "harmonic", points, 0.3 + 0.05 * points
     steps = int(settings.cycles * settings.steps)
     f, shear = scene.friction, scene.contact is not None and bool(scene.contact.gives_way)
     each = 1e-6
@@ -207,7 +211,7 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
             each = 6e-8 * unknowns.get("interface_points", 1)
     elif shear:
         each = 3e-9 * unknowns.get("interface_points", 1) + 5e-7
-    return "march", int(steps * 1.75), steps * 1.75 * each
+    return settings.engine, int(steps * 1.75), steps * 1.75 * each
 
 
 def _groups(scene, chain) -> dict:
@@ -220,7 +224,7 @@ def _groups(scene, chain) -> dict:
         from .simulate_structure import first_frequency, friction_limit, moving_mass
 
         drive, mass, limit = drive_of(scene), moving_mass(scene), friction_limit(scene, load)
-        push = mass * largest(drive)
+        push = scene.drive.force if scene.drive.kind == "force" and scene.drive.force else mass * largest(drive)
         out["D"] = limit / push if push > 0 else None
         ratio = first_frequency(scene) * drive.period if scene.drive.frequency else inf
         out["knee"] = 4 / pi * limit / mass if abs(ratio - 1) < 0.2 else None
@@ -243,7 +247,7 @@ def _groups(scene, chain) -> dict:
 def _verdict(scene, groups, size: int) -> list:
     out = []
     d = groups.get("D")
-    if d is not None:
+    if d is not None and scene.structure is not None and len(scene.structure.mode) == 1 and scene.drive.kind != "free":
         if d >= 1:
             out.append(f"D = {d:.3g} >= 1: the block should stick")
         elif d > pi / 4:

@@ -21,6 +21,7 @@ from .response.measures import (
     window_ends,
 )
 from .simulate_acting import acting
+from .simulate_interfaces import yaws
 from .simulate_structure import highest_frequency, mode_stiffness
 from .simulate_wrench_scene import acts
 
@@ -124,6 +125,8 @@ def choose(scene, per_point: bool = False) -> Settings:
     # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
     steps = accuracy.steps_per_cycle or int(np.clip(
         2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * fastest), 100, MOST_STEPS))
+    if accuracy.steps_per_cycle is None and engine == "march":
+        steps = max(steps, unique_steps(scene, drive))
     if not simulate_drive.sinusoidal(drive) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / cycles)))
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
@@ -131,6 +134,19 @@ def choose(scene, per_point: bool = False) -> Settings:
         steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Settings(engine, steps, cycles, window, accuracy.shear_modes, per_point or side == "lower",
                     frozenset(pinned))
+
+
+def unique_steps(scene, drive) -> int:
+    """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
+    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
+    f = scene.friction
+    if f is None or f.law != "nonlocal" or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
+        return 0
+    from .simulate_plan import nominal_load
+
+    modes = modes_of(scene)
+    stiff = f.static * nominal_load(scene) / f.bond_length * (f.static / f.kinetic - 1)
+    return 2 * int(np.ceil(0.55 * drive.period * sqrt(stiff * float(np.sum(modes.slide**2)) / (2 * modes.mass))))
 
 
 def engine_of(scene, drive, side: str) -> str:
@@ -167,6 +183,8 @@ def no_closed_form(scene, drive, shear: str) -> str:
         return f"with {shear}"
     if acts(scene):
         return "under a load that changes"
+    if yaws(scene) and scene.drive.waveform == "levels":
+        return "with strips that yaw, level by level"
     if not drive.segments:
         return f"under a drive of waveform '{scene.drive.waveform}'"
     if structure.stiffening is not None:
@@ -257,6 +275,13 @@ def contact_model(scene, settings: Settings, patch, drive):
     return hub.points_model(law, [1.0], [load])
 
 
+def sampled(values: dict) -> dict:
+    """Errors of measures of strips that are read off 400 samples a cycle, by the trapezoidal rule."""
+    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
+    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
+            else 1e-9 * abs(value) for name, value in values.items()}
+
+
 def _ledger(ledger) -> dict:
     """Measures of the ledger but for what is stored, which depends on the instant at which the run ends."""
     return {name: value for name, value in ledger_measures(ledger).items() if name != "energy_stored"}
@@ -266,7 +291,7 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     """One march at settings.steps per cycle."""
     from . import simulate_events, simulate_levels
     from . import simulate_march as hub
-    from .simulate_interfaces import model_of, other_measures
+    from .simulate_interfaces import joined, model_of, other_measures
     from .simulate_march import Mark
 
     travel, marks, start = scene.structure.travel or np.inf, simulate_levels.ends(scene), start_of(scene, modes)
@@ -276,9 +301,11 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     hub.warm_up(modes, drive, model, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
+    frames = 0 if yaws(scene) else frames  # strips have no common field of shear
     done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
                      progress, start, marks)
     seconds = perf_counter() - begin
+    done = joined(done, patch) if yaws(scene) else done
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
     held, rubbing = 0.0, None
@@ -290,8 +317,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         held *= scene.friction.law != "tanh"  # a law of the speed never holds
 
         def rubbing(part):
-            return _rubbing(scene, settings, modes, drive, patch, part) | other_measures(part.window, drive,
-                                                                                         settings.steps)
+            others = {} if yaws(scene) else other_measures(part.window, drive, settings.steps)
+            return _rubbing(scene, settings, modes, drive, patch, part) | others
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])

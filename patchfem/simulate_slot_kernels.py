@@ -20,7 +20,7 @@ from .simulate_element_kernels import (
 )
 from .simulate_step_kernels import COULOMB, RATE, commit, contact_state, contact_step
 
-TURNS = 400  # of all elements in a step before it counts as failed
+TURNS = 1000  # of all elements in a step before it counts as failed
 NOBODY = -1  # kind of a patch that is not there
 
 
@@ -36,17 +36,24 @@ def elsewhere(mine, port, ports, forces, own, beta):
 
 @njit(error_model="numpy", **LEAN)
 def newton_turn(free, ports, kinds, num, mem, q, eps, dt, beta, forces, mean, system):
-    """One Newton step on the forces of all elements at once, without a patch; False where a law has no slope.
+    """One Newton step on the forces of all elements at once, without a patch; False where it fails.
 
-    forces (e,) in place; the residual is forces - law(free - beta forces).
+    forces (e,) in place; the residual is forces - law(free - beta forces). A Coulomb element that holds asks for no
+    slide, with a trace of give where elements that depend on each other share their force in more ways than one; one
+    that slips keeps its force.
     """
     count = forces.size
     for e in range(count):
-        if kinds[e] == COULOMB:
-            return False
-        dq = free[ports[e]]
+        dq, own = free[ports[e]], beta[ports[e], ports[e]]
         for k in range(count):
             dq -= beta[ports[e], ports[k]] * forces[k]
+        if kinds[e] == COULOMB:
+            holds = abs(forces[e]) < num[e, 0] * (1 - 1e-12) and abs(forces[e]) != num[e, 1]
+            mean[e] = dq / own if holds else 0.0
+            for k in range(count):
+                system[e, k] = beta[ports[e], ports[k]] / own if holds else 0.0
+            system[e, e] += 1e-9 if holds else 1.0
+            continue
         force, slope = element_mean(kinds[e], num, mem, e, q[e], dq, eps[e], dt)
         mean[e] = force - forces[e]
         for k in range(count):
@@ -69,6 +76,8 @@ def newton_turn(free, ports, kinds, num, mem, q, eps, dt, beta, forces, mean, sy
             return False
     for e in range(count):
         forces[e] += mean[e]
+        if kinds[e] == COULOMB:
+            forces[e] = min(max(forces[e], -num[e, 0]), num[e, 0])
     return True
 
 

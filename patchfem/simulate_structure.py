@@ -3,11 +3,12 @@
 Where a number is wanted before anything runs (`plan`), the functions here give it for every description of the rig.
 """
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
 
-from .core import ModalBasis, PatchfemError, Start
+from .core import ModalBasis, PatchfemError, Start, frozen_array
 from .structure.modes import basis
 
 
@@ -18,16 +19,29 @@ def modes_of(scene) -> ModalBasis:
     on drive.mass (structure.output_mass unless given), at the output of [[structure.mode]] and of a file without a
     force of its own. PatchfemError names what a file lacks.
     """
-    found = _unbonded(scene)
+    found = _over_strips(scene, _unbonded(scene))
+    if found.faces is not None and not len(found.faces):
+        found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
     bonded = scene.structure.bonded
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
     from .structure.bonded import bonded as fold
 
-    if len(found.interfaces) != 1:
+    if len(found.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
     return fold(found, bonded.stiffness, bonded.damping)
+
+
+def _over_strips(scene, found: ModalBasis) -> ModalBasis:
+    """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
+    from .simulate_interfaces import strip_rows, yaws
+
+    if not yaws(scene):
+        return found
+    count, width = scene.contact.strips.count, scene.contact.width
+    offsets = (np.arange(count) + 0.5) * (width / count) - width / 2
+    return replace(found, faces=frozen_array(strip_rows(found, offsets)))
 
 
 def _unbonded(scene) -> ModalBasis:
@@ -37,10 +51,6 @@ def _unbonded(scene) -> ModalBasis:
         found = basis(structure.mode, structure.moving_mass)
         if not forced:
             return found
-        from dataclasses import replace
-
-        from .core import frozen_array
-
         return replace(found, base=frozen_array(-found.output))
     if structure.masses:
         from .structure import masses

@@ -81,13 +81,6 @@ def rows_of(modes: ModalBasis) -> np.ndarray:
                      for part in (modes.slide, modes.normal, modes.pitch)])
 
 
-def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
-    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
-    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
-    yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
-    return basis.slide - np.outer(offsets, yaw)
-
-
 def contact_frequencies(modes: ModalBasis, atlas: Atlas) -> np.ndarray:
     """Natural frequencies [rad/s] of the modes on the preloaded contact set, without friction: what a step must
     resolve."""
@@ -198,7 +191,8 @@ class WrenchRun(Run):
         work = self._works(rows)
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
-        digit = np.abs(rows[:-1, :n // 2]) @ np.abs(self.modes.slide)
+        digit = np.abs(rows[:, :n // 2]) @ np.abs(self.modes.slide)
+        digit = np.maximum(digit[1:], digit[:-1]) + self.prop.beta[0, 0] * size
         noise = size * (1e-12 * np.abs(np.diff(rows[:, n])) + 2e-15 * digit) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])

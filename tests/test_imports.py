@@ -108,6 +108,30 @@ def test_exact_a_rubbing_point_needs_no_patch(scene):
     assert {"patchfem.dynamics.events", "patchfem.structure.modes"} <= modules
 
 
+def test_exact_a_rubbing_point_needs_no_other_rig(scene):
+    """One mode, one sine, one point: no masses, files, springs, wrench, other drives, other engines."""
+    modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE))
+    absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
+           "structure.bonded", "structure.identify", "dynamics.drives", "dynamics.duhamel", "dynamics.newmark",
+           "dynamics.euler", "dynamics.comparison", "dynamics.harmonic", "dynamics.steady", "dynamics.steady_events",
+           "dynamics.continuation", "dynamics.propagator", "simulate_slots", "simulate_wrench", "simulate_comparison",
+           "simulate_steady", "simulate_harmonic", "contact.atlas", "response.signals")
+    assert "pyuff" not in modules
+
+
+@pytest.mark.parametrize("lines, module", [
+    ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "simulate_slots"),
+    ('[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
+    ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.newmark"),
+    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.steady_events"),
+], ids=["stiffening", "bonded", "newmark", "harmonic"])
+def test_exact_a_rig_brings_what_it_names(scene, lines, module):
+    modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE + lines))
+    assert f"patchfem.{module}" in modules
+    others = {"simulate_slots", "structure.bonded", "dynamics.newmark", "dynamics.steady_events"} - {module}
+    assert not {f"patchfem.{name}" for name in others} & modules
+
+
 def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled")

@@ -287,8 +287,6 @@ UNBUILT = [
     (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz",
                                              "friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
     (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10"], "wear"),
-    (RIG, ["accuracy.method=newmark"], "accuracy.method"),
-    (RIG, ["accuracy.harmonics=5"], "accuracy.harmonics"),
 ]
 
 

@@ -125,7 +125,8 @@ def refine(book):
         else:
             tableau[i, m], tableau[i, m + 1], tableau[i, m + 2] = s0, s1, s2
             left[0, i], left[1, i], left[2, i] = 0.0, 0.0, 0.0
-    for i in range(m):
+    worst = max(off0 / top0 if top0 > 0 else 0.0, off1 / top1, off2 / top2 if top2 > 0 else 0.0)
+    for i in range(m if worst > 1e-15 else 0):
         s0, s1, s2 = 0.0, 0.0, 0.0
         line = tableau[i]
         for j in range(m):
@@ -135,7 +136,7 @@ def refine(book):
         tableau[i, m] -= s0
         tableau[i, m + 1] -= s1
         tableau[i, m + 2] -= s2
-    return max(off0 / top0 if top0 > 0 else 0.0, off1 / top1, off2 / top2 if top2 > 0 else 0.0)
+    return worst
 
 
 @njit(error_model="numpy", **LEAN)

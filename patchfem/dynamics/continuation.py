@@ -5,8 +5,8 @@ the parameter turns, a crossing where the determinant of the bordered system cha
 Method: Keller 1977; Seydel, Practical Bifurcation and Stability Analysis, 2010, ch. 4.
 """
 
-import itertools
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
@@ -45,7 +45,7 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
         raise NotConverged("accuracy.method: the branch has no first point near the start given")
     x, p = x[0], x[1]
     tangent = _tangent(system, x, p, None, size, width, forward)
-    found = [(x, p, tangent[1][-1], 0.0)]
+    found = [(x, p, tangent[1], 0.0)]
     signs, ended, arc = [tangent[0]], "points", 0.0
     while len(found) < most:
         if not scale:
@@ -66,16 +66,17 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
             share = (at - p) / (new[1] - p)
             last = _correct(system, x + share * (new[0] - x), at, np.zeros(x.size), 1.0, size, width, goal, at)
             if last is not None:
-                found.append((last[0], at, t[-1], arc + share * step))
+                found.append((last[0], at, t, arc + share * step))
             ended = "end" if (at == bounds[1]) == forward else "start"
             break
         arc += step
         x, p, count = new
         tangent = _tangent(system, x, p, t, size, width, forward)
-        found.append((x, p, tangent[1][-1], arc))
+        found.append((x, p, tangent[1], arc))
         signs.append(tangent[0])
         step = min(step * (1.5 if count <= 3 else 1.1 if count <= 5 else 0.6), longest)
-    return Path(np.array([f[0] for f in found]), *(np.array([f[i] for f in found]) for i in (1, 2, 3)),
+    return Path(np.array([f[0] for f in found]), np.array([f[1] for f in found]),
+                np.array([f[2][-1] for f in found]), np.array([f[3] for f in found]),
                 _folds(found, width), tuple(0.5 * (found[k][1] + found[k + 1][1]) for k in range(len(signs) - 1)
                                             if signs[k] * signs[k + 1] < 0), ended)
 
@@ -129,13 +130,14 @@ def _alike(new, x, p, t, size, width, step) -> bool:
 
 
 def _folds(found, width) -> tuple:
-    """Extremes of p between points whose dp/ds differ in sign, of the cubic through values and slopes."""
+    """Extremes of p between points whose dp/ds differ in sign, of the cubic through values and slopes over the way
+    along the first one's tangent, which a step covers exactly: the corrector goes across it."""
     out = []
-    for (_, p0, t0, s0), (_, p1, t1, s1) in itertools.pairwise(found):
-        if t0 * t1 >= 0:
+    for (_, p0, t0, s0), (_, p1, t1, s1) in pairwise(found):
+        if t0[-1] * t1[-1] >= 0:
             continue
         h = s1 - s0
-        a, b = t0 * h, t1 * h
+        a, b = t0[-1] * h, t1[-1] * h / max(float(t0 @ t1), 0.1)
         rise = (p1 - p0) / width
         # derivative of the cubic: a + 2 s (3 rise - 2 a - b) + 3 s^2 (a + b - 2 rise)
         c, d = 3 * (a + b - 2 * rise), 2 * (3 * rise - 2 * a - b)

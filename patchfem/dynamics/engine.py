@@ -83,13 +83,12 @@ class Engine:
                 clock.offset += piece.span
                 self._event(event, piece)
             elif piece.span == clock.left:
-                self.idle = 0
                 before = self.signs
                 if first := clock.arrive():
                     self.recorder.add(clock.time, clock.theta, -1, BORDER, 0.0)
                     self._enter(before, self._resting(piece))
             else:
-                clock.offset, first, self.idle = clock.offset + piece.span, False, 0
+                clock.offset, first = clock.offset + piece.span, False
             self._keep()
 
     def _sine(self) -> tuple:
@@ -145,7 +144,7 @@ class Engine:
         resting = self._resting(piece) if len(guess) > 1 else [0]
         if face not in resting:
             resting = sorted([*resting, face])
-        self.idle += 1
+        self.idle = self.idle + 1 if piece.span < 1e-12 * self.clock.period else 0
         if self.idle > 1000:
             raise NotConverged(f"dynamics: events pile up at t = {self.clock.time:.9g} s")
         self._enter(tuple(guess), resting)

@@ -5,7 +5,7 @@ from math import ceil, comb
 
 import numpy as np
 
-from ..core import ModalBasis, Outcome, Response, Start
+from ..core import ModalBasis, Outcome, PatchfemError, Response, Start
 from . import batches
 from .event_list import RELEASE, EventLog
 from .events import Engine
@@ -48,6 +48,8 @@ def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: i
     static, kinetic: one for every interface or (i,). The outcome is set only where the output passes `travel` [m]; the
     run ends there. PatchfemError for a drive without closed form.
     """
+    if start is not None and abs(float(modes.output @ start.z)) > travel:
+        raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
     book = _Book(modes, drive, cycles, window, travel)
     engine, waiting = Engine(modes, drive, static, kinetic, cycles, start), []
     book.live = engine.live

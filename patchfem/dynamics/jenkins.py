@@ -71,7 +71,7 @@ class Jenkins:
                     pull = way * self.limit
             else:
                 g0 = way * (bs - self.w**2 * z) - self.limit
-                span = stop(way * v, g0, way * bc, way * bs, self.free, left)
+                span = stop(way * v, g0, way * bc, way * bs, self.free, left)[0]
                 ends = span >= 0
                 span = span if ends else left
                 shift, speed, _ = motion(span, way * v, g0, way * bc, way * bs, self.free)

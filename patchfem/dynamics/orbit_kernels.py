@@ -60,13 +60,13 @@ def flow(theta, z, v, angle, b, static, kinetic, o, out, phases):
                 phases[count] = theta % TURN
             out[20] += 1.0
             continue
-        span = stop(speed, g0, bc, bs, o, left)
+        span, shift, gain = stop(speed, g0, bc, bs, o, left)
         if span == -2.0:
             return False
         ends = span >= 0.0
         if not ends:
             span = left
-        shift, speed, gain = motion(span, speed, g0, bc, bs, o)
+            shift, speed, gain = motion(span, speed, g0, bc, bs, o)
         h, h1, one = impulse(span, o)
         keep = 1.0 - beta * one
         zz, vz = keep * zz + h * vz, h1 * vz - beta * h * zz
@@ -161,7 +161,7 @@ def settle(theta, z, v, halves, b, static, kinetic, o, out, phases):
         turn, _, _, _ = release(-beta * z, b, theta, static)
         ahead = 0.5 * min(turn, pi)
     else:
-        ahead = 0.5 * om * stop(abs(v), g0, bc, bs, o, pi / om)
+        ahead = 0.5 * om * stop(abs(v), g0, bc, bs, o, pi / om)[0]
         if ahead <= 0.0:
             ahead = 0.25 * pi
     alive = flow(theta, z, v, ahead, b, static, kinetic, o, out, phases)

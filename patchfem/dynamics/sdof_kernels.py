@@ -209,13 +209,14 @@ def march(mode, friction, segments, clock, state, rows, extremes, book):
                     span = angle / om
                 shift, speed, gain = 0.0, 0.0, 0.0
             else:
-                found = stop(v, g0, bc, bs, o, left)
+                found, shift, gain = stop(v, g0, bc, bs, o, left)
                 if found == -2.0:
                     return LOST, count
                 ready = found >= 0.0
                 if ready:
-                    span = found
-                shift, speed, gain = motion(span, v, g0, bc, bs, o)
+                    span, speed = found, 0.0
+                else:
+                    shift, speed, gain = motion(span, v, g0, bc, bs, o)
                 if abs(z + direction * shift) > far:
                     span, code = crossing(z, far, direction, v, g0, bc, bs, span, o), TRAVEL
                     shift, speed, gain = motion(span, v, g0, bc, bs, o)

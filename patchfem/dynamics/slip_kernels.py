@@ -195,7 +195,8 @@ def over_parts(v0, a0, size, bc, bs, o):
 
 
 def stop(v0, g0, bc, bs, o, limit):
-    """First time in (0, limit] at which the speed, positive just after 0, is back at zero; -1 if none, -2 if lost."""
+    """(first time in (0, limit] at which the speed, positive just after 0, is back at zero, shift, acceleration there);
+    time -1 if there is none, -2 if it was lost."""
     beta, alpha, om = o[0], o[1], o[5]
     size = hypot(bc, bs)
     free = alpha if o[4] != 1.0 else 0.0
@@ -206,15 +207,16 @@ def stop(v0, g0, bc, bs, o, limit):
     if o[4] == 1.0:
         quick, late, forced = over_parts(v0, g0 - alpha * v0, size, bc, bs, o)
         rest = late + forced
-    u, v, a, co, so, peak = 0.0, v0, g0 - alpha * v0, 1.0, 0.0, 0.0
+    y, u, v, a, co, so, peak = 0.0, 0.0, v0, g0 - alpha * v0, 1.0, 0.0, 0.0
     for _ in range(200000):
         j = om * (bc * co - bs * so) - alpha * a - beta * v
         if u > 0.0 and v <= 1e-6 * peak:
             x = -v / a if a < 0.0 else inf
             if abs(j) * x <= -1e-5 * a:
-                return min(u + x * (1.0 - 0.5 * j * x / a), limit)
+                x *= 1.0 - 0.5 * j * x / a
+                return min(u + x, limit), y + x * (v + 0.5 * a * x), a + x * j
             if v <= 1e-14 * peak:
-                return u
+                return u, y, a
         peak = max(peak, v)
         h = min(stride, limit - u)
         k = -om * om * (bc * so + bs * co) - alpha * j - beta * a
@@ -223,10 +225,10 @@ def stop(v0, g0, bc, bs, o, limit):
             m = min(m, quick * exp(-(o[2] + o[3]) * u) + rest)
         s = leap(v, a, j, k, m, h) if v > 0.0 else first_leap(a, j, k, m, h)
         if s >= limit - u:
-            return -1.0
+            return -1.0, 0.0, 0.0
         if u + s == u:
-            return u
+            return u, y, a
         u += s
         co, so = cos(om * u), sin(om * u)
-        _, v, a = moved(u, co, so, v0, g0, bc, bs, o)
-    return -2.0
+        y, v, a = moved(u, co, so, v0, g0, bc, bs, o)
+    return -2.0, 0.0, 0.0

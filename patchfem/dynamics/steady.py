@@ -83,11 +83,13 @@ def point(modes: ModalBasis, drive, static: float, kinetic: float, start: Start 
     drives; a motion that does not become periodic is `unsettled`, not an error.
     """
     row, output = _row(modes, drive, static, kinetic, start)
-    engine = orbit_kernels
+    found, phases = np.zeros(12), np.full(orbit_kernels.PHASES, np.nan)
     if compiled:
-        from . import steady_kernels as engine
-    out, found, phases = np.empty(orbit_kernels.OUT), np.zeros(12), np.full(orbit_kernels.PHASES, np.nan)
-    engine.point(*row, patience, out, phases, found)
+        from .steady_kernels import points
+
+        points(np.array([row], float), patience, found[None], phases[None])
+    else:
+        orbit_kernels.point(*row, patience, np.empty(orbit_kernels.OUT), phases, found)
     return _steady(row, found, phases, output)
 
 

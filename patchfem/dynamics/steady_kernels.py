@@ -6,9 +6,8 @@ from numba import njit
 from . import orbit_kernels as plain
 from .event_kernels import COMPILED, compiled_copy
 
-INNER = ("impulse", "flow", "newton", "sliding_guess", "settle", "report", "recurrence")
-SCOPE = compiled_copy(plain, INNER, ("point",), COMPILED)
-point = SCOPE["point"]
+point = compiled_copy(plain, ("impulse", "flow", "newton", "sliding_guess", "settle", "report", "recurrence", "point"),
+                      (), COMPILED)["point"]
 
 
 @njit(error_model="numpy", cache=True)

@@ -15,7 +15,7 @@ from ..core import NotConverged, PatchfemError
 from .places import AXES, Shapes
 
 MOST = 30  # modes
-STARTS = 3  # peaks tried for every further mode
+STARTS = 2  # peaks of each kind tried for every further mode
 ALIKE = 0.5  # mean cosine between neighbouring frequencies of what is left: 1 for a missing mode, 0 for noise
 ASIDE = 8  # frequencies on each side over which it is taken
 GAIN = 15.0  # times what a mode would explain of white noise, for it to be kept
@@ -175,20 +175,24 @@ def _pruned(fit, theta):
 
 
 def _starts(fit, theta):
-    """(w, zeta) at the largest peaks of what is left, the damping from their width at half the height."""
+    """(w, zeta) at the largest peaks of what is left, as it is and in proportion to the responses; the damping from
+    their width at half the height."""
     rest, omega = fit.left(theta), fit.omega
-    spectrum = np.sum(np.abs(rest)**2, axis=1)
-    size = np.sqrt(np.maximum(spectrum, 1e-300))
+    size = np.maximum(np.sqrt(np.sum(np.abs(rest)**2, axis=1)), 1e-300)
     alike = np.real(np.sum(rest[:-1] * rest[1:].conj(), axis=1)) / (size[:-1] * size[1:])
-    peaks = find_peaks(np.concatenate([[0], spectrum, [0]]))[0] - 1
-    peaks = [k for k in peaks if alike[max(0, k - ASIDE):k + ASIDE].mean() > ALIKE]
-    for k in sorted(peaks, key=lambda k: -spectrum[k])[:STARTS]:
-        below, above = k, k
-        while below > 0 and spectrum[below] > spectrum[k] / 2:
-            below -= 1
-        while above < omega.size - 1 and spectrum[above] > spectrum[k] / 2:
-            above += 1
-        yield omega[k], np.clip((omega[above] - omega[below]) / (2 * omega[k]), 1e-5, 0.3)
+    tried = set()
+    for spectrum in ((size / fit.weight)**2, size**2):
+        peaks = find_peaks(np.concatenate([[0], spectrum, [0]]))[0] - 1
+        peaks = [k for k in peaks if alike[max(0, k - ASIDE):k + ASIDE].mean() > ALIKE]
+        for k in sorted(peaks, key=lambda k: -spectrum[k])[:STARTS]:
+            below, above = k, k
+            while below > 0 and spectrum[below] > spectrum[k] / 2:
+                below -= 1
+            while above < omega.size - 1 and spectrum[above] > spectrum[k] / 2:
+                above += 1
+            if k not in tried:
+                yield omega[k], np.clip((omega[above] - omega[below]) / (2 * omega[k]), 1e-5, 0.3)
+            tried.add(k)
 
 
 def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:

@@ -1,13 +1,11 @@
 """The two problems with exact answers: stick-slip at resonance and the two masses of Fig 16."""
 
-from functools import cache
-
 import numpy as np
 
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, frozen_array
-from patchfem.dynamics.events import run
-from patchfem.dynamics.histories import sample
+from patchfem.dynamics.batches import gather, sample
+from patchfem.dynamics.engine import Engine
 
 load("dynamics.comparison_kernels")  # compiled loops come from the hashed cache
 
@@ -29,15 +27,13 @@ TWO, TWO_DRIVE, TWO_LIMIT = (basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF
                              BaseSine(1.0, 1.14, False), 3.0)
 
 
-@cache
-def phases(name: str, duration: float) -> list:
-    """Exact phases of "sdof" or "two" from rest."""
-    modes, drive, limit = {"sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT), "two": (TWO, TWO_DRIVE, TWO_LIMIT)}[name]
-    return list(run(modes, drive, limit, limit, duration))
+def sampled(modes, drive, limit, cycles: float, times, start=None):
+    """Response at `times` (k,) of `cycles` by the event engine of any modes."""
+    engine = Engine(modes, drive, limit, limit, cycles, start)
+    return sample(gather(list(engine.pieces())), np.asarray(times, float), modes, drive, engine.live)
 
 
 def exact(name: str, times):
-    """Exact Response at `times` (k,)."""
-    modes, drive, _ = {"sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT), "two": (TWO, TWO_DRIVE, TWO_LIMIT)}[name]
-    times = np.asarray(times, float)
-    return sample(phases(name, float(np.ceil(times[-1]))), times, modes, drive)
+    """Exact Response of "sdof" or "two" from rest at `times` (k,)."""
+    modes, drive, limit = {"sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT), "two": (TWO, TWO_DRIVE, TWO_LIMIT)}[name]
+    return sampled(modes, drive, limit, float(np.ceil(times[-1])) / drive.period, times)

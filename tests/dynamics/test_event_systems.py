@@ -9,7 +9,7 @@ from event_reference import march_reference, run_reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, ModalBasis, PatchfemError, Segment, Start
+from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
 from patchfem.dynamics import drives
 from patchfem.dynamics.engine import Engine
 from patchfem.dynamics.event_list import BORDER, RELEASE, REVERSAL, STOP
@@ -457,6 +457,16 @@ def test_exact_figure_16_range_after_3900():
 def test_refuses_drives_without_closed_form():
     with pytest.raises(PatchfemError, match='use method = "march"'):
         simulate(basis_of(1.0), drives.Sweep(1.0, 2.0, 5.0, 1.0), 1.0, 1.0, 3)
+
+
+def test_refuses_a_start_beyond_the_travel():
+    with pytest.raises(PatchfemError, match=r"structure\.travel"):
+        simulate(basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1)))
+    done = simulate(basis_of(1.0), FREE, 0.1, 0.1, 3, travel=2.0, start=Start(np.array([1.0]), np.array([3.0])))
+    assert done.outcome is Outcome.EXCEEDS_TRAVEL  # 1.1 cos t + 3 sin t - 0.1 passes 2
+    at = done.response.time[-1]
+    assert 1.1 * cos(at) + 3 * sin(at) - 0.1 == pytest.approx(2.0, rel=1e-12) and at < 1
+    assert energy_balance(done.ledger) < 1e-12
 
 
 @pytest.mark.parametrize("kinetic", [1.1, -0.1])

@@ -39,7 +39,17 @@ def test_exact_a_circle_and_its_folds():
     path = follow(circle, [0.6], 0.8, (-0.5, 2.0), True, 0.05, 0.05)
     assert path.ended == "start" and path.p[-1] == -0.5 and path.x[-1, 0] == pytest.approx(-np.sqrt(0.75), abs=1e-9)
     assert path.x[:, 0]**2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
-    assert path.folds == (pytest.approx(1.0, abs=1e-5),) and not path.crossings
+    assert path.folds == (pytest.approx(1.0, abs=1e-8),) and not path.crossings
+
+
+def test_exact_a_lopsided_fold():
+    """p = x exp(-5 x^3): the fold at x^3 = 1/15 from points 0.1 apart on the arc."""
+    def curve(x, p):
+        e = np.exp(-5 * x[0]**3)
+        return x * e - p, np.array([[e * (1 - 15 * x[0]**3)]]), np.array([-1.0])
+
+    path = follow(curve, [0.1], 0.1 * np.exp(-0.005), (0.05, 1.0), True, 0.1, 0.1, scale=1.0)
+    assert path.ended == "start" and path.folds == (pytest.approx(15**(-1 / 3) * np.exp(-1 / 3), abs=5e-5),)
 
 
 def test_exact_a_pitchfork_is_a_crossing():
@@ -136,8 +146,8 @@ def test_exact_bistable_starts_with_friction():
     drive = BaseSine(LEVEL, 2 * np.pi * 152)
     found = branches(RIG, drive, FRICTION)
     assert [p.stable for p in found] == [True, False, True]
-    up = response(RIG, drive, FRICTION, np.linspace(130, 152, 8)).points[-1]
-    down = response(RIG, drive, FRICTION, np.linspace(190, 152, 8)).points[-1]
+    up = response(RIG, drive, FRICTION, np.linspace(130, 152, 5)).points[-1]
+    down = response(RIG, drive, FRICTION, np.linspace(190, 152, 5)).points[-1]
     assert up.amplitude([1.0]) == pytest.approx(found[2].amplitude([1.0]), rel=1e-2)
     assert down.amplitude([1.0]) == pytest.approx(found[0].amplitude([1.0]), rel=1e-2)
     whole = response(RIG, drive, FRICTION, (125.0, 200.0))
@@ -314,7 +324,7 @@ load = "100 N"
 kind = "sine"
 amplitude = "{amplitude} um"
 frequency = "10 Hz"
-cycles = 6
+cycles = 4
 [accuracy]
 steps_per_cycle = 600
 """
@@ -325,7 +335,7 @@ steps_per_cycle = 600
     ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', Stretch(30.0, 2e-6))], ids=["elastic-plastic", "bonds"])
 def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     """A scene's bench measures stiffness and area of the loop; with one harmonic they are the backbone's."""
-    omega, amplitudes = W, np.array([3.0, 12.0])
+    omega, amplitudes = W, np.array([4.0])
     found = backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
     for k, amplitude in enumerate(amplitudes):
         result = run(plan(loads(BENCH.format(law=text, amplitude=amplitude))))

