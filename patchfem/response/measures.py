@@ -179,7 +179,8 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
         if rest is None:
             return None, None
         ends.append(abs(p[p.size - 1 - k] + rest))
-    shrink = min(abs(p[-1] - p[-2]) / abs(p[-2] - p[-3]), 0.9995)
+    before = abs(p[-2] - p[-3])
+    shrink = min(abs(p[-1] - p[-2]) / before, 0.9995) if before > 0 else 0.9995
     settle = (shape[-1] - shape[-2]) * shrink / (1 - shrink)
     value = ends[0] * (shape[-1] + settle)
     error = 6 * (max(ends) - min(ends)) * shape[-1] + 2 * abs(settle) * ends[0] + 1e-9 * value
