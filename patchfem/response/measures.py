@@ -172,7 +172,7 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
     a, p = np.asarray(amplitudes, float), np.asarray(phasors, complex)
     if a.size < 5 or not np.all(np.abs(p[-5:]) > 0):
         return None, None
-    shape = a / np.abs(p)
+    shape = a[-2:] / np.abs(p[-2:])
     ends = []
     for k in range(3):
         rest = tail(p[p.size - 3 - k:p.size - k])
