@@ -1,0 +1,145 @@
+"""Is the steady motion that is found directly the one that a march ends in?
+
+TO BE WRITTEN
+
+Run: python studies/steady/against_march.py
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from patchfem import scene, simulate
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+
+HERE = Path(__file__).parent
+BLOCK = """
+[normal]
+load = "26 lbf"
+[friction]
+law = "LAW"
+static = 0.30
+MORE
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 600
+"""
+LENGTH = 'bond_length = "1 um"'
+YAW = '[drive]', '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n[drive]'
+TEXTS = {"Coulomb": BLOCK.replace("LAW", "coulomb").replace("MORE", ""),
+         "elastic-plastic": BLOCK.replace("LAW", "elastic-plastic").replace("MORE", LENGTH),
+         "bonds": BLOCK.replace("LAW", "nonlocal").replace("MORE", LENGTH)}
+TEXTS["Coulomb, two modes"] = TEXTS["Coulomb"].replace(*YAW)
+PATCH = (HERE.parent / "integrators" / "patch.toml").read_text()
+TEXTS["patch of 41 elements"] = PATCH
+NAMES = tuple(TEXTS)
+FREQUENCIES = np.linspace(115.5, 174.0, 40)  # Hz, 1.5 apart, 144 among them
+MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
+STEPS, CYCLES, LONG = 1600, 600, 2000
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Row:
+    """One frequency [Hz] of one contact: MEASURES found directly, by the march and, of Coulomb, by a long exact run;
+    regime and largest multiplier of the steady motion."""
+
+    contact: str
+    frequency: float
+    steady: dict
+    march: dict
+    run: dict | None
+    regime: str
+    multiplier: float
+
+    def miss(self, name: str, other: str = "march") -> float:
+        """Difference of a measure from the steady motion's over it; 0 where nothing slips in either."""
+        found, truth = getattr(self, other)[name], self.steady[name]
+        return abs(found - truth) / abs(truth) if truth else abs(found)
+
+
+def solve(contact: str, frequency: float, **accuracy):
+    """simulate.Result of a contact at a frequency [Hz]; accuracy: keys of the table, `cycles` of the drive."""
+    sets = [f"drive.frequency={frequency} Hz", f"drive.cycles={accuracy.pop('cycles', CYCLES)}"]
+    sets += [f"accuracy.{key}={value}" for key, value in accuracy.items()]
+    return simulate.run(simulate.plan(scene.loads(TEXTS[contact], sets=sets)), estimate=False)
+
+
+def _kept(found) -> dict:
+    return {name: found.measures[name].value for name in MEASURES}
+
+
+def row(contact: str, frequency: float, steps: int = STEPS, cycles: float = CYCLES, long: float = LONG) -> Row:
+    """Both ways at one frequency."""
+    steady = solve(contact, frequency, method="harmonic", tolerance=1e-4)
+    march = solve(contact, frequency, method="march", steps_per_cycle=steps, cycles=cycles)
+    run = _kept(solve(contact, frequency, method="exact", cycles=long)) if contact.startswith("Coulomb") else None
+    worst = float(np.abs(steady.extra["multipliers"]).max(initial=0.0))
+    return Row(contact, frequency, _kept(steady), _kept(march), run, steady.extra["regime"], worst)
+
+
+def picture(table: dict, path: Path = HERE / "against_march.svg") -> Path:
+    """Amplitude over frequency, both ways, and their difference below."""
+    names = list(table)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(2.6 * len(names), 4.6))
+        FigureCanvasSVG(figure)
+        axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
+        for (top, low), name in zip(axes.T, names):
+            rows = table[name]
+            f = [r.frequency for r in rows]
+            top.semilogy(f, [1e6 * r.steady[MEASURES[0]] for r in rows], "-", color=BLUE, label="steady")
+            top.semilogy(f, [1e6 * r.march[MEASURES[0]] for r in rows], "o", color=ORANGE, ms=3, label="march")
+            low.semilogy(f, [max(r.miss(MEASURES[0]), 1e-16) for r in rows], "o-", color=ORANGE, ms=3, lw=0.7,
+                         label="march")
+            if rows[0].run is not None:
+                low.semilogy(f, [max(r.miss(MEASURES[0], "run"), 1e-16) for r in rows], "s-", color=GREY, ms=3, lw=0.7,
+                             label="long exact run")
+            top.set_title(name, fontsize=9)
+            low.set(xlabel="frequency [Hz]")
+        axes[0, 0].set_ylabel("amplitude [um]")
+        axes[1, 0].set_ylabel("difference / amplitude")
+        axes[0, -1].legend(fontsize=7)
+        axes[1, 0].legend(fontsize=7)
+        figure.savefig(path, metadata={"Date": None})
+    return path
+
+
+def compute(names=NAMES, frequencies=FREQUENCIES, **how) -> dict:
+    """{contact: [Row]}."""
+    return {name: [row(name, float(f), **how) for f in frequencies] for name in names}
+
+
+def main(names=NAMES, frequencies=FREQUENCIES, path: Path | None = HERE / "against_march.svg", **how) -> dict:
+    """{contact: [Row]}, printed and drawn."""
+    table = compute(names, frequencies, **how)
+    for name, rows in table.items():
+        regimes = list(dict.fromkeys(r.regime for r in rows))
+        print(f"{name}, 5 g at {len(rows)} frequencies from {rows[0].frequency:g} to {rows[-1].frequency:g} Hz: "
+              f"{', '.join(regimes)}")
+        for other in ("march", "run") if rows[0].run is not None else ("march",):
+            for measure in MEASURES:
+                misses = np.array([r.miss(measure, other) for r in rows])
+                k = int(misses.argmax())
+                print(f"  {other:6}{measure:34} median {np.median(misses):7.1e}  largest {misses[k]:7.1e} at "
+                      f"{rows[k].frequency:g} Hz ({rows[k].regime}, multiplier {rows[k].multiplier:.3f}, "
+                      f"{1e6 * rows[k].steady[MEASURES[0]]:.1f} um)")
+    if path is not None:
+        picture(table, path)
+    return table
+
+
+if __name__ == "__main__":
+    main()

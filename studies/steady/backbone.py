@@ -1,0 +1,106 @@
+"""Is the backbone of the axial mode, its frequency and damping over amplitude, that of the contact's loops on a bench?
+
+TO BE WRITTEN
+
+Run: python studies/steady/backbone.py
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+from against_march import PATCH, TEXTS
+
+from patchfem import scene, simulate, simulate_harmonic, simulate_patch, simulate_rig
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+
+HERE = Path(__file__).parent
+ONE_MODE = PATCH[:PATCH.rindex("[[structure.mode]]")] + PATCH[PATCH.index("[drive]"):]
+CASES = {"elastic-plastic": (TEXTS["elastic-plastic"], 1e-6), "bonds": (TEXTS["bonds"], 1e-6),
+         "patch of 41 elements": (ONE_MODE, 3e-7)}  # and the size [m] that amplitudes are counted in
+SHARES = np.geomspace(0.1, 100, 16)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Row:
+    """Amplitudes (k,) [m] of a case; frequency [Hz] and damping [1] from the loops of the bench, by the free balance of
+    one harmonic and of nine."""
+
+    case: str
+    amplitude: np.ndarray
+    bench: tuple
+    single: tuple
+    many: tuple
+
+    def miss(self, which: str) -> tuple:
+        """Largest relative distances of frequency and damping from the bench's; of the damping over what the contact
+        adds where that is most."""
+        pairs = zip(getattr(self, which), self.bench)
+        return tuple(float(np.abs(found / truth - 1).max()) for found, truth in pairs)
+
+
+def loop(text: str, amplitude: float, steps: int) -> tuple:
+    """(equivalent stiffness [N/m], area [J]) of a steady sine cycle of the scene's interface on a bench."""
+    head = text[:text.index("[structure]")]
+    bench = (f'{head}[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\nfrequency = "143 Hz"\ncycles = 8\n'
+             f"[accuracy]\nsteps_per_cycle = {steps}\n")
+    found = simulate.run(simulate.plan(scene.loads(bench)), estimate=False).measures
+    return found["equivalent_stiffness"].value, found["loop_area"].value
+
+
+def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
+    """One contact."""
+    text, size = CASES[name]
+    given = scene.loads(text)
+    modes, drive, chosen = simulate_rig.modes_of(given), simulate_rig.drive_of(given), simulate_rig.choose(given)
+    patch = simulate_patch.solve_all(given, False)[0] if given.contact is not None else None
+    model, amplitude = simulate_rig.contact_model(given, chosen, patch, drive), size * np.asarray(shares)
+    free = [simulate_harmonic.backbone(modes, model, amplitude, harmonics=h) for h in (1, 9)]
+    w, zeta = modes.omega[0], modes.zeta[0]
+    stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
+    omega = np.sqrt(w**2 + stiffness / modes.mass)
+    damping = zeta * w / omega + area / (2 * np.pi * modes.mass * omega**2 * amplitude**2)
+    return Row(name, amplitude, (omega / (2 * np.pi), damping), *((b.frequency, b.damping) for b in free))
+
+
+def picture(rows: list, path: Path = HERE / "backbone.svg") -> Path:
+    """Frequency and damping over amplitude; lines: nine harmonics, marks: the bench."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(8.5, 3.4))
+        FigureCanvasSVG(figure)
+        axes = figure.subplots(1, 2)
+        for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
+            for axis, line, mark in zip(axes, r.many, r.bench):
+                axis.loglog(1e6 * r.amplitude, line, "-", color=colour, label=r.case)
+                axis.loglog(1e6 * r.amplitude, mark, "o", color=colour, ms=3.5)
+        for axis, name in zip(axes, ("frequency [Hz]", "damping ratio")):
+            axis.set(xlabel="amplitude [um]", ylabel=name)
+        axes[0].axhline(143, color="#bbbbbb", lw=0.8, zorder=0)
+        axes[1].legend(fontsize=8, title="lines: free balance, marks: bench", title_fontsize=7)
+        figure.savefig(path, metadata={"Date": None})
+    return path
+
+
+def main(names=tuple(CASES), path: Path | None = HERE / "backbone.svg", **how) -> list:
+    """[Row], printed and drawn."""
+    rows = [case(name, **how) for name in names]
+    for r in rows:
+        top = int(r.bench[1].argmax())
+        print(f"{r.case}: {r.bench[0][0]:.2f} Hz held, {r.bench[0][-1]:.2f} Hz at {1e6 * r.amplitude[-1]:.3g} um; "
+              f"damping {r.bench[1][0]:.5f}, most {r.bench[1][top]:.3f} at {1e6 * r.amplitude[top]:.3g} um, last "
+              f"{r.bench[1][-1]:.4f}")
+        for which in ("single", "many"):
+            print(f"  {which:7} frequency off by {r.miss(which)[0]:.1e}, damping by {r.miss(which)[1]:.1e}")
+    if path is not None:
+        picture(rows, path)
+    return rows
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,143 @@
+"""Does a march forget a small push at the rate that the multipliers of its steady motion say?
+
+TO BE WRITTEN
+
+Run: python studies/steady/multipliers.py
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from against_march import TEXTS
+
+from patchfem import scene, simulate, simulate_march, simulate_patch, simulate_rig
+from patchfem.core import Start
+from patchfem.dynamics.sdof import simulate as simulate_sdof
+from patchfem.simulate_harmonic import Group, Spring, branches, periodic_response
+from patchfem.simulate_interfaces import model_of
+
+HERE = Path(__file__).parent
+STIFFENED = (HERE / "stiffened.toml").read_text().replace(
+    'waveform = "sweep"\nfrom = "138 Hz"\nto = "152 Hz"\nrate = "0.1 Hz/s"', 'frequency = "147.4 Hz"').replace(
+    'duration = "140 s"', "cycles = 600")
+CASES = {"Coulomb, 8 g": (TEXTS["Coulomb"], "8 g"), "elastic-plastic, 5 g": (TEXTS["elastic-plastic"], "5 g"),
+         "bonds, 5 g": (TEXTS["bonds"], "5 g"), "patch of 41 elements, 5 g": (TEXTS["patch of 41 elements"], "5 g"),
+         "stiffened, 147.4 Hz, 6 g": (STIFFENED, "6 g")}
+STEPS, SETTLE, PUSH = 1600, 100, 1e-5
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Row:
+    """A case: multipliers of the steady motion, and those of pushed marches, the largest first."""
+
+    case: str
+    regime: str
+    steady: np.ndarray
+    march: np.ndarray
+
+    @property
+    def miss(self) -> float:
+        """Distance of the largest ones, of a pair whichever is nearer."""
+        return float(np.abs(self.steady - self.march[0]).min())
+
+
+def fitted(states, n: int, size: float, omega: float) -> np.ndarray:
+    """Multipliers of motions pushed each way along every coordinate and rate: one map is fitted to their differences.
+
+    states(push (2, n)) -> (cycles, 2, n) at the ends of successive cycles; size [m], omega size of rates: of a push.
+    """
+    units, spans = np.repeat([size, omega * size], n), []
+    for k in range(2 * n):
+        push = np.zeros(2 * n)
+        push[k] = units[k]
+        ends = [np.reshape(states(sign * push.reshape(2, n)), (-1, 2 * n)) / units / 2 for sign in (1, -1)]
+        spans.append(ends[0] - ends[1])
+    found = np.array(spans)  # (push, cycle, coordinate); the first cycle still holds what the contact remembers
+    before, after = np.concatenate(found[:, 1:-1]), np.concatenate(found[:, 2:])
+    values = np.linalg.eigvals(np.linalg.lstsq(before, after, rcond=1e-9)[0])
+    return values[np.argsort(-np.abs(values))]
+
+
+def marched(given, start: Start, steps: int, settle: int, cycles: int, size: float) -> np.ndarray:
+    """Multipliers by the march of a scene from a state near its steady motion."""
+    modes, drive, chosen = simulate_rig.modes_of(given), simulate_rig.drive_of(given), simulate_rig.choose(given)
+    patch = simulate_patch.solve_all(given, False)[0] if given.contact is not None else None
+    model = model_of(given, chosen, patch, modes, drive, start)
+    run = simulate_march.fresh(modes, drive, model, steps, np.inf, start)
+    for _ in range(settle):
+        run.cycle(steps, 0, [])
+
+    def states(push):
+        twin, out = run.fork(drive), []
+        twin.state += push
+        for _ in range(cycles):
+            twin.cycle(steps, 0, [])
+            out.append(twin.state.copy())
+        return np.array(out)
+
+    return fitted(states, modes.omega.size, size, drive.omega)
+
+
+def exact(given, start: Start, cycles: int, size: float) -> np.ndarray:
+    """The same by the event engine of one mode."""
+    modes, drive = simulate_rig.modes_of(given), simulate_rig.drive_of(given)
+    limit = given.friction.static * given.normal.load
+
+    def states(push):
+        out, now = [], Start(start.z + push[0], start.v + push[1])
+        for _ in range(cycles):
+            seen = simulate_sdof(modes, drive, limit, limit, 1, 1, start=now).response
+            now = Start(seen.modal[-1], seen.modal_rate[-1])
+            out.append([now.z, now.v])
+        return np.array(out)
+
+    return fitted(states, 1, size, drive.omega)
+
+
+def rows_of(case: str, steps: int = STEPS, settle: int = SETTLE, cycles: int = 12) -> list:
+    """Every steady motion of a case, and what pushed motions near it do."""
+    text, level = CASES[case]
+    sets = [f"drive.acceleration={level}"]
+    given = scene.loads(text, sets=[*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"])
+    if given.structure.stiffening is not None:
+        return _branches(given, case, steps, cycles)
+    steady = simulate.run(simulate.plan(scene.loads(text, sets=[*sets, "accuracy.method=harmonic",
+                                                                "accuracy.tolerance=1e-5"])), estimate=False)
+    seen, size = steady.response, PUSH * steady.measures["relative_displacement_amplitude"].value
+    start = Start(np.array(seen.modal[0]), np.array(seen.modal_rate[0]))
+    found = exact(given, start, cycles, size) if given.friction.law == "coulomb" and given.contact is None else \
+        marched(given, start, steps, settle, cycles, size)
+    return [Row(case, steady.extra["regime"], steady.extra["multipliers"], found)]
+
+
+def _branches(given, case: str, steps: int, cycles: int) -> list:
+    """All motions at one frequency; from the one that is not stable the march is pushed before it has left it."""
+    modes, drive = simulate_rig.modes_of(given), simulate_rig.drive_of(given)
+    group = Group(modes, [(0, simulate_rig.contact_model(given, simulate_rig.choose(given), None, drive)),
+                          (modes.output, Spring(0.0, given.structure.stiffening.cubic))])
+    out = []
+    for one in branches(modes, drive, group, 1e-5):
+        seen = periodic_response(one, modes, drive, 200)
+        start = Start(seen.modal[0].copy(), seen.modal_rate[0].copy())
+        size = PUSH * one.amplitude(modes.output)
+        out.append(Row(case, "stable" if one.stable else "unstable", one.multipliers,
+                       marched(given, start, steps, 10, cycles, size)))
+    return out
+
+
+def main(cases=tuple(CASES), **how) -> list:
+    """[Row], printed."""
+    rows = [row for case in cases for row in rows_of(case, **how)]
+    print(f"{'':26} {'steady motion':38} pushed march")
+    for r in rows:
+        words = ["  ".join(f"{v.real:+.5f}{v.imag:+.5f}i" for v in part[:2]) for part in (r.steady, r.march)]
+        print(f"{r.case:26} {words[0]:38} {words[1]:38} {r.miss:.1e}  ({r.regime})")
+    return rows
+
+
+if __name__ == "__main__":
+    main()
