@@ -14,7 +14,7 @@ from .response.measures import (
     interface_loop,
     ledger_measures,
     run_measures,
-    steady_amplitude,
+    swing,
     window_amplitudes,
     window_ends,
 )
@@ -33,10 +33,12 @@ def run_exact(scene, settings, modes, drive, load: float, start=None, progress=N
     else:
         done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
         levels, slips = (), None
+        done = _whole(done)
     values, stuck = _values(scene, settings, drive, done, load)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    ends = window_ends(done.amplitudes, done.phasors, settings.window)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
+               simulate_drive.steady_of(drive, *ends), outcome, [],
                done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log)
 
 
@@ -74,6 +76,8 @@ def _values(scene, settings, drive, done, load: float) -> tuple:
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
     span = done.window.time[-1] - done.window.time[0]
+    if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
+        values["relative_displacement_amplitude"] = swing(done.window)
     if scene.friction is None:
         values.pop("friction_force_peak")
         return values, False
@@ -90,9 +94,28 @@ def _values(scene, settings, drive, done, load: float) -> tuple:
         omega = simulate_drive.omega_of(drive)
         q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
         values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
-    values |= other_measures(done.window, drive, 400)
+    values |= other_measures(done.window, drive, 400) | _held_parts(done.window)
+    values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(peak) for k, peak in enumerate(done.force_peaks)}
     others = np.ptp(done.window.extra["slides"], axis=0).any() if "slides" in done.window.extra else False
     return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _whole(done):
+    """The run without the extremes and the phasor of a last cycle that is cut short."""
+    count = int(done.cycles_done + 1e-9)
+    if not count or count >= len(done.amplitudes):
+        return done
+    return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
+
+
+def _held_parts(window) -> dict:
+    """stick_fraction of the interfaces after the first: the share of the time in which they do not move at all."""
+    slides, length = window.extra.get("slides"), np.diff(window.time)
+    if slides is None:
+        return {}
+    still = (np.diff(slides, axis=0) == 0) & (length[:, None] > 1e-12 * length.max())
+    return {f"stick_fraction_{k + 1}": float(length[still[:, k]].sum() / length.sum())
+            for k in range(1, slides.shape[1])}
 
 
 def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tuple:

@@ -426,7 +426,7 @@ def test_refuses_verbs_not_yet_built(verb):
 
 
 @pytest.mark.parametrize("sets", [
-    ("wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"), ("accuracy.method=harmonic",),
+    ("wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"),
 ], ids=lambda sets: sets[0].split("=")[0])  # fmt: skip
 def test_refuses_keys_not_yet_built(written, tmp_path, sets):
     words = [word for one in sets for word in ("--set", one)]

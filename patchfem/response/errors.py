@@ -6,10 +6,17 @@ both count double. On 30 random scenes (two laws, one and two modes, 20 to 200 c
 the true error of every amplitude, acceleration peak and loop area, at a median of six times that error.
 """
 
+import re
+
 import numpy as np
 
 from ..core import Measure
 from .measures import FLOORS, UNITS
+
+
+def plain(name: str) -> str:
+    """A measure's name without the number of its interface: slip_amplitude of slip_amplitude_2."""
+    return re.sub(r"_\d+$", "", name)
 
 
 def change(fine: dict, coarse: dict) -> dict:
@@ -30,9 +37,9 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
     last, before = change(fine, half), change(half, quarter)
     factor = 2.0 if steps < 400 else 1.0
     out = {name: factor * max(value, before.get(name, 0.0) / 2) for name, value in last.items()}
-    for name, least in (("stick_fraction", 4 / steps), ("slip_start_phase", 4 * np.pi / steps)):
-        if name in out:
-            out[name] += least
+    least = {"stick_fraction": 4 / steps, "slip_start_phase": 4 * np.pi / steps}
+    for name in out:
+        out[name] += least.get(plain(name), 0.0)
     return out
 
 
@@ -45,5 +52,5 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
         error = float(sum(known) + abs(value) * least)
         if name == "slip_start_phase":
             error = min(error, np.pi / 2)  # a phase modulo pi cannot be farther off
-        out[name] = Measure(float(value), UNITS[name], error, FLOORS.get(name, 0.0))
+        out[name] = Measure(float(value), UNITS[plain(name)], error, FLOORS.get(plain(name), 0.0))
     return out
