@@ -12,7 +12,6 @@ from .response.measures import (
     interface_loop,
     run_measures,
     slip_measures,
-    steady_amplitude,
     window_amplitudes,
     window_ends,
 )
@@ -71,9 +70,10 @@ def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=No
         rings, own = simulate_events.rings(kept, modes, drive)
         values |= rings
     outcome = _outcome(scene, done, response)
+    ends = window_ends(extremes, phasors, window)
     return Raw(values, response, kept, window_amplitudes(extremes, window),
-               steady_amplitude(*window_ends(extremes, phasors, window)), outcome or (Outcome.STUCK if stuck else None),
-               [], book, perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
+               simulate_drive.steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
+               perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
 
 
 def _integrated(scene, settings, modes, drive, laws, start):

@@ -138,6 +138,14 @@ def sinusoidal(drive) -> bool:
     return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
 
+def steady_of(drive, amplitudes, phasors) -> tuple:
+    """`response.measures.steady_amplitude` under a drive that ends as a sine, (None, None) under any other: a released
+    or struck rig comes to rest, whatever the tail of its amplitudes looks like."""
+    from .response.measures import steady_amplitude
+
+    return steady_amplitude(amplitudes, phasors) if sinusoidal(drive) else (None, None)
+
+
 def whole(span: float, drive) -> bool:
     """Whether a window of `span` [s] holds a whole cycle: a loop needs one."""
     return span > drive.period * (1 - 1e-6)

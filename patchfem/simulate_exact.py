@@ -14,7 +14,7 @@ from .response.measures import (
     interface_loop,
     ledger_measures,
     run_measures,
-    steady_amplitude,
+    swing,
     window_amplitudes,
     window_ends,
 )
@@ -34,15 +34,16 @@ def run_exact(scene, settings, modes, drive, load: float, start=None, progress=N
     else:
         done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
         levels, slips = (), None
-        done = _over_strips(done, patch) if yaws(scene) else done
+        done = _whole(_over_strips(done, patch) if yaws(scene) else done)
     values, stuck = _values(scene, settings, drive, done, load)
     rubs = scene.friction is not None
     rings, own = simulate_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
     values |= rings
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    ends = window_ends(done.amplitudes, done.phasors, settings.window)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, [],
-               done.ledger, perf_counter() - begin, levels=levels, slips=slips, log=done.log, own=own)
+               simulate_drive.steady_of(drive, *ends), outcome, [], done.ledger, perf_counter() - begin,
+               levels=levels, slips=slips, log=done.log, own=own)
 
 
 def _forces(scene, modes, load: float, share: float, patch=None) -> tuple:
@@ -92,6 +93,8 @@ def _values(scene, settings, drive, done, load: float) -> tuple:
     last = min(settings.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
     span = done.window.time[-1] - done.window.time[0]
+    if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
+        values["relative_displacement_amplitude"] = swing(done.window)
     if scene.friction is None:
         values.pop("friction_force_peak")
         return values, False
@@ -111,9 +114,19 @@ def _values(scene, settings, drive, done, load: float) -> tuple:
         omega = simulate_drive.omega_of(drive)
         q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
         values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
-    values |= {} if yaws(scene) else other_measures(done.window, drive, 400, done.log)
+    if not yaws(scene):
+        values |= other_measures(done.window, drive, 400, done.log)
+        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
     others = any(simulate_events.moving(done.window, drive, done.log)[1:])
     return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _whole(done):
+    """The run without the extremes and the phasor of a last cycle that is cut short."""
+    count = int(done.cycles_done + 1e-9)
+    if not count or count >= len(done.amplitudes):
+        return done
+    return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
 
 
 def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tuple:

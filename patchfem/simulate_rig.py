@@ -15,7 +15,6 @@ from .response.measures import (
     ledger_measures,
     run_measures,
     slip_measures,
-    steady_amplitude,
     step_harmonic,
     window_amplitudes,
     window_ends,
@@ -337,10 +336,10 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
                 modes, other, model, settings.steps, travel, start)
             return run.slip_amplitude(round(marks[0]), settings.window) >= held
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    ends = window_ends(done.amplitudes, done.phasors, settings.window)
     return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_amplitude(*window_ends(done.amplitudes, done.phasors, settings.window)), outcome, done.snapshots,
-               done.ledger, seconds, model, {"reduce": reduced, "load": loaded}, done.message, levels, slips,
-               held=held, own=own)
+               simulate_drive.steady_of(drive, *ends), outcome, done.snapshots, done.ledger, seconds, model,
+               {"reduce": reduced, "load": loaded}, done.message, levels, slips, held=held, own=own)
 
 
 def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -> dict:
@@ -353,9 +352,10 @@ def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -
     weight = np.full(w.time.size, 1.0)
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
-    alone = "slides" not in w.extra or w.extra["slides"].shape[1] == 1
-    work = part.work if alone else float(part.step_force @ np.diff(w.slide))  # of the first interface, not of all
-    work *= drive.period / span if span > 0 else 0.0
+    done = part.work
+    if "slides" in w.extra and w.extra["slides"].shape[1] > 1 and not yaws(scene):
+        done = float(part.step_force @ np.diff(w.slide))  # of the first interface, not of all
+    work = done * drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
     if simulate_drive.whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,

@@ -189,10 +189,24 @@ def absolute(batch: Batch, modes: ModalBasis, moving: bool):
     out = batch.coefs @ modes.output
     series = np.zeros_like(out)
     series[:, :-2] = out[:, 2:] * (ORDER[2:] * (ORDER[2:] - 1)) / batch.unit[:, None]**2
-    if moving:
-        turn, size = batch.drive[:, 2] * batch.unit, batch.drive[:, 1].copy()
-        series[:, 0] += batch.drive[:, 0]
-        for k in range(TERMS):
-            series[:, k] += size * np.sin(batch.theta + k * np.pi / 2)
-            size = size * turn / (k + 1)
+    return _with_sine(series, batch, 1.0, 1.0) if moving else series
+
+
+def pushing(batch: Batch, modes: ModalBasis, face: int):
+    """Series (k, TERMS) of the friction force [N] of the live face number `face`; the last term is lost."""
+    react, coefs, series = batch.react[:, face], batch.coefs, np.zeros(batch.coefs.shape[:2])
+    rate = np.zeros_like(coefs)
+    rate[:, :-1] = coefs[:, 1:] * ORDER[1:, None] / batch.unit[:, None, None]
+    series -= np.einsum("kjn,kn->kj", coefs * modes.omega**2 + rate @ np.asarray(modes.dampers, float).T, react)
+    series[:, 0] += batch.forces[:, face] + np.einsum("kn,kn->k", batch.push, react)
+    return _with_sine(series, batch, 0.0, -(react @ modes.base))
+
+
+def _with_sine(series, batch: Batch, constant: float, share):
+    """Series (k, TERMS) with `share` of the drive's sine and `constant` of its constant added."""
+    turn, size = batch.drive[:, 2] * batch.unit, batch.drive[:, 1] * share
+    series[:, 0] += constant * batch.drive[:, 0]
+    for k in range(TERMS):
+        series[:, k] += size * np.sin(batch.theta + k * np.pi / 2)
+        size = size * turn / (k + 1)
     return series

@@ -22,8 +22,9 @@ class EventRun:
     amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its drive-frequency part; ledger: energies [J]
     over all interfaces; events: how many stretches between events; loop: quadrature arrays (time, weight, slide, rate,
     force) over the window; stick: time stuck in the window [s]; starts: phases of release, mod pi; acceleration:
-    largest |absolute acceleration| at the output in the window, both sides of every jump; log: the events. loop, stick
-    and starts are the first interface's; those of all are in Response.extra.
+    largest |absolute acceleration| at the output in the window, both sides of every jump; log: the events;
+    force_peaks (i,): largest friction force [N] of each interface in the window. loop, stick and starts are the first
+    interface's; those of all are in Response.extra.
     """
 
     response: Response
@@ -39,6 +40,7 @@ class EventRun:
     acceleration: float
     cycles_done: float
     log: EventLog | None = None
+    force_peaks: np.ndarray | None = None
 
 
 def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: int = 10, travel: float = np.inf,
@@ -174,7 +176,7 @@ class _Book:
         done = slice(0, max(1, ceil(self.end / period - 1e-9)))
         return EventRun(full, wide, np.stack([self.low, self.high], axis=1)[done], self.phasors[done], book,
                         self.outcome, self.events, loop, stick, starts, self._peak_acceleration(held),
-                        self.end / period, log)
+                        self.end / period, log, self._peak_forces(held))
 
     def _wide(self, recent, first: float, end: float) -> Response:
         """Uniform samples from `first` to `end` and both sides of every event."""
@@ -192,11 +194,21 @@ class _Book:
         return held if gone < 1e-9 * self.drive.period else _shift(held, gone)
 
     def _peak_acceleration(self, held) -> float:
-        series = batches.absolute(held, self.modes, self.drive.moving)
-        piece, u = batches.turning_points(series, held.share)
-        every = np.arange(len(held))
-        values = [series[:, 0], batches.values_at(series, every, held.share), batches.values_at(series, piece, u)]
-        return float(max(np.abs(x).max(initial=0.0) for x in values))
+        return _largest(batches.absolute(held, self.modes, self.drive.moving), held.share)
+
+    def _peak_forces(self, held) -> np.ndarray:
+        peaks = np.zeros(len(self.modes.interfaces))
+        for k, face in enumerate(self.live):
+            peaks[face] = _largest(batches.pushing(held, self.modes, k), held.share)
+        return peaks
+
+
+def _largest(series, share) -> float:
+    """Largest size of series (k, TERMS) over shares (k,) of their units."""
+    piece, u = batches.turning_points(series, share)
+    every = np.arange(len(series))
+    values = [series[:, 0], batches.values_at(series, every, share), batches.values_at(series, piece, u)]
+    return float(max(np.abs(x).max(initial=0.0) for x in values))
 
 
 def _shift(batch, gone: float):

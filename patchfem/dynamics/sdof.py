@@ -11,7 +11,7 @@ from ..core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, S
 from . import sdof_kernels
 from .event_list import BORDER, ROOM, EventLog
 from .histories import LEAST, SAMPLES, EventRun
-from .sdof_samples import Scene, force, panels, peak_acceleration, position, response, states
+from .sdof_samples import Scene, force, panels, peak_acceleration, peak_force, position, response, states
 
 COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
@@ -199,7 +199,8 @@ class _Run:
         count = 1 if scene.friction[0] == 0 else int(self.book[4])
         stuck = float((high - low)[rows[:, 3] == 0].sum())
         return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
-                        self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period, self.log())
+                        self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period, self.log(),
+                        force_peaks=np.array([peak_force(low, high, rows, scene)]))
 
     def _starts(self, first: float):
         rows = self.recent

@@ -190,11 +190,21 @@ def panels(low, high, fastest: float) -> tuple:
 
 def peak_acceleration(low, high, rows, scene: Scene) -> float:
     """Largest |absolute acceleration| of the output over intervals [low, high] (k,) of phases, both ends included."""
+    return _peak(_output_acceleration, low, high, rows, scene)
+
+
+def peak_force(low, high, rows, scene: Scene) -> float:
+    """Largest |friction force| [N] over intervals [low, high] (k,) of phases, both ends included."""
+    return _peak(_force_rates, low, high, rows, scene)
+
+
+def _peak(curve, low, high, rows, scene: Scene) -> float:
+    """Largest size of a curve that gives its value, rate and second rate at tau in the phases `owner`."""
     count = np.maximum(5, np.ceil((high - low) * scene.fastest * 8).astype(int) + 1)
     owner = np.repeat(np.arange(count.size), count)
     inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
     tau = low[owner] + (high - low)[owner] * inside / (count[owner] - 1)
-    value, rate, _ = _output_acceleration(tau, rows, owner, scene)
+    value, rate, _ = curve(tau, rows, owner, scene)
     top = float(np.abs(value).max())
     turn = np.flatnonzero((owner[:-1] == owner[1:]) & (rate[:-1] * rate[1:] < 0)
                           & (np.maximum(np.abs(value[:-1]), np.abs(value[1:])) >= 0.9 * top))
@@ -203,9 +213,15 @@ def peak_acceleration(low, high, rows, scene: Scene) -> float:
     a, b = tau[turn], tau[turn + 1]
     t, mine = a - rate[turn] * (b - a) / (rate[turn + 1] - rate[turn]), owner[turn]
     for _ in range(6):
-        _, slope, bend = _output_acceleration(t, rows, mine, scene)
+        _, slope, bend = curve(t, rows, mine, scene)
         t = np.clip(t - np.divide(slope, bend, out=np.zeros_like(t), where=bend != 0), a, b)
-    return max(top, float(np.abs(_output_acceleration(t, rows, mine, scene)[0]).max()))
+    return max(top, float(np.abs(curve(t, rows, mine, scene)[0]).max()))
+
+
+def _force_rates(u, rows, owner, scene: Scene) -> tuple:
+    stuck = (rows[owner, 3] == 0) * (scene.modes.mass / scene.slide if scene.slide else 0.0)
+    _, rate, second = pull(u, rows, owner, scene)
+    return force(u, rows, owner, scene), stuck * rate, stuck * second
 
 
 def _output_acceleration(u, rows, owner, scene: Scene) -> tuple:
