@@ -45,6 +45,11 @@ def march(first, steps, state, held, modes, prop, table, mass, kind, follow, c, 
         from .simulate_list_kernels import march_list
 
         return march_list(first, steps, state, modes, prop, table, mass, c, work, goal, travel, ledger, rows)
+    if kind == JENKINS:
+        from .simulate_jenkins_kernels import march_jenkins
+
+        return march_jenkins(first, steps, state, modes, prop, table, mass, c.stretch, c.stiffness, c.limit, c.now,
+                             work.last[:, 0], c.force[2], goal, travel, ledger, rows)
     if follow:
         from .simulate_follow_kernels import march_follow
 
