@@ -66,7 +66,7 @@ def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=No
     else:
         values |= _rubbing(scene, kept, drive, n, bears) | other_measures(kept, drive, n)
         values |= {"friction_work": book["friction"], "energy_dissipated": book["friction"], "energy_created": 0.0}
-        stuck = simulate_events.all_stick(values, kept, 0.0)
+        stuck = simulate_events.all_stick(kept, 0.0) and scene.friction.law != "tanh"
         rings, own = simulate_events.rings(kept, modes, drive)
         values |= rings
     outcome = _outcome(scene, done, response)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from .response.events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
-from .response.measures import of_first, slip_noise
+from .response.measures import slip_noise
 
 OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
 SOURCE = "located by the event engine"
@@ -72,10 +72,10 @@ def with_own(measures: dict, own: dict | None) -> dict:
             for name, m in measures.items()}
 
 
-def all_stick(values: dict, window, held: float) -> bool:
-    """Whether no interface slips by more than `held` [m] or the last digit in measures by name."""
-    slips = [value for name, value in values.items() if of_first(name) == "slip_amplitude"]
-    return bool(slips) and max(slips) <= max(held, slip_noise(window))
+def all_stick(window, held: float) -> bool:
+    """Whether no interface and no strip slips by more than `held` [m] to either side, or by the last digit."""
+    slips = np.column_stack([window.slip, slips_of(window)[0]])
+    return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_noise(window)))
 
 
 def joined_logs(logs, shifts) -> object:

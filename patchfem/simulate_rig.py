@@ -321,10 +321,10 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
-    rings, own = {}, {}
+    rings, own, stuck = {}, {}, False
     if scene.friction is not None:
         rings, own = simulate_events.rings(done.window, modes, drive, None, held)
-    stuck = simulate_events.all_stick(values, done.window, held) and scene.friction.law != "tanh"
+        stuck = simulate_events.all_stick(done.window, held) and scene.friction.law != "tanh"
     values |= rings
     levels, slips = (), None
     if marks:
@@ -352,10 +352,10 @@ def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -
     weight = np.full(w.time.size, 1.0)
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
-    done = part.work
-    if "slides" in w.extra and w.extra["slides"].shape[1] > 1 and not yaws(scene):
-        done = float(part.step_force @ np.diff(w.slide))  # of the first interface, not of all
-    work = done * drive.period / span if span > 0 else 0.0
+    work = part.work  # of all strips; of interfaces only the first, the others have their own
+    if len(scene.structure.interface) > 1:
+        work = float(part.step_force @ np.diff(w.slide))
+    work *= drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
     if simulate_drive.whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,

@@ -172,3 +172,11 @@ def test_exact_levels_are_judged_by_their_last_one():
     assert found.outcome == "steady"
     assert run(plan(loads(text.replace('levels = ["3 g", "6 g"]', 'levels = ["6 g"]'))), estimate=False).measures[
         "slip_amplitude"].value == pytest.approx(found.measures["slip_amplitude"].value, rel=1e-6)
+
+
+def test_exact_rising_levels_do_not_grow():
+    """Each level is larger than the last because its drive is: not a motion that runs away."""
+    sizes = ", ".join(f'"{g} g"' for g in range(3, 15))
+    text = MODE.replace("0.003", "0.5") + LEVELS.replace('"3 g", "6 g"', sizes).replace("15", "2")
+    found = run(plan(loads(text)), estimate=False)
+    assert found.outcome == "transient"

@@ -86,7 +86,8 @@ def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, mean
     return data.assign({
         "event_time": ("event", time, about),
         "event_interface": ("event", np.asarray(interface, np.int32),
-                            {"units": "1", "long_name": "number of the interface from 1, 0 for a border of the drive"}),
+                            {"units": "1", "long_name": "number of the interface (of the strip where strips yaw) "
+                                                        "from 1, 0 for a border of the drive"}),
         "event_kind": ("event", np.asarray(kind, np.int8), flags),
         "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event"})})
 

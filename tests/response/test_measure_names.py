@@ -1,0 +1,29 @@
+"""Units, floors and errors of the measures of further interfaces, and of a steady tail that has come to rest."""
+
+import numpy as np
+import pytest
+
+from patchfem.response.errors import step_error, with_errors
+from patchfem.response.measures import FLOORS, UNITS, floor_of, of_first, steady_amplitude, unit_of
+
+
+@pytest.mark.parametrize("name", sorted(UNITS))
+def test_exact_a_number_behind_a_name_changes_neither_unit_nor_floor(name):
+    for full in (name, f"{name}_2", f"{name}_17"):
+        assert of_first(full) == name and unit_of(full) == UNITS[name] and floor_of(full) == FLOORS.get(name, 0.0)
+
+
+def test_exact_errors_of_further_interfaces_know_the_step():
+    fine, half, quarter = ({"stick_fraction_2": v, "slip_amplitude_2": 2 * v} for v in (0.5, 0.502, 0.51))
+    found = with_errors(fine, step_error(fine, half, quarter, 400))
+    assert found["stick_fraction_2"].error == pytest.approx(0.004 + 4 / 400)
+    assert found["slip_amplitude_2"].error == pytest.approx(0.008) and found["slip_amplitude_2"].unit == "m"
+
+
+def test_exact_a_motion_that_stands_still_has_its_own_amplitude():
+    """No change at all between the last windows: nothing is divided by it."""
+    with np.errstate(all="raise"):
+        assert steady_amplitude(np.ones(6), np.ones(6, complex))[0] in (None, 1.0)
+        assert steady_amplitude(np.zeros(6), np.zeros(6, complex)) == (None, None)
+        late = np.array([0.0, 0, 1, 1, 1, 1, 1])
+        assert steady_amplitude(late, late + 0j)[0] in (None, 1.0)
