@@ -15,8 +15,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "steady"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "steady"))
 from against_march import TEXTS
 
 from patchfem import scene, simulate, simulate_rig
@@ -25,7 +24,7 @@ from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.simulate_harmonic import Group, Spring
 from patchfem.simulate_harmonic import levels as follow
 
-HERE = Path(__file__).parent
+HERE, ROOT = Path(__file__).parent, Path(__file__).parents[1]
 MIL, FLOOR = 25.4e-6, 0.01  # FLOOR: least displacement that Table 1 reads [mil]
 MEASURED = (3.8, 4.2)  # onset on the rig [g]
 UP = np.arange(3.0, 5.01, 0.25)  # g
@@ -52,9 +51,9 @@ CASES = {  # name: (scene up to [drive], frequency [Hz], levels up [g])
 @dataclass(frozen=True, eq=False, slots=True)
 class Row:
     """A case. levels (k,) [g] up and down again, amplitude and slip (k,) [m] at the end of each; limit: mu N/m [g];
-    onset: (level, half its bracket) [g] by bisection or None; seen: level [g] at which slip passes 0.01 mil on the way
-    up; jumps: (level before, level after, factor) of the largest step on the way up and of that on the way down; hysteresis [m]; folds [g]
-    of the steady motions over the level, if they were asked for."""
+    onset: (level, half its bracket) by bisection [g], or None; seen: level at which slip passes 0.01 mil on the way up
+    [g]; jumps: (level before, level after, factor) of the largest step on the way up and of that on the way down;
+    hysteresis [m]; folds of the steady motions over the level [g], where they were asked for."""
 
     case: str
     levels: np.ndarray
@@ -89,7 +88,7 @@ def solve(case: str, cycles: int = CYCLES, steps: int = 400) -> Row:
     onset, loop = found.measures.get("onset_level"), found.measures.get("level_hysteresis")
     folds = folds_of(case) if case == "stiffened, 147 Hz" else ()
     return Row(case, listed, amplitude, slip, given.friction.static * load / given.structure.moving_mass / G_N,
-               None if onset is None else (onset.value / G_N, onset.error or 0.0), _seen(listed, slip, up.size),
+               None if onset is None else (onset.value / G_N, (onset.error or 0.0) / G_N), _seen(listed, slip, up.size),
                (_jump(listed, slip, slice(0, up.size)), _jump(listed, slip, slice(up.size - 1, None))),
                loop.value, folds)
 

@@ -93,10 +93,10 @@ def fold():
 
 
 def test_exact_a_sweep_jumps_beyond_the_fold(fold):
-    steady = fold.curve(146.2, 148.2)
+    steady = fold.curve(145.5, 148.2)
     assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
-    up = fold.sweep(steady, True, 0.8, 200, 146.6, 148.8)
-    assert steady.folds[0] < up.jump < steady.folds[0] + 0.8
+    up = fold.sweep(steady, True, 0.4, 200, 145.5, 148.4)
+    assert steady.folds[0] + 0.1 < up.jump < steady.folds[0] + 0.5 and up.miss < 0.02
     assert not steady.stable.all() and steady.multiplier.max() > 1.02
     assert np.isnan(fold.sweep(steady, False, 0.8, 100, 147.5, 148.8).jump)  # ends before the fold
 
@@ -127,13 +127,13 @@ def backbone():
 
 
 def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
-    rows = [backbone.case(name, (0.5, 2.0, 20.0), 1000) for name in ("elastic-plastic", "bonds")]
+    rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
     sharp, soft = rows
-    assert max(sharp.miss("single")) < 5e-5 and max(soft.miss("single")) < 1e-3
-    assert sharp.bench[0][0] == pytest.approx(1007.29, abs=0.01)  # held: sqrt((k + mu N/eps)/m)
+    assert max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3  # the bench takes 400 steps a cycle
+    assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)  # held: sqrt((k + mu N/eps)/m)
     held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi)**2)
     assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
-    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=1e-6)  # nothing slips
+    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=2e-5)  # nothing slips
     assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
     text = backbone.picture(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text
