@@ -80,10 +80,12 @@ def sweep(steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float =
     past &= started
     jump = float(frequency[np.argmax(past)]) if past.any() else np.nan
     f, a = steady.branch(up)
-    follows = (np.abs(frequency - first) > 0.5) & (np.abs(frequency - jump) > 0.3) & (frequency < jump
-                                                                                     if up else frequency > jump)
+    until = jump if np.isfinite(jump) else last
+    before = frequency < until if up else frequency > until
+    follows = before & (np.abs(frequency - first) > 0.5) & (np.abs(frequency - until) > 0.3)
     truth = np.interp(frequency[follows], f, a)
-    return Sweep(rate, up, frequency, amplitude, jump, float(np.abs(amplitude[follows] / truth - 1).max()))
+    return Sweep(rate, up, frequency, amplitude, jump,
+                 float(np.abs(amplitude[follows] / truth - 1).max(initial=0.0)))
 
 
 def at_rest(sweeps: list) -> float:

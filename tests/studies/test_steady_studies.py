@@ -133,7 +133,7 @@ def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)  # held: sqrt((k + mu N/eps)/m)
     held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi)**2)
     assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
-    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=2e-5)  # nothing slips
+    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)  # nothing slips
     assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
     text = backbone.picture(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text
