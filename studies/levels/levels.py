@@ -3,10 +3,10 @@ the motion jump?
 
 The rig of studies/rig at 143 Hz, 3 to 5 g and back in steps of .25 g, 200 cycles each, state carried over; mu N/m =
 4.00 g, measured onset 3.8 to 4.2 g. Onset by bisection (slip of a thousandth of a bond length): 4.002 g for a Coulomb
-block, which is mu N/m, 4.018 g for an elastic-plastic one and 3.876 g for the tilted patch of it. Laws that slip from the
-start have no onset: the Coulomb patch slips at its edge from .87 g, bonds are damaged at any level (.18 g). What a gauge
-of .01 mil sees is another matter: slip from 4.17 to 4.23 g for all without bonds, the measured onset or just above it;
-with bonds from below 3 g, which the rig does not show (bonds of 1 um are too soft, or they have a breakaway).
+block, which is mu N/m, 4.018 g for an elastic-plastic one and 3.876 g for the tilted patch of it. Laws that slip from
+the start have none: the Coulomb patch slips at its edge from .87 g, bonds are damaged at any level (.18 g). What a
+gauge of .01 mil sees is another matter: slip from 4.17 to 4.23 g for all without bonds, the measured onset or just
+above it; with bonds of 1 um from below 3 g, and .11 (point) and .09 mil (patch) of motion at 4 g, where .08 was read.
 
 None of these jumps, and raised or lowered they give the same to 3e-3 mil. Nor does the stiffened rig at 143 Hz. At
 147 Hz, right of its resonance, it does: raised it jumps between 6.25 and 6.375 g, lowered between 6 and 5.875 g, the

@@ -1,12 +1,12 @@
 """Does a march jump where the curve of steady motions folds?
 
-Yes, and the slower the nearer. The axial mode of the rig at 6 g, its joint elastic-plastic (limit 4 g), on a flexure of
-2e10 N/m3 more per cube of the slide: the upper branch ends at 147.678 Hz, the lower at 146.451 Hz, between them three
-motions (balance to 1e-4; to 1e-3 the folds are 8 mHz off). Marches whose frequency sweeps up jump down at 148.03, 147.84
-and 147.75 Hz for 0.4, 0.1 and 0.025 Hz/s, those that sweep down jump up at 146.03, 146.28 and 146.38 Hz: always past the
-fold, late by a delay that goes as the rate to the power 2/3. Drawn back to no rate by it they jump at 147.685 and
-146.445 Hz, 7 mHz from the folds. Before the jump the slowest follow their branches within 3e-4 (upper) and 6e-3
-(lower).
+Yes, and the slower the nearer. The axial mode of the rig at 6 g, its joint elastic-plastic (limit 4 g), on a flexure
+that stiffens by 2e10 N/m3: the upper branch ends at 147.678 Hz, the lower at 146.451 Hz, between them are three
+motions (balance to 1e-4; to 1e-3 the folds are up to 11 mHz off). Marches whose frequency sweeps up jump down at
+148.03, 147.84 and 147.75 Hz for 0.4, 0.1 and 0.025 Hz/s, those that sweep down jump up at 146.03, 146.28 and 146.38 Hz:
+always past the fold, late by a delay that goes as the rate to the power 2/3. Drawn back to no rate by it they jump at
+147.685 and 146.445 Hz, 7 mHz from the folds. Before the jump the slowest follow their branches within 3e-4 (upper) and
+6e-3 (lower).
 
 Run: python studies/steady/fold.py
 """
