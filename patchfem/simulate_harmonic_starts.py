@@ -1,7 +1,9 @@
 """Starts for the balance: every motion that one harmonic would make."""
 
+from itertools import pairwise
+
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 SAMPLES = 512  # of the cycle, enough for one harmonic
 
@@ -34,11 +36,24 @@ def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
     grid = np.log(size) + np.linspace(np.log(1e-7), np.log(1e4), count)
     values = [miss(g) for g in grid]
     out = []
-    for a, b, va, vb in zip(grid[:-1], grid[1:], values[:-1], values[1:]):
-        if va * vb > 0:
-            continue
+    for a, b in _brackets(miss, grid, values):
         log = brentq(miss, a, b, xtol=1e-10)
         turn = left(log)
         y = along * np.exp(log) * (turn.conjugate() / abs(turn))
         out.append(np.concatenate([*([0.0, v.real, v.imag] for v in y), np.zeros(len(here.free))]))
     return out
+
+
+def _brackets(miss, grid, values) -> list:
+    """(a, b) around every change of sign of miss: between neighbours of the grid (k,), or two of them that a point
+    nearer to zero than its neighbours announces."""
+    points = list(zip(grid, values))
+    for k in range(1, len(grid) - 1):
+        sign = np.sign(values[k])
+        if all(0 < sign * values[k] < sign * v for v in (values[k - 1], values[k + 1])):
+            low = minimize_scalar(lambda x, sign=sign: sign * miss(x), bounds=(grid[k - 1], grid[k + 1]),
+                                  method="bounded", options={"xatol": 1e-8})
+            if low.fun < 0:
+                points.append((float(low.x), sign * low.fun))
+    points.sort()
+    return [(a, b) for (a, u), (b, v) in pairwise(points) if u * v <= 0]

@@ -1,6 +1,14 @@
 """Is the steady motion that is found directly the one that a march ends in?
 
-TO BE WRITTEN
+Yes. The rig at 5 g, 40 frequencies from 115.5 to 174 Hz, marched for 600 cycles from rest at 1600 steps each.
+Laws with memory (harmonic balance to 1e-4): amplitudes differ by at most 8.7e-5 (elastic-plastic), 6.1e-5 (bonds) and
+5.1e-4 (a patch of 41 elements on two modes), loop areas by 9.2e-5, 6.3e-5 and 7.6e-4. Coulomb friction (shooting on the
+map of events, one mode and two, sliding or with two stops a cycle) against 2000 cycles from event to event: at most
+5e-14 in amplitude, acceleration and loop.
+
+It is the march of Coulomb friction that is off: where the slide reverses without a stop it can do so only at the end of
+a step. Amplitudes are within 1e-3 where it stops, and up to 1.6e-2 off where it does not (133.5 Hz), which falls with
+the step alone: at 129 Hz 2.1e-2, 5.9e-3 and 2.1e-3 at 400, 1600 and 6400 steps. Such scenes get the exact engine.
 
 Run: python studies/steady/against_march.py
 """

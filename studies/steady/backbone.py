@@ -1,6 +1,13 @@
 """Is the backbone of the axial mode, its frequency and damping over amplitude, that of the contact's loops on a bench?
 
-TO BE WRITTEN
+With one harmonic it is, to the digits of the bench: omega^2 = omega_0^2 + K_eq/m and zeta = zeta_0 omega_0/omega + loop
+area/(2 pi m omega^2 A^2) from sine loops on the bench (4000 steps) and the free balance differ by at most 2e-6 and 5e-6
+for the elastic-plastic law, 2e-4 and 6e-5 for bonds, 4e-6 and 8e-6 for the patch of 41 elements, from the held joint
+(1007, 1005 and 3219 Hz) to amplitudes a hundred times its length (149, 148 and 155 Hz).
+
+With nine harmonics the motion is no sine any more, and a bench that moves as one does not know it: where the joint
+damps most (ratios .80, .83 and 1.75 at amplitudes of 16, 16 and 5 um) frequencies differ by 13, 14 and 37 %, damping by
+38, 38 and 150 %. A mode that is lost within a cycle has no backbone to speak of.
 
 Run: python studies/steady/backbone.py
 """

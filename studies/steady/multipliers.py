@@ -1,6 +1,12 @@
 """Does a march forget a small push at the rate that the multipliers of its steady motion say?
 
-TO BE WRITTEN
+Yes. Settled marches are pushed by 1e-5 of their amplitude along each coordinate and rate, and one map is fitted to what
+becomes of the pushes from cycle to cycle. Largest multipliers of the steady motion and distance of the pushed one, at
+1600 steps a cycle: elastic-plastic -.635 +- .167i (2.5e-3; 4e-2 at 400 steps, 7e-4 at 6400), bonds .464 (3e-3), a patch
+of 41 elements on two modes .804 +- .562i, magnitude .981 (6e-5); of the three motions of the stiffened rig at 147.4 Hz
+.900 (lower branch, 1.5e-3), 1.023 (6e-4: it leaves) and .949 (upper branch, 3e-3). Coulomb friction at 8 g, sliding:
+.98133 and .94940, pushed runs from event to event agree to 5e-12. A march of Coulomb friction pushed by less than its
+steps shows .98133 twice: it reverses at the end of the same step as before.
 
 Run: python studies/steady/multipliers.py
 """

@@ -113,7 +113,7 @@ def basis(count: int) -> ModalBasis:
     k = np.arange(count)
     slide = np.array([1.0, 0.7, -0.5, 0.4, 0.3, -0.3, 0.2, 0.2, -0.1, 0.1])[:count]
     return ModalBasis(tuple(f"mode {i + 1}" for i in k), 1.0 + 1.4 * k + 0.1 * k**2, np.full(count, 0.02), slide,
-                      0.3 * slide, slide, 1.0)
+                      0.6 * slide, slide, 1.0)
 
 
 def elements(count: int) -> tuple:

@@ -1,0 +1,35 @@
+"""Starts of the balance that lie close together."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import G_N, BaseSine, ModalBasis
+from patchfem.simulate_harmonic import Jenkins, Spring, branches
+from patchfem.simulate_harmonic_starts import _brackets
+
+
+@pytest.mark.parametrize("middle", [0.31, 0.35, 0.4, -0.55])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_exact_two_roots_between_neighbours_of_the_grid(middle, sign):
+    """A parabola that dips below zero between two points a tenth apart, and one that does not."""
+    grid = np.linspace(-1, 1, 21)
+
+    def miss(x, depth=4e-4):
+        return sign * ((x - middle)**2 - depth)
+
+    found = _brackets(miss, grid, [miss(x) for x in grid])
+    roots = middle - 0.02, middle + 0.02
+    assert len(found) == 2
+    assert all(a <= root <= b for (a, b), root in zip(found, roots))
+    assert not _brackets(lambda x: miss(x, -1e-4), grid, [miss(x, -1e-4) for x in grid])
+
+
+def test_exact_three_motions_near_the_end_of_the_upper_branch():
+    """Two of them 8 % apart: between neighbours of the scan."""
+    w, mass, limit = 2 * np.pi * 143, 0.884, 0.3 * 26 * 4.4482216152605
+    one = np.ones(1)
+    modes = ModalBasis(("axial",), w * one, 0.003 * one, one, one, one, mass)
+    laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
+    for hertz in np.linspace(147.2, 147.6, 5):
+        found = branches(modes, BaseSine(6 * G_N, 2 * np.pi * hertz), laws)
+        assert [p.stable for p in found] == [True, False, True], hertz

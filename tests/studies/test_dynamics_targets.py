@@ -1,0 +1,53 @@
+"""The targets of the dynamics: what is measured is right; times only where they have a wide margin."""
+
+import numpy as np
+import pytest
+from test_studies import study
+
+
+@pytest.fixture(scope="module")
+def targets():
+    return study("targets/dynamics.py")
+
+
+def test_exact_what_is_timed_is_right(targets):
+    assert targets.cycle_of_events()[1] <= 1e-12
+    assert targets.steady_point()[1] <= 1e-10
+
+
+def test_always_many_times_faster_than_others(targets):
+    """Measured 80 and 1400 times."""
+    seconds, _, plain = targets.steady_point()
+    assert plain > 10 * seconds
+    assert targets.cycle_of_peer("DOP853") > 300 * targets.cycle_of_events()[0]
+
+
+def test_exact_the_numpy_march_is_the_compiled_one(targets):
+    modes = targets.basis(10)
+    _, slides = targets.plain(modes, targets.soft(200))
+    assert slides == pytest.approx(targets.marched(modes, targets.bonded(200)), abs=1e-10)
+    _, slides = targets.plain(modes, targets.sharp(30))
+    mine = targets.marched(modes, targets.jenkins_model(*targets.elements(30)))
+    assert np.abs(slides - mine).max() < 1e-3 * np.abs(mine).max() and np.abs(mine).max() > 0.15
+    assert np.isfinite(targets.marched(modes, targets.bonded(200, 16))).all()
+
+
+def test_always_the_table_says_what_is_missed(targets, capsys):
+    def absent():
+        raise targets.Missing("nothing there")
+
+    rows = (targets.Target("fine", lambda: 1e-6, 2e-6, "s", "other", lambda: 4e-6, 3),
+            targets.Target("slow", lambda: 1e-6, 2e-6, "s", "other", lambda: 2e-6, 3),
+            targets.Target("wrong", lambda: 1e-6, 1e-9, ""), targets.Target("alone", lambda: 1e-3, 1.0, "s", "peer",
+                                                                            absent, 3))
+    found = targets.main(rows)
+    assert [met for _, _, met in found.values()] == [True, False, False, True]
+    said = capsys.readouterr().out.splitlines()
+    assert "4  other (wanted 3)" in said[1] and "NO" in said[2] and "nothing there" in said[4]
+    assert [targets.text_of(v, "s") for v in (2e-9, 3e-6, 0.5)] == ["2 ns", "3 us", "500 ms"]
+
+
+def test_always_every_row_names_its_limit(targets):
+    assert len({(t.text, t.beside) for t in targets.TARGETS}) == len(targets.TARGETS) == 12
+    for one in targets.TARGETS:
+        assert one.limit > 0 and one.unit in ("s", "") and bool(one.beside) == (one.other is not None)

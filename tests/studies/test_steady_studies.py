@@ -1,0 +1,139 @@
+"""What the studies of steady motions say, from their cheap share; the whole campaigns are slow."""
+
+import numpy as np
+import pytest
+from test_studies import study
+
+
+@pytest.fixture(scope="module")
+def march():
+    return study("steady/against_march.py")
+
+
+@pytest.mark.parametrize("contact, frequency, near", [
+    ("Coulomb", 144.0, 4e-4), ("elastic-plastic", 144.0, 4e-4), ("bonds", 150.0, 4e-4),
+    ("patch of 41 elements", 150.0, 3e-3)])
+def test_exact_the_march_ends_in_the_steady_motion(march, contact, frequency, near):
+    one = march.row(contact, frequency, 800, 300, 400)
+    for name in march.MEASURES:
+        assert one.miss(name) < near
+        if one.run is not None:
+            assert one.miss(name, "run") < 1e-12
+    assert one.multiplier < 1 and one.regime != "stuck"
+
+
+def test_order_of_a_march_that_reverses_between_its_steps(march):
+    """No stop at 129 Hz: two hundredths off at 400 steps, the exact run is not."""
+    coarse, fine = (march.row("Coulomb", 129.0, steps, 300, 400) for steps in (400, 6400))
+    name = march.MEASURES[0]
+    assert coarse.regime == "sliding" and coarse.miss(name, "run") < 1e-12
+    assert coarse.miss(name) == pytest.approx(0.021, abs=2e-3) and fine.miss(name) == pytest.approx(2.1e-3, abs=3e-4)
+
+
+@pytest.mark.slow
+def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
+    table = march.main(path=tmp_path / "x.svg")
+    worst = {name: {m: max(r.miss(m) for r in rows) for m in march.MEASURES} for name, rows in table.items()}
+    for name in ("elastic-plastic", "bonds"):
+        assert max(worst[name].values()) < 1.1e-4
+    assert max(worst["patch of 41 elements"].values()) < 1.1e-3
+    for name in ("Coulomb", "Coulomb, two modes"):
+        assert max(r.miss(m, "run") for r in table[name] for m in march.MEASURES) < 1e-12
+        assert {r.regime for r in table[name]} == {"sliding", "2 stops"}
+        assert max(r.miss(march.MEASURES[0]) for r in table[name] if r.regime == "2 stops") < 1e-3
+        assert 5e-3 < worst[name][march.MEASURES[0]] < 2e-2
+    assert all(len(rows) == 40 for rows in table.values())
+    text = (tmp_path / "x.svg").read_text()
+    assert all(name in text for name in march.NAMES) and "long exact run" in text
+    assert "largest" in capsys.readouterr().out
+
+
+# ---- multipliers
+
+@pytest.fixture(scope="module")
+def pushed():
+    return study("steady/multipliers.py")
+
+
+def test_exact_multipliers_of_a_linear_map(pushed):
+    """Four modes of known decay and turn, found from pushed motions of the map itself."""
+    a = np.diag([0.9, -0.5, 0.3, 0.2]) + np.diag([0.4, 0.1, 0.2], 1)
+
+    def states(push):
+        return np.array([(np.linalg.matrix_power(a, k) @ push.ravel()).reshape(2, 2) for k in range(1, 8)]) + 3.0
+
+    assert pushed.fitted(states, 2, 1e-3, 1.0).real == pytest.approx([0.9, -0.5, 0.3, 0.2], abs=1e-9)
+
+
+def test_exact_pushed_runs_forget_as_the_multipliers_say(pushed, capsys):
+    rows = pushed.main(("Coulomb, 8 g",))
+    assert np.sort(rows[0].march.real) == pytest.approx([0.94940, 0.98133], abs=2e-5) and rows[0].miss < 1e-9
+    patch, = pushed.main(("patch of 41 elements, 5 g",), steps=400, settle=40)
+    assert patch.miss < 2e-3 and np.abs(patch.steady[0]) == pytest.approx(0.98065, abs=2e-4)
+    assert "pushed march" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_exact_every_case_of_the_multipliers(pushed):
+    rows = pushed.main()
+    for r in rows:
+        assert r.miss < 4e-3, r.case
+    stiff = [r for r in rows if r.case.startswith("stiffened")]
+    assert [r.regime for r in stiff] == ["stable", "unstable", "stable"]
+    assert stiff[1].march[0].real > 1.02 and max(np.abs(stiff[k].march[0]) for k in (0, 2)) < 1
+    finer, = pushed.main(("elastic-plastic, 5 g",), steps=6400)
+    assert finer.miss < 1e-3
+
+
+# ---- the fold
+
+@pytest.fixture(scope="module")
+def fold():
+    return study("steady/fold.py")
+
+
+def test_exact_a_sweep_jumps_beyond_the_fold(fold):
+    steady = fold.curve(145.5, 148.2)
+    assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
+    up = fold.sweep(steady, True, 0.4, 200, 145.5, 148.4)
+    assert steady.folds[0] + 0.1 < up.jump < steady.folds[0] + 0.5 and up.miss < 0.02
+    assert not steady.stable.all() and steady.multiplier.max() > 1.02
+    assert np.isnan(fold.sweep(steady, False, 0.8, 100, 147.5, 148.8).jump)  # ends before the fold
+
+
+def test_exact_jumps_are_drawn_back_to_no_rate(fold):
+    made = [fold.Sweep(rate, True, None, None, 100 + 3 * rate**(2 / 3), 0.0) for rate in (0.1, 0.4, 1.6)]
+    assert fold.at_rest(made) == pytest.approx(100, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_exact_jumps_bracket_the_folds(fold, tmp_path):
+    steady, sweeps = fold.main((0.4, 0.1), path=tmp_path / "x.svg")
+    by = {(s.up, s.rate): s for s in sweeps}
+    assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
+    assert steady.folds[0] < by[True, 0.1].jump < by[True, 0.4].jump < steady.folds[0] + 0.36
+    assert steady.folds[1] > by[False, 0.1].jump > by[False, 0.4].jump > steady.folds[1] - 0.43
+    assert by[True, 0.1].miss < 2e-3 and by[False, 0.1].miss < 0.03
+    for up in (True, False):
+        assert fold.at_rest([s for s in sweeps if s.up == up]) == pytest.approx(steady.folds[0 if up else 1], abs=0.05)
+    assert "marched up" in (tmp_path / "x.svg").read_text()
+
+
+# ---- the backbone
+
+@pytest.fixture(scope="module")
+def backbone():
+    return study("steady/backbone.py")
+
+
+def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
+    rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
+    sharp, soft = rows
+    assert max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3  # the bench takes 400 steps a cycle
+    assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)  # held: sqrt((k + mu N/eps)/m)
+    held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi)**2)
+    assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
+    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)  # nothing slips
+    assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
+    text = backbone.picture(rows, tmp_path / "x.svg").read_text()
+    assert "damping ratio" in text and "bonds" in text
