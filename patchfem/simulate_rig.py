@@ -293,6 +293,9 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
     stuck = values.get("slip_amplitude", np.inf) < held
+    if stuck and not model.kind:  # what moves in round-off does not slide
+        values["stick_fraction"] = 1.0
+        values.pop("slip_start_phase", None)
     levels, slips = (), None
     if marks:
         levels = simulate_levels.rows(scene, done.marks, drive, held, rubbing)
