@@ -325,6 +325,9 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     if scene.friction is not None:
         rings, own = simulate_events.rings(done.window, modes, drive, None, held)
         stuck = simulate_events.all_stick(done.window, held) and scene.friction.law != "tanh"
+        if stuck and not model.kind:  # what moves in round-off does not slide
+            values["stick_fraction"] = 1.0
+            values.pop("slip_start_phase", None)
     values |= rings
     levels, slips = (), None
     if marks:

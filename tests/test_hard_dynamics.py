@@ -1,0 +1,360 @@
+"""Hard cases of dry friction as scenes, through every engine that applies, against closed forms and other programs."""
+
+from functools import lru_cache
+from math import asin, cos, pi, sin
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from patchfem.scene import loads
+from patchfem.simulate import plan, run
+
+W = 2 * pi * 100  # rad/s, of 1 kg
+LOAD = 100.0
+
+
+def rig(friction, drive, damping=0.003, frequency=100.0, more="", law="coulomb"):
+    """One mode of 1 kg under 100 N; friction: keys of [friction]; drive: keys of [drive]."""
+    return f"""\
+[structure]
+moving_mass = "1 kg"
+{more if more.startswith("travel") else ""}
+[[structure.mode]]
+name = "axial"
+frequency = "{frequency} Hz"
+damping = {damping}
+slide = 1.0
+{more if not more.startswith("travel") else ""}
+[normal]
+load = "{LOAD} N"
+[friction]
+law = "{law}"
+{friction}
+[drive]
+{drive}
+"""
+
+
+def base(acceleration, cycles, ratio=1.0):
+    return (f'kind = "base"\nfrequency = "{100 * ratio!r} Hz"\nacceleration = "{acceleration!r} m/s^2"\n'
+            f"cycles = {cycles}")
+
+
+@lru_cache(maxsize=64)
+def result_of(text, *sets, estimate=True):
+    return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
+
+
+def value(result, name="relative_displacement_amplitude"):
+    return result.measures[name].value
+
+
+def close(result, name, want, least=0.0):
+    """Whether a measure lies within its own error of the truth."""
+    one = result.measures[name]
+    assert abs(one.value - want) <= one.error + least, (name, one.value, want, one.error)
+
+
+def balanced(result, bound):
+    assert value(result, "energy_balance") <= bound
+
+
+SECOND = '[[structure.mode]]\nname = "other"\nfrequency = "271 Hz"\ndamping = 0.01\nslide = 0.0\nbase = 0.0\n'
+
+
+@pytest.mark.parametrize("more", ["", SECOND], ids=["one mode", "general"])
+@pytest.mark.parametrize("power", range(4, 11))
+def test_exact_grazing_onset(power, more):
+    """First slip 9/2 (1 - D)^2 a/omega^2; relative error of order 1 - D, and of round-off over 1 - D."""
+    part = 10.0**-power
+    result = result_of(rig("static = 0.3", base(30.0 / (1 - part), 0.5), 0.0, more=more), estimate=False)
+    want = 4.5 * part**2 * 30.0 / W**2
+    assert abs(result.response.slide[-1]) == pytest.approx(want, rel=3 * part + 1e-14 / part)
+    assert result.outcome != "stuck"
+    balanced(result, 1e-10)
+
+
+def test_exact_no_slip_below_the_onset():
+    for part in (0.0, 1e-10, 1e-4):
+        for method in ("auto", "march"):
+            result = result_of(rig("static = 0.3", base(30.0 * (1 - part), 20)), f"accuracy.method={method}")
+            assert result.outcome == "stuck" and np.ptp(result.response.slide) <= (method == "march") * 1e-10
+            close(result, "friction_force_peak", 30.0 * (1 - part), 1e-9)
+            assert value(result, "stick_fraction") == 1.0 and value(result, "absolute_acceleration_peak") == \
+                pytest.approx(30.0 * (1 - part), rel=1e-12)
+
+
+def two_stops(d):
+    """Half peak-to-peak over a/omega^2 of the undamped motion at resonance with two stops, by its half period.
+
+    Released at -q where sin t + q = D; x'' + x = sin t - D until x' = 0, which must be at +q. (Den Hartog's phases.)
+    """
+    def miss(q):
+        begin = asin(d - q)
+        a, b = _through(begin, -q, d)
+        return a(brentq(b, begin + 0.5, begin + pi)) - q
+
+    grid = np.linspace(1e-3, min(d, 0.7853), 400)
+    values = [miss(q) for q in grid]
+    k = next(i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0)
+    return brentq(miss, grid[k], grid[k + 1], xtol=1e-15)
+
+
+def _through(begin, x, d):
+    """x(t), x'(t) of x'' + x = sin t - d from (x, 0) at `begin`."""
+    one, two = x + d + begin * cos(begin) / 2, cos(begin) / 2 - begin * sin(begin) / 2
+    def place(t):
+        return -d - t * cos(t) / 2 + one * cos(t - begin) + two * sin(t - begin)
+
+    def rate(t):
+        return -cos(t) / 2 + t * sin(t) / 2 - one * sin(t - begin) + two * cos(t - begin)
+
+    return place, rate
+
+
+def test_exact_above_the_resonance_threshold():
+    """D = pi/4 + 1e-3 without damping: bounded, by the half period; D = 0.8 is the printed 0.299431041748427515."""
+    assert two_stops(0.8) == pytest.approx(0.299431041748427515, abs=1e-13)
+    d = pi / 4 + 1e-3
+    want = two_stops(d)
+    condition = (two_stops(d * (1 + 1e-6)) / want - 1) / 1e-6
+    assert 5 < abs(condition) < 1e3
+    text = rig("static = 0.3", base(30.0 / d, 1500), 0.0)
+    result = result_of(text)
+    assert result.outcome == "steady"
+    assert value(result) * W**2 / (30.0 / d) == pytest.approx(want, rel=1e-12 * abs(condition))
+    balanced(result, 1e-10)
+    point = result_of(text, "accuracy.method=harmonic")
+    close(point, "relative_displacement_amplitude", want * 30.0 / d / W**2, 1e-9 * want * 30.0 / d / W**2)
+
+
+def test_exact_below_the_resonance_threshold():
+    """D = pi/4 - 1e-3 without damping: no bounded motion; the amplitude rises by pi - 4 D (a/omega^2) a cycle."""
+    d = pi / 4 - 1e-3
+    short, long = (result_of(rig("static = 0.3", base(30.0 / d, n), 0.0)) for n in (900, 1500))
+    assert short.outcome == long.outcome == "grows"
+    assert long.measures["relative_displacement_amplitude"].error is None
+    rise = (value(long) - value(short)) / 600 * W**2 / (30.0 / d)
+    assert rise == pytest.approx(pi - 4 * d, rel=1e-2)
+    balanced(long, 1e-10)
+
+
+def test_exact_two_contacts_stop_together():
+    """Two alike masses on alike interfaces, a spring between them: each is the single mass, stops and all."""
+    k = W * W
+    text = f"""\
+[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "{k!r} N/m"
+[[structure.spring]]
+between = [2, 0]
+stiffness = "{k!r} N/m"
+[[structure.spring]]
+between = [1, 2]
+stiffness = "7e4 N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "{2 * 0.003 * W!r} N s/m"
+[[structure.damper]]
+between = [2, 0]
+coefficient = "{2 * 0.003 * W!r} N s/m"
+[[structure.interface]]
+between = [1, 0]
+law = "coulomb"
+static = 0.3
+load = "100 N"
+[[structure.interface]]
+between = [2, 0]
+law = "coulomb"
+static = 0.3
+load = "100 N"
+[drive]
+{base(37.5, 60)}
+"""
+    one = result_of(rig("static = 0.3", base(37.5, 60)))
+    both = result_of(text)
+    for name in ("relative_displacement_amplitude", "slip_amplitude", "loop_area", "stick_fraction",
+                 "friction_force_peak"):
+        assert value(both, name) == pytest.approx(value(one, name), rel=1e-10), name
+        other = {"relative_displacement_amplitude": "slip_amplitude"}.get(name, name)
+        assert value(both, f"{other}_2") == pytest.approx(value(one, other), rel=1e-10), name
+    assert value(both, "energy_dissipated") == pytest.approx(2 * value(one, "energy_dissipated"), rel=1e-10)
+    balanced(both, 1e-10)
+    marched = result_of(text, "accuracy.method=march")
+    balanced(marched, 1e-8)
+    for name in ("relative_displacement_amplitude", "slip_amplitude_2", "loop_area", "loop_area_2"):
+        close(marched, name, value(both, name))
+
+
+def test_exact_friction_far_above_and_far_below_the_drive():
+    """1e6 times: nothing moves and friction carries m a; 1e-9 times: the linear rig but for 1e-9 of it."""
+    for method, bound in (("auto", 1e-10), ("march", 1e-8)):
+        held = result_of(rig("static = 0.3", base(30e-6, 20)), f"accuracy.method={method}")
+        assert held.outcome == "stuck" and value(held) <= (method == "march") * 1e-16
+        close(held, "friction_force_peak", 30e-6, 1e-12)
+        free = result_of(rig("static = 3e-10", base(30.0, 20)), f"accuracy.method={method}")
+        text = rig("static = 0.3", base(30.0, 20))
+        linear = result_of(text[:text.index("[normal]")] + text[text.index("[drive]"):])
+        assert value(free) == pytest.approx(value(linear), rel=1e-5 if method == "march" else 3e-9)
+        assert value(free, "friction_force_peak") == pytest.approx(3e-8, rel=1e-3 if method == "march" else 1e-12)
+        balanced(held, bound)
+        balanced(free, bound)
+
+
+def test_exact_a_rigid_mode_slides_under_a_force():
+    """A block on a table under F sin w t: from rest it slides (cos a - cos b) - D (b - a) F/(m w^2) ... and stops."""
+    d, w = 0.8, 2 * pi * 50
+    text = rig("static = 0.3", f'kind = "force"\nfrequency = "50 Hz"\nforce = "{30 / d!r} N"\ncycles = 30', 0.0, 0.0)
+    begin = asin(d)
+    end = brentq(lambda t: cos(begin) - cos(t) - d * (t - begin), begin + 0.1, begin + pi)
+    far = cos(begin) * (end - begin) - sin(end) + sin(begin) - d * (end - begin)**2 / 2
+    exact = result_of(text)
+    assert exact.plan.scene.structure.mode[0].frequency == 0
+    assert value(exact) == pytest.approx(far / 2 * (30 / d) / w**2, rel=1e-11)
+    assert value(exact, "stick_fraction") == pytest.approx(1 - (end - begin) / pi, rel=1e-9)
+    assert abs(value(exact, "drift_per_cycle")) <= 1e-12 * value(exact)
+    balanced(exact, 1e-10)
+    marched = result_of(text, "accuracy.method=march")
+    close(marched, "relative_displacement_amplitude", far / 2 * (30 / d) / w**2)
+    balanced(marched, 1e-8)
+
+
+# amplitude of the slip [m] and loop area [J] by an event search on DOP853 at 1e-11, a program of its own
+PEERS = {"overdamped": (2.0, 1.0, 10.0, 0.05, 20, 2.177447050215183e-06, 4.354894097337636e-05),
+         "eight stops": (0.01, 1 / 16, 10.0, 0.05, 12, 1.3238644852087504e-05, 2.6477289704175477e-4)}
+
+
+@pytest.mark.parametrize("name", PEERS)
+@pytest.mark.parametrize("method", ["auto", "march", "harmonic"])
+def test_exact_against_another_program(name, method):
+    damping, ratio, level, static, cycles, slip, area = PEERS[name]
+    result = result_of(rig(f"static = {static}", base(level, cycles, ratio), damping), f"accuracy.method={method}")
+    if name == "eight stops" and method == "auto":
+        late = result.response.time > (cycles - 1) / (100 * ratio)
+        still = result.response.slide_rate[late] == 0
+        assert np.count_nonzero(still[1:] & ~still[:-1]) == 8
+    share = {"auto": 1e-9, "march": 5e-4, "harmonic": 1e-9}[method]
+    assert value(result, "slip_amplitude") == pytest.approx(slip, rel=share)
+    assert value(result, "loop_area") == pytest.approx(area, rel=share)
+    if method != "harmonic":
+        balanced(result, 1e-10 if method == "auto" else 1e-8)
+
+
+@pytest.mark.parametrize("damping, want", [(0.0, 0.29943104174842751488), (0.003, 0.28704671337871602595)])
+def test_exact_steady_at_resonance(damping, want):
+    """Printed numbers of D = 0.8."""
+    text = rig("static = 0.3", base(37.5, 200), damping)
+    assert value(result_of(text)) == pytest.approx(want * 37.5 / W**2, rel=1e-11)
+    for method in ("march", "harmonic"):
+        close(result_of(text, f"accuracy.method={method}"), "relative_displacement_amplitude", want * 37.5 / W**2,
+              1e-10 * want * 37.5 / W**2)
+
+
+@pytest.mark.parametrize("cycles", [4000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_exact_many_cycles_keep_their_phase(cycles):
+    """Amplitude and the phase of the release, 0.538622 rad after the drive, as in the first two hundred."""
+    short, long = (result_of(rig("static = 0.3", base(37.5, n)), estimate=False) for n in (200, cycles))
+    want = 0.28704671337871602595 * 37.5 / W**2
+    assert value(long) == pytest.approx(want, rel=1e-12)
+    assert value(long, "slip_start_phase") == pytest.approx(0.538622, abs=1e-6)
+    assert value(long, "slip_start_phase") == pytest.approx(value(short, "slip_start_phase"), abs=1e-11)
+    assert abs(value(long, "drift_per_cycle")) <= 1e-12 * want and long.outcome == "steady"
+    balanced(long, 1e-10)
+
+
+def test_exact_static_above_kinetic_is_bistable():
+    """6 g at 135 Hz of 143 Hz under friction of 7 g at rest, 4 g in motion: at rest for ever, or 4.83011 a/omega^2."""
+    text = rig("static = 0.7\nkinetic = 0.4", base(60.0, 400, 135 / 143))
+    rest, moving = result_of(text), result_of(text, 'structure.start={velocity = ["0.5 m/s"]}')
+    assert rest.outcome == "stuck" and value(rest) == 0.0
+    assert moving.outcome == "steady"
+    assert value(moving) == pytest.approx(4.83011 * 60.0 / W**2, rel=1e-5)  # the printed number is over omega_n^2
+    for one in (rest, moving):
+        balanced(one, 1e-10)
+    marched = result_of(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
+    close(marched, "relative_displacement_amplitude", value(moving))
+
+
+def test_exact_a_stiffened_rig_is_bistable():
+    """The same drive from rest and from 2 mm: two amplitudes, by DOP853 with an event search at 1e-9."""
+    text = rig("static = 0.06", base(20.0, 300, 1.1)).replace("[[structure.mode]]", "[structure.stiffening]\n"
+               'cubic = "4e10 N/m^3"\n[[structure.mode]]')
+    low, high = result_of(text), result_of(text, 'structure.start={displacement = ["2 mm"]}')
+    assert value(low, "slip_amplitude") == pytest.approx(0.00022226158425632175, rel=1e-3)
+    close(high, "slip_amplitude", 0.0017582018745473929)
+    for one in (low, high):
+        assert one.outcome == "steady"
+        balanced(one, 1e-8)
+
+
+HEAVE = """\
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "100 N"
+element_size = "1.27 mm"
+substrate = {young = "1e6 GPa", poisson = 0.3, density = "4370 kg/m^3"}
+[contact.asperities]
+law = "linear"
+normal_stiffness = "1e11 Pa/m"
+[friction]
+law = "%s"
+static = 0.3
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "100 Hz"
+damping = 0.003
+slide = 0.9
+[[structure.mode]]
+name = "bounce"
+frequency = "250 Hz"
+damping = 0.02
+slide = 0.1
+normal = 0.8
+base = 0.4
+output = 1.0
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "400 m/s^2"
+cycles = 4
+"""
+STEADY = '%s"\nreference_speed = "20 mm/s'
+
+
+def test_exact_the_load_goes_through_zero_and_comes_back():
+    """Heave under a strong drive: the block lifts off and lands on a linear skin, N = max(0, N0 - k A h); beside it the
+    same equations by DOP853."""
+    found = result_of(HEAVE % (STEADY % "tanh"))
+    load = found.response.extra["normal_load"]
+    assert load.min() == 0.0 and load.max() > 150 and load[-1] >= 0
+    balanced(found, 1e-8)
+    omega, zeta = 2 * pi * np.array([100.0, 250.0]), np.array([0.003, 0.02])
+    slide, push, share = np.array([0.9, 0.1]), np.array([0.0, 0.8]), np.array([0.9, 0.4])
+    stiff = 1e11 * 0.0127**2
+
+    def rate(t, y):
+        z, v = y[:2], y[2:]
+        up = max(100.0 - stiff * (push @ z), 0.0)
+        rub = 0.3 * up * np.tanh(slide @ v / 0.02)
+        pull = -omega**2 * z - 2 * zeta * omega * v - share * 400.0 * np.sin(W * t)
+        return np.concatenate([v, pull + push * (up - 100.0) - slide * rub])
+
+    grid = np.linspace(0.03, 0.04, 4001)
+    y = solve_ivp(rate, (0, 0.04), np.zeros(4), "DOP853", grid, rtol=1e-9, atol=1e-12, max_step=2e-5).y
+    close(found, "relative_displacement_amplitude", np.ptp(y[:2].T @ [0.9, 1.0]) / 2, 1e-9)
+
+
+@pytest.mark.parametrize("law", ["coulomb", 'elastic-plastic"\nbond_length = "1 um', 'nonlocal"\nbond_length = "1 um'])
+def test_always_lift_off_closes_its_energy(law):
+    found = result_of(HEAVE % law, estimate=False)
+    load = found.response.extra["normal_load"]
+    assert load.min() == 0.0 and (np.abs(found.response.force) <= 0.3 * load + 1e-9).all()
+    balanced(found, 1e-8)
