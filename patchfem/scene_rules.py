@@ -266,6 +266,8 @@ def _method(draft: Draft, kind: str) -> None:
     method = accuracy and accuracy.method
     if method in method_unused(kind):
         draft.remark(f"accuracy.method = '{method}' has no meaning in a {kind} scene and is not used")
+    if method == "harmonic" and kind in ("rig", "linear"):
+        _harmonic(draft)
     if method != "exact" or kind != "rig" or law is None or law.law is None:
         return
     shear = contact.gives_way if contact is not None else ""
@@ -273,6 +275,25 @@ def _method(draft: Draft, kind: str) -> None:
         beside = f" beside {shear}" if shear else ""
         draft.say("accuracy.method", f"no exact solution exists for law '{law.law}'{beside}; use 'march' or leave "
                                      "method out")  # fmt: skip
+
+
+def _harmonic(draft: Draft) -> None:
+    """A steady motion needs a drive that repeats, and one way to find it for every force in the scene."""
+    drive, structure, law = draft.tables.drive, draft.tables.structure, draft.tables.friction
+    if drive is not None and (drive.kind == "free" or drive.waveform in ("step", "file")):
+        draft.say("accuracy.method", "'harmonic' finds the steady motion under a sine, or its curve over a sweep or "
+                                     "over levels; use 'march' or leave method out")  # fmt: skip
+    elif drive is not None and drive.kind == "base" and drive.waveform == "sweep" and drive.displacement is not None:
+        draft.say("accuracy.method", "'harmonic' keeps the acceleration over a sweep; give drive.acceleration")
+    if structure is None:
+        return
+    bends = "[structure.stiffening]" if structure.stiffening is not None else ""
+    if structure.bonded is not None and structure.bonded.wavelength is not None:
+        bends = "structure.bonded.wavelength"
+    rigid = law is not None and law.law in ("coulomb", "convolution")
+    if bends and (rigid or any(one.law in ("coulomb", "convolution") for one in structure.interface)):
+        draft.say("accuracy.method", f"'harmonic' with a law that jumps beside {bends}: use 'march', or law "
+                                     "'elastic-plastic' with a short bond_length; not yet built")  # fmt: skip
 
 
 def _quadrature(draft: Draft, kind: str) -> None:

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from . import simulate_drive
 from .core import Measure
 from .response.levels import KEPT, Level, bracket, hysteresis, jump
@@ -69,13 +67,12 @@ def drive_with(drive, number: int, level: float):
 
 
 def measures(levels, found: tuple | None) -> dict:
-    """Measures over all levels: onset_level, level_jump, level_hysteresis, as far as there are any."""
+    """Measures over all levels: onset_level, jump_level, level_hysteresis, as far as there are any."""
     out = {}
     if found is not None:
         out["onset_level"] = Measure(found[0], "m s-2", found[1], 1e-9)
     if (leap := jump(levels)) is not None:
-        spacing = float(np.abs(np.diff([level.drive for level in levels])).max())
-        out["jump_level"] = Measure(leap[0], "m s-2", spacing, spacing)
+        out["jump_level"] = Measure(leap[0], "m s-2", float(leap[2]), float(leap[2]))  # it lies between two levels
     if (loop := hysteresis(levels)) is not None:
         out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return out

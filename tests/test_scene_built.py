@@ -16,6 +16,7 @@ LOWER = "contact.tilt.on=lower"
 PATCH_BENCH = PATCH + BENCH[BENCH.index("[friction]") :]
 POINT_RIG = BENCH[: BENCH.index("[slide]")] + LINEAR
 REPORT = ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.reading=report"]
+STEADY = "accuracy.method=harmonic"
 NOT_BUILT = "not yet built"
 
 # (text, sets, key, what the message says)
@@ -35,6 +36,9 @@ REFUSED = [
     (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
     (RIG, ["friction.reading=report", LOWER], "contact.tilt.on", "'lower' in a rig with reading 'report'"),
     (RIG, ["friction.order=0.5", LOWER], "contact.tilt.on", "'lower' in a rig with order = 0.5"),
+    (POINT_RIG, [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"], "accuracy.method", "use 'march', or law"),
+    (POINT_RIG, [COULOMB, STEADY, "structure.bonded.stiffness=1e6 N/m", "structure.bonded.wavelength=80 um"],
+     "accuracy.method", "'harmonic' with a law that jumps beside structure.bonded.wavelength"),
 ]
 PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is wanted"),
@@ -43,6 +47,8 @@ PLAIN = [
     (RIG, ["accuracy.method=exact", PLASTIC], "accuracy.method", "for law 'elastic-plastic'; use 'march' or leave"),
     (RIG, ["accuracy.method=exact", COULOMB, SHEAR], "accuracy.method", "law 'coulomb' beside [contact.shear]"),
     (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle is wanted, cycles >= 0.25, not 0.2"),
+    (LINEAR, [STEADY, "drive.kind=free", "drive.displacement=1 mm"], "accuracy.method", "steady motion under a sine"),
+    (LINEAR, [STEADY, "drive.waveform=step"], "accuracy.method", "use 'march' or leave method out"),
     (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle is wanted"),
 ]
 

@@ -32,13 +32,13 @@ def bracket(levels) -> tuple | None:
 
 
 def jump(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
-    """(drive of the level after it, factor) of the largest growth of a measure between neighbouring levels, over what
-    the drive itself grew; None with fewer than two levels that move."""
+    """(drive of the level after it, factor, distance of the two levels) of the largest change of a measure between
+    neighbouring levels, up or down, over what the drive itself changed; None with fewer than two levels that move."""
     found = []
     for a, b in pairwise(levels):
         if min(a.drive, b.drive, a.values[name], b.values[name]) > 0 and not (a.stuck or b.stuck):
             factor = (b.values[name] / a.values[name]) / (b.drive / a.drive)
-            found.append((abs(np.log(factor)), b.drive, factor))
+            found.append((abs(np.log(factor)), b.drive, factor, abs(b.drive - a.drive)))
     return max(found)[1:] if found else None
 
 

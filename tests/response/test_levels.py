@@ -45,7 +45,8 @@ def test_exact_bracket_jump_and_hysteresis_of_a_table():
     assert bracket(table) == (1, 2)
     assert bracket(table[2:]) == (-1, 0)
     assert bracket(table[:2]) is None and bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)]) is None
-    assert jump(table) == (6, pytest.approx(6 * 5 / 6))
+    assert jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
+    assert jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5  # not the widest of the table
     assert hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
     assert hysteresis(table[:4]) is None and jump(table[:2]) is None
 
@@ -96,3 +97,11 @@ def test_exact_onset_of_elastic_bonds_is_where_the_stuck_spring_reaches_its_limi
     assert found["onset_level"].value == pytest.approx(steady, rel=2e-2)
     assert result.extra["levels"][0].stuck and not result.extra["levels"][1].stuck
     assert found["onset_level"].value / G_N == pytest.approx(3.99, abs=0.05)
+
+
+def test_exact_a_block_that_holds_has_no_stiffness_in_a_march():
+    """Round-off moves the held block by 1e-20 m; a force over that is no stiffness. Beside it a block that slips."""
+    for level_text, there in (('["3 g"]', False), ('["6 g"]', True)):
+        found = measured('law = "coulomb"', level_text, 'method = "march"')[1]
+        assert ("equivalent_stiffness" in found) is there and ("equivalent_damping" in found) is there
+        assert found["slip_amplitude"].value > 1e-6 if there else found["slip_amplitude"].value < 1e-15
