@@ -11,6 +11,7 @@ from .core import Measure, Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
     classify,
+    energy_balance,
     harmonic,
     interface_loop,
     ledger_measures,
@@ -84,7 +85,10 @@ def start_of(scene, modes: ModalBasis):
     """core.Start of a scene that does not begin at rest, else None."""
     from .simulate_structure import start_of
 
-    start = start_of(scene, modes)
+    start, travel = start_of(scene, modes), scene.structure.travel
+    if travel is not None and abs(float(modes.output @ start.z)) > travel:
+        raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
+                            "nearer to the middle")
     return start if start.z.any() or start.v.any() else None
 
 
@@ -296,6 +300,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     if stuck and not model.kind:  # what moves in round-off does not slide
         values["stick_fraction"] = 1.0
         values.pop("slip_start_phase", None)
+        moving = modes.mass * simulate_drive.peak_speed(drive, start)**2  # its energies are round-off of such a one
+        values["energy_balance"] = energy_balance(done.ledger | {"power": done.ledger["power"] + moving})
     levels, slips = (), None
     if marks:
         levels = simulate_levels.rows(scene, done.marks, drive, held, rubbing)
