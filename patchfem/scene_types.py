@@ -7,7 +7,16 @@ from difflib import get_close_matches
 from functools import partial
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, WithJsonSchema, field_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    WithJsonSchema,
+    field_validator,
+)
 from pydantic.types import AllowInfNan
 
 from patchfem.quantities import EXAMPLES, parse
@@ -17,17 +26,31 @@ class Kind(str):
     """Marks a key as a quantity of this kind of the unit table."""
 
 
+LARGEST = 1e50  # SI; its fourth power and what is multiplied with it stay within double precision
+
+
+def _within(value: float) -> float:
+    if value and not 1 / LARGEST <= abs(value) <= LARGEST:
+        raise ValueError(f"{value:g} in SI is beyond what can be computed with; 0 or a size from {1 / LARGEST:g} to "
+                         f"{LARGEST:g} is wanted")  # fmt: skip
+    return value
+
+
+Within = AfterValidator(_within)
+
+
 def quantity(kind: str, **limits: float) -> Any:
     """The type of a key that holds a quantity of this kind, within limits as `pydantic.Field` names them."""
     schema = {"type": "string", "examples": [EXAMPLES[kind]]}
     return Annotated[
-        float, Kind(kind), BeforeValidator(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits)
+        float, Kind(kind), BeforeValidator(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits),
+        Within,
     ]
 
 
 def number(**limits: float) -> Any:
     """The type of a key that holds a plain finite number within limits; neither a text nor a boolean."""
-    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits)]
+    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), Within]
 
 
 def whole(least: int) -> Any:

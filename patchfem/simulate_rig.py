@@ -10,6 +10,7 @@ from . import simulate_drive
 from .core import Missing, ModalBasis, Outcome, PatchfemError, Response
 from .friction.law import Bonds
 from .response.measures import (
+    energy_balance,
     harmonic,
     interface_loop,
     ledger_measures,
@@ -87,7 +88,10 @@ def start_of(scene, modes: ModalBasis):
     """core.Start of a scene that does not begin at rest, else None."""
     from .simulate_structure import start_of
 
-    start = start_of(scene, modes)
+    start, travel = start_of(scene, modes), scene.structure.travel
+    if travel is not None and abs(float(modes.output @ start.z)) > travel:
+        raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
+                            "nearer to the middle")
     return start if start.z.any() or start.v.any() else None
 
 
@@ -329,7 +333,10 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
         stuck = simulate_events.all_stick(done.window, held) and scene.friction.law != "tanh"
         if stuck and not model.kind:  # what moves in round-off does not slide
             values["stick_fraction"] = 1.0
-            values.pop("slip_start_phase", None)
+            for name in ("slip_start_phase", "equivalent_stiffness", "equivalent_damping"):
+                values.pop(name, None)
+            moving = modes.mass * simulate_drive.peak_speed(drive, start)**2  # its energies are round-off of such a one
+            values["energy_balance"] = energy_balance(done.ledger | {"power": done.ledger["power"] + moving})
     values |= rings
     levels, slips = (), None
     if marks:

@@ -18,9 +18,11 @@ from .simulate_element_kernels import (
     element_solve,
     element_state,
 )
+from .simulate_slot_solve_kernels import solve_smooth
 from .simulate_step_kernels import COULOMB, RATE, commit, contact_state, contact_step
 
 TURNS = 1000  # of all elements in a step before it counts as failed
+ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
 NOBODY = -1  # kind of a patch that is not there
 
 
@@ -100,6 +102,11 @@ def march_slots(first, steps, state, held, modes, prop, beta, table, mass, kind,
     q, v, eps = np.empty(count), np.empty(count), np.empty(count)
     mean, system, v1 = np.empty(count), np.empty((count, count)), np.empty(count)
     own, dq, middle, iterations = held[0], 0.0, 0.0, 0
+    give, room, hess, smooth = np.empty(n), np.empty((3, n)), np.empty((n, n)), not there and dense.size == 0
+    for k in range(n):
+        give[k] = push[0, k] / mass
+    for e in range(count):
+        smooth = smooth and kinds[e] != COULOMB
     for i in range(steps + 1):
         slide_now, speed_now, out = sample(rows[i], state, slide, output)
         force, energy, slip, springs = 0.0, 0.0, slide_now, 0.0
@@ -136,7 +143,7 @@ def march_slots(first, steps, state, held, modes, prop, beta, table, mass, kind,
                 dq, used, tries, middle = contact_step(free[0] - elsewhere(-1, 0, ports, forces, 0.0, beta), beta[0, 0],
                                                        speed_now, dt, kind, c, work, goal[0])
                 used = (free[0] - elsewhere(-1, 0, ports, forces, 0.0, beta) - dq) / beta[0, 0]
-                worst = abs(used - own) / goal[0]
+                worst = abs(used - own) / (goal[0] + ROUND * (abs(free[0]) / beta[0, 0] + abs(used)))
                 own = used
                 iterations += abs(tries)
                 if tries < 0:
@@ -148,14 +155,18 @@ def march_slots(first, steps, state, held, modes, prop, beta, table, mass, kind,
                                                     2 * mem[e, 5] - mem[e, 6] if turn == 0 else dqs[e],
                                                     0.1 * goal[1 + e])
                 used = (mine - dqs[e]) / beta[p, p]
-                worst = max(worst, abs(used - forces[e]) / goal[1 + e])
+                noise = ROUND * (abs(mine) / beta[p, p] + abs(used))
+                worst = max(worst, abs(used - forces[e]) / (goal[1 + e] + noise))
                 forces[e] = used
                 iterations += abs(tries)
                 if tries < 0:
                     worst = np.inf
             if worst <= 1.0 or count + there == 1:
                 break
-            if turn > 4 and not there and worst > 0.2 * last_worst:
+            if smooth and turn > 1:
+                iterations += abs(solve_smooth(free, rows_of, ports, kinds, num, mem, q, eps, dt, give, goal[1:],
+                                               forces, room[0], room[1], room[2], hess))
+            elif turn > 4 and not there and worst > 0.2 * last_worst:
                 newton_turn(free, ports, kinds, num, mem, q, eps, dt, beta, forces, mean, system)
             last_worst = worst
         failed = worst > 1.0 and count + there > 1

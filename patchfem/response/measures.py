@@ -87,6 +87,8 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     slip = window.slip
     out = {"slip_amplitude": float(slip.max() - slip.min()) / 2}
     speed = np.diff(slip)
+    if not speed.size:  # the run ended where it began
+        return out | {"stick_fraction": 1.0}
     cycles = max(1, len(speed) // steps_per_cycle)
     rows = speed[len(speed) - cycles * steps_per_cycle:] if len(speed) >= steps_per_cycle else speed
     times = window.time[len(speed) - len(rows):]
