@@ -137,6 +137,10 @@ def test_exact_sentences_of_the_saved_table(work, table):
     quick = work.ratios(table["rows"], "patch", "march")["SUNDIALS CVODE"]
     assert float(quick[1e-4].strip("<> ")) > 3
     assert of("block", "DOP853 + events")[1].min() > 4 * exact and of("block", "SUNDIALS CVODE")[1][3] > 2 * exact
+    assert of("two", "SUNDIALS CVODE")[1].min() > 2 * of("two", "exact")[1][0]
+    error, seconds = of("block", "exact, one mode")
+    assert error[0] == work.FLOOR and of("block", "SUNDIALS CVODE")[1].min() > 100 * seconds[0]
+    assert of("block", "DOP853 + events")[1].min() > 300 * seconds[0]
 
 
 def test_exact_ratios_of_power_laws(work):
