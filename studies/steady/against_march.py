@@ -7,8 +7,9 @@ map of events, one mode and two, sliding or with two stops a cycle) against 2000
 5e-14 in amplitude, acceleration and loop.
 
 It is the march of Coulomb friction that is off: where the slide reverses without a stop it can do so only at the end of
-a step. Amplitudes are within 1e-3 where it stops, and up to 1.6e-2 off where it does not (133.5 Hz), which falls with
-the step alone: at 129 Hz 2.1e-2, 5.9e-3 and 2.1e-3 at 400, 1600 and 6400 steps. Such scenes get the exact engine.
+a step. Amplitudes are within 9e-4 (one mode) and 4e-3 (two) where it stops, and up to 1.6e-2 off where it does not
+(133.5 Hz), which falls with the step alone: at 129 Hz 2.1e-2, 5.9e-3 and 2.1e-3 at 400, 1600 and 6400 steps. Such
+scenes get the exact engine.
 
 Run: python studies/steady/against_march.py
 """

@@ -79,6 +79,27 @@ def test_exact_dop853_from_event_to_event(engines, where):
     assert one.error(engines.dop853(one, 1e-10)) < 5e-9
 
 
+@pytest.mark.parametrize("name, where", [("exact", "decay"), ("exact, one mode", "decay"),
+                                         ("exact, one mode", "block")])
+def test_exact_event_engines_of_one_and_of_any_modes(engines, name, where):
+    """Free decay has a closed form; stick-slip at resonance by two engines that share no code."""
+    run, knobs, places = engines.OURS[name]
+    one = engines.problem(where)
+    assert where in places and one.error(run(one, knobs[0])) < 1e-12
+
+
+def test_refuses_an_event_engine_that_does_not_end(engines):
+    class Lost:
+        def enter(self, *_):
+            pass
+
+        def march(self, *_):
+            return 3, 0
+
+    with pytest.raises(engines.NotConverged, match="code 3"):
+        engines.one_mode(engines.problem("block"), 0, Lost())
+
+
 def test_exact_without_a_longest_step_dop853_passes_over_releases(engines):
     """No warning, 4 events instead of 240."""
     one = engines.problem("block")
@@ -94,8 +115,8 @@ def test_exact_errors_of_the_saved_table(engines, table):
                             ("duhamel, static branch", (200, 800))):
             run, _, places = engines.OURS[name]
             for knob in knobs if where in places else ():
-                one = engines.problem(where)
-                assert one.error(run(one, knob)) == pytest.approx(row(table, where, name, knob)["error"], rel=0.02)
+                one, saved = engines.problem(where), row(table, where, name, knob)["error"]
+                assert one.error(run(one, knob)) == pytest.approx(saved, rel=0.02, abs=1e-11)
 
 
 def test_exact_sentences_of_the_saved_table(work, table):
@@ -116,6 +137,10 @@ def test_exact_sentences_of_the_saved_table(work, table):
     quick = work.ratios(table["rows"], "patch", "march")["SUNDIALS CVODE"]
     assert float(quick[1e-4].strip("<> ")) > 3
     assert of("block", "DOP853 + events")[1].min() > 4 * exact and of("block", "SUNDIALS CVODE")[1][3] > 2 * exact
+    assert of("two", "SUNDIALS CVODE")[1].min() > 2 * of("two", "exact")[1][0]
+    error, seconds = of("block", "exact, one mode")
+    assert error[0] == work.FLOOR and of("block", "SUNDIALS CVODE")[1].min() > 100 * seconds[0]
+    assert of("block", "DOP853 + events")[1].min() > 300 * seconds[0]
 
 
 def test_exact_ratios_of_power_laws(work):
