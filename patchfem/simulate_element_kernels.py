@@ -76,7 +76,7 @@ def element_solve(free, beta, kind, num, mem, e, q, eps, dt, guess, goal):
     for count in range(1, 200):
         force, slope = element_mean(kind, num, mem, e, q, dq, eps, dt)
         miss = dq - free + beta * force
-        if abs(miss) <= goal * beta:
+        if abs(miss) <= goal * beta + 4e-16 * (abs(free) + abs(dq)):  # the last digit of the slide
             return dq, force, count
         if miss > 0:
             high = min(high, dq)
