@@ -1,5 +1,6 @@
 """The report's own and other comparison methods under a scene: their steps as a run, with the warnings they deserve."""
 
+from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
 
@@ -53,6 +54,11 @@ def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=No
     laws, start, begin = laws_of(scene, bears), start_of(scene, modes), perf_counter()
     done = _integrated(scene, settings, modes, drive, laws, start)
     response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
+    beyond = np.flatnonzero(np.abs(response.output) > (scene.structure.travel or np.inf))
+    if beyond.size and 0 < beyond[0] < response.time.size - 1:  # the run ends at the first step beyond the stop
+        cut = replace(settings, cycles=response.time[beyond[0]] / drive.period)
+        done = _integrated(scene, cut, modes, drive, laws, start)
+        response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
     n, window = settings.steps, settings.window
     first = max(0, response.time.size - 1 - window * n)
     kept = _cut(response, slice(first, None))
@@ -101,8 +107,6 @@ def _integrated(scene, settings, modes, drive, laws, start):
 
 def _with_interfaces(response, modes):
     """With slides, slide_rates and forces (k, i) of every interface where there are several."""
-    from dataclasses import replace
-
     extra = {name: response.extra[name] for name in ("residual", "iterations")}
     if len(modes.interfaces) > 1:
         faces = modes.interfaces.T
@@ -113,8 +117,6 @@ def _with_interfaces(response, modes):
 
 def _with_slip(response, laws):
     """The irreversible slip of elastic-plastic interfaces in place of their slide."""
-    from dataclasses import replace
-
     from .dynamics.point_laws import ElasticPlastic
 
     give = np.array([law.length / law.limit if isinstance(law, ElasticPlastic) else 0.0 for law in laws])

@@ -338,6 +338,10 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
             moving = modes.mass * simulate_drive.peak_speed(drive, start)**2  # its energies are round-off of such a one
             values["energy_balance"] = energy_balance(done.ledger | {"power": done.ledger["power"] + moving})
     values |= rings
+    if scene.friction is not None and "normal_load" in done.window.extra:
+        load = done.window.extra["normal_load"]
+        values |= {"normal_load_least": float(load.min()), "normal_load_peak": float(load.max()),
+                   "open_fraction": float(np.mean(load <= 0))}
     levels, slips = (), None
     if marks:
         levels = simulate_levels.rows(scene, done.marks, drive, held, rubbing)

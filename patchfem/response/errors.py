@@ -30,7 +30,7 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
     last, before = change(fine, half), change(half, quarter)
     factor = 2.0 if steps < 400 else 1.0
     out = {name: factor * max(value, before.get(name, 0.0) / 2) for name, value in last.items()}
-    least = {"stick_fraction": 4 / steps, "slip_start_phase": 4 * np.pi / steps}
+    least = {"stick_fraction": 4 / steps, "open_fraction": 4 / steps, "slip_start_phase": 4 * np.pi / steps}
     for name in out:
         out[name] += least.get(of_first(name), 0.0)
     return out

@@ -14,13 +14,15 @@ UNITS = {
     "normal_load": "N", "friction_ratio_end": "1", "friction_ratio_peak": "1",
     "friction_work": "J", "energy_stored": "J", "energy_dissipated": "J", "energy_created": "J",
     "ring_frequency": "Hz", "ring_damping": "1",
+    "normal_load_least": "N", "normal_load_peak": "N", "open_fraction": "1",
     "onset_level": "m s-2", "jump_level": "m s-2", "level_hysteresis": "m",
 }
 FLOORS = {
     "relative_displacement_amplitude": 1e-10, "absolute_acceleration_peak": 1e-4, "slip_amplitude": 1e-10,
     "stick_fraction": 1e-3, "slip_start_phase": 1e-3, "friction_force_peak": 1e-6, "loop_area": 1e-10,
     "equivalent_stiffness": 1.0, "equivalent_damping": 1e-8, "energy_balance": 1e-8, "drift_per_cycle": 1e-11,
-    "friction_ratio_end": 1e-9, "friction_ratio_peak": 1e-9,
+    "normal_load_least": 1e-6, "normal_load_peak": 1e-6,
+    "open_fraction": 1e-3, "friction_ratio_end": 1e-9, "friction_ratio_peak": 1e-9,
     "friction_work": 1e-10, "energy_stored": 1e-10, "energy_dissipated": 1e-10, "energy_created": 1e-10,
     "ring_frequency": 1e-3, "ring_damping": 1e-6,
 }

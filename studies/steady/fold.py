@@ -15,8 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
 
 from patchfem import scene, simulate
+from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 
 HERE = Path(__file__).parent
 LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
