@@ -16,7 +16,7 @@ from .core import ModalBasis, Outcome, PatchfemError, Response
 from .simulate_march import GOAL, ContactModel, Run
 
 COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
-FLOOR = 0.1  # least pressure of a node in the weights of the shear modes, over the mean of the preload
+FLOOR = 1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
 PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
@@ -163,10 +163,12 @@ def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tole
     from .simulate_plan import SHEAR_MODES
 
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
-    weakening = law.growth[3] / law.growth[4] if law.growth[0] >= 0 and law.growth[4] > 0 else 1.0
+    if law.growth[0] >= 0:  # a patch that could jump by itself is refused, under its preload as where the load stays
+        shear_modes(giving, law.static * force, law.length, 1,
+                    law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf)
     if count is not None:
-        return shear_modes(giving, limit, law.length, count, weakening)
-    return enough_modes(giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)
+        return shear_modes(giving, limit, law.length, count)
+    return enough_modes(giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance)
 
 
 def wrench_model(modes: ModalBasis, law: Rubbing, atlas: Atlas | None, load=None, shear=None) -> WrenchModel:
@@ -208,6 +210,12 @@ class WrenchRun(Run):
         self.held = np.zeros(2)
         self.width += 5
         self.ledger[0] += self.strained()
+
+    def fork(self, drive):
+        """As of a Run; the pieces of the atlas are shared, which any run may ask."""
+        twin = super().fork(drive)
+        twin.rub = type(self.rub)(*(array.copy() for array in self.rub))
+        return twin
 
     def _steps(self, count: int, rows) -> tuple:
         table, row = self.table(count)

@@ -281,7 +281,9 @@ def test_refuses_another_shape_of_table(text, says):
 UNBUILT = [
     (RIG, ["friction.breakaway=0.1", "friction.order=2"], "friction.breakaway"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "contact.strips.count=4"], "contact.strips"),
-    (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}"], "structure.mode.second.normal"),
+    (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=coulomb"], "friction.law"),
+    (RIG, ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=tanh",
+           "friction.reference_speed=1 mm/s"], "friction.law"),
     (RIG, ["structure.mode.second.normal=0.1", "friction.order=0"], "friction.order"),
     (RIG, ["structure.mode.axial.pitch=1 rad/m", "contact.tilt.on=lower"], "contact.tilt.on"),
     (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz",
