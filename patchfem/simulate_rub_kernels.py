@@ -41,6 +41,7 @@ class Rub(NamedTuple):
     hess: np.ndarray
     ready: np.ndarray
     slope: np.ndarray
+    under: np.ndarray
     scale: np.ndarray
 
 
@@ -249,6 +250,7 @@ def rub_state(kind, rub, q, held):
         else:
             force += mu / length * memory[1, j]
             stretch = memory[1, j] / memory[0, j] if memory[0, j] > 0 else 0.0
-        slip += rub.now[j] * (q - stretch - bend(j, rub))
-        total += rub.now[j]
+        if rub.now[j] > 0:
+            slip += rub.now[j] * (q - stretch - bend(j, rub))
+            total += rub.now[j]
     return force, held_energy(kind, rub, memory), slip / total if total > 0 else q

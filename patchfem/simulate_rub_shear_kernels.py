@@ -24,7 +24,7 @@ from .simulate_rub_kernels import (
 )
 
 GRADIENT, STEP, TRIAL = range(3)
-TIGHT = 0.01  # share of the goal down to which a residual is brought
+TIGHT = 0.1  # share of the goal down to which a residual is brought
 
 
 @njit(error_model="numpy", **LEAN)
@@ -50,14 +50,23 @@ def bond_end(m, z, dq, sigma, eps):
 
 
 @njit(error_model="numpy", **LEAN)
+def under_load(rub, ending):
+    """Write the points that carry load, at the end of the step or on its mean, into rub.under; how many."""
+    count = 0
+    for j in range(rub.now.size):
+        if rub.now[j] > 0.0 or (not ending and rub.before[j] > 0.0):
+            rub.under[count] = j
+            count += 1
+    return count
+
+
+@njit(error_model="numpy", **LEAN)
 def point_force(j, xi, kind, rub, ending):
     """(force [N], slope [N/m] >= 0) of point j after the slide xi: its path mean under the mean load, or its value at
     the end under the load of the end."""
     mu, length = rub.force[0], rub.force[2]
     memory = rub.memory if ending else rub.half
     load = rub.now[j] if ending else 0.5 * (rub.before[j] + rub.now[j])
-    if load <= 0.0:
-        return 0.0, 0.0
     if kind == PLASTIC:
         if ending:
             f, s = spring_end(memory[0, j], memory[1, j], load, xi, length)
@@ -72,19 +81,20 @@ def point_force(j, xi, kind, rub, ending):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def gradient(y, free, beta, kind, rub, ending, out):
-    """Residual (1 + r,) at y = (dq, db) and the slopes of the points; beta = 0 or `ending`: the slide is given. Returns
-    the friction force [N]."""
+def gradient(y, free, beta, kind, rub, ending, size, out):
+    """Residual (1 + r,) at y = (dq, db) and the slopes of the `size` points under load; beta = 0 or `ending`: the slide
+    is given. Returns the friction force [N]."""
     psi, kappa, b, r = rub.psi, rub.kappa, rub.b, rub.kappa.size
     part, force = 1.0 if ending else 0.5, 0.0
     for k in range(r):
         out[k + 1] = kappa[k] * (b[k] + part * y[k + 1])
-    for j in range(rub.now.size):
+    for i in range(size):
+        j = rub.under[i]
         xi = y[0]
         for k in range(r):
             xi -= psi[j, k] * y[k + 1]
         f, s = point_force(j, xi, kind, rub, ending)
-        rub.slope[j] = s
+        rub.slope[i] = s
         force += f
         for k in range(r):
             out[k + 1] -= psi[j, k] * f
@@ -93,7 +103,7 @@ def gradient(y, free, beta, kind, rub, ending, out):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def hessian(beta, rub, ending, hess):
+def hessian(beta, rub, ending, size, hess):
     """Lower half of the Hessian (1 + r, 1 + r) at the slopes of the points."""
     psi, kappa, r = rub.psi, rub.kappa, rub.kappa.size
     given = ending or beta == 0.0
@@ -101,8 +111,8 @@ def hessian(beta, rub, ending, hess):
     hess[0, 0] = 1.0 if given else 1 / beta
     for k in range(r):
         hess[k + 1, k + 1] = kappa[k] * (1.0 if ending else 0.5)
-    for j in range(rub.slope.size):
-        s = rub.slope[j]
+    for i in range(size):
+        j, s = rub.under[i], rub.slope[i]
         if s == 0.0:
             continue
         if not given:
@@ -160,7 +170,8 @@ def descend(y, free, beta, kind, rub, ending, goal):
     g, p, trial = rub.room[GRADIENT], rub.room[STEP], rub.room[TRIAL]
     which = 1 if ending else 0
     hess = rub.hess[which]
-    force = gradient(y, free, beta, kind, rub, ending, g)
+    points = under_load(rub, ending)
+    force = gradient(y, free, beta, kind, rub, ending, points, g)
     size, least = weighted(g, rub.scale), np.inf
     noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
     stale, stall = True, 0
@@ -168,7 +179,7 @@ def descend(y, free, beta, kind, rub, ending, goal):
         if size <= max(TIGHT * goal, noise + 4e-16 * abs(force)):
             return force, count
         if rub.ready[which] == 0.0:
-            hessian(beta, rub, ending, hess)
+            hessian(beta, rub, ending, points, hess)
             if not factor(hess):
                 return force, -count
             rub.ready[which], stale = 1.0, False
@@ -177,7 +188,7 @@ def descend(y, free, beta, kind, rub, ending, goal):
         for _ in range(40):
             for i in range(y.size):
                 trial[i] = y[i] + part * p[i]
-            force = gradient(trial, free, beta, kind, rub, ending, g)
+            force = gradient(trial, free, beta, kind, rub, ending, points, g)
             rise = 0.0
             for i in range(y.size):
                 rise += g[i] * p[i]

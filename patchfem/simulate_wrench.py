@@ -283,13 +283,13 @@ class WrenchRun(Run):
 
 
 def _shear_arrays(shear, size: int, limit: float) -> tuple:
-    """psi, kappa, b, y, last, rest, room, hess, ready, slope and scale of a Rub."""
+    """psi, kappa, b, y, last, rest, room, hess, ready, slope, under and scale of a Rub."""
     psi = np.zeros((size, 0)) if shear is None else np.array(shear.shape, order="C")
     kappa = np.zeros(0) if shear is None else np.array(shear.stiffness)
     r = kappa.size
     scale = np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0)))
     return (psi, kappa, np.zeros(r), *np.zeros((3, 1 + r)), np.zeros((3, 1 + r)), np.zeros((2, 1 + r, 1 + r)),
-            np.zeros(2), np.zeros(size), scale)
+            np.zeros(2), np.zeros(size), np.zeros(size, np.int64), scale)
 
 
 def _one_point(load: float) -> dict:
