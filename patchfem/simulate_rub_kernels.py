@@ -180,6 +180,7 @@ def give_way(rub):
         here = y[k]
         y[k] = 2 * here - last[k]
         last[k] = here
+    rub.ready[:] = 0.0
 
 
 @njit(error_model="numpy", **LEAN)

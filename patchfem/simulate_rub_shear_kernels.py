@@ -24,7 +24,7 @@ from .simulate_rub_kernels import (
 )
 
 GRADIENT, STEP, TRIAL = range(3)
-TIGHT = 0.1  # share of the goal down to which a residual is brought
+TIGHT = 0.001  # share of the goal down to which a residual is brought
 
 
 @njit(error_model="numpy", **LEAN)
@@ -165,7 +165,7 @@ def back(a, g, p):
 def descend(y, free, beta, kind, rub, ending, goal):
     """Minimum over y in place, from the guess in it. Returns (force [N], iterations), < 0: failed.
 
-    The factor of the last Hessian serves until a step with it gains less than a factor of ten.
+    The factor of a Hessian serves all solves of a step of the march, until one with it gains less than a factor of ten.
     """
     g, p, trial = rub.room[GRADIENT], rub.room[STEP], rub.room[TRIAL]
     which = 1 if ending else 0
