@@ -107,6 +107,9 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     accuracy = draft.tables.accuracy
     if accuracy is not None and accuracy.method == "exact" and law.law == "coulomb" and not shear:
         draft.say("accuracy.method", f"no exact solution exists {beside}; use 'march' or leave method out")
+    if accuracy is not None and accuracy.method in ("duhamel", "newmark", "euler", "harmonic"):
+        draft.say("accuracy.method", f"'{accuracy.method}' {beside} takes the load as constant: use 'march'; not yet "
+                                     "built")  # fmt: skip
     if law.law == "convolution":
         draft.say("friction.law", f"'convolution' {beside}: use another law; not yet built")
     elif law.law == "nonlocal" and (law.reading == "report" or law.order not in (1, None) or law.breakaway):
