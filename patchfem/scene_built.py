@@ -107,14 +107,18 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     accuracy = draft.tables.accuracy
     if accuracy is not None and accuracy.method == "exact" and law.law == "coulomb" and not shear:
         draft.say("accuracy.method", f"no exact solution exists {beside}; use 'march' or leave method out")
+    if accuracy is not None and accuracy.method in ("duhamel", "newmark", "euler", "harmonic"):
+        draft.say("accuracy.method", f"'{accuracy.method}' {beside} takes the load as constant: use 'march'; not yet "
+                                     "built")  # fmt: skip
     if law.law == "convolution":
         draft.say("friction.law", f"'convolution' {beside}: use another law; not yet built")
     elif law.law == "nonlocal" and (law.reading == "report" or law.order not in (1, None) or law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", f"{beside}: use reading = \"stretch\" with order = 1 and no breakaway; not yet "
                                      "built")  # fmt: skip
-    if shear:
-        draft.say(cause, f"beside {shear}: leave one of them out; not yet built")
+    if shear and law.law == "coulomb":
+        draft.say("friction.law", f"'coulomb' {beside} and {shear}: use law 'elastic-plastic' with a short "
+                                  "bond_length, which is Coulomb behind stiff springs; not yet built")  # fmt: skip
     if structure is not None and structure.stiffening is not None:
         draft.say("structure.stiffening", f"{beside}: leave one of them out; not yet built")
     if structure is not None and structure.bonded is not None and structure.bonded.wavelength is not None:

@@ -84,6 +84,10 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         warnings = [*warnings, *unripe(law, float(np.abs(raw.window.slide_rate).max())),
                     *creeping(law, outcome, found)]
     warnings = [*warnings, *rig.created_warning(scene, raw.book, settings.cycles)]
+    if patch is not None and rig.acts(scene):
+        from .simulate_wrench_scene import shear_note
+
+        warnings = [*warnings, *shear_note(scene, raw.model)]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
     return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
 
@@ -150,11 +154,11 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
         rough = rig.run_march(scene, few, modes, drive, coarse[0])
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
-        if scene.friction.law == "nonlocal":
-            kept = quarter.model.reduction.stiffness.size
-            fewer = rig.run_march(scene, replace(few, shear_modes=max(1, kept // 2)), modes, drive, patch)
-            out.append(change(quarter.values, fewer.values))
-            seconds["error"] += fewer.seconds
+    shape = getattr(getattr(quarter.model, "reduction", None), "stiffness", None)
+    if shape is not None and (rig.acts(scene) or (coarse[0] is not None and scene.friction.law == "nonlocal")):
+        fewer = rig.run_march(scene, replace(few, shear_modes=max(1, shape.size // 2)), modes, drive, patch)
+        out.append(change(quarter.values, fewer.values))
+        seconds["error"] += fewer.seconds
     return out
 
 

@@ -6,6 +6,7 @@ from math import inf, pi, sqrt
 from .core import Missing, PatchfemError
 from .effects import EFFECTS, absent
 from .simulate_acting import acting, pad_width
+from .simulate_wrench_scene import acts
 
 AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
 SHEAR_MODES = 8  # modes a shear reduction starts from
@@ -209,6 +210,9 @@ def _rig_cost(scene, per_point, unknowns) -> tuple:
             each = 4e-8 * unknowns.get("interface_points", 1) * (1 + unknowns["shear_modes"] / 4)
         elif settings.per_point:
             each = 6e-8 * unknowns.get("interface_points", 1)
+    elif shear and acts(scene):
+        unknowns["shear_modes"] = settings.shear_modes or SHEAR_MODES
+        each = 4e-8 * unknowns.get("interface_points", 1) * (1 + unknowns["shear_modes"] / 4)
     elif shear:
         each = 3e-9 * unknowns.get("interface_points", 1) + 5e-7
     return settings.engine, int(steps * 1.75), steps * 1.75 * each
@@ -273,6 +277,9 @@ def _verdict(scene, groups, size: int) -> list:
     slip = groups.get("slip_length")
     if slip is not None:
         out.append(f"the pieces' own shear gives way by about {slip:.2g} m before the patch slips")
+    if scene.kind == "rig" and scene.contact is not None and scene.contact.gives_way and acts(scene):
+        out.append(f"{scene.contact.gives_way} by tangential modes of all nodes, as the load changes with the motion; "
+                   "half as many check them")
     return out
 
 

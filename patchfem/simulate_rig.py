@@ -230,7 +230,7 @@ def contact_model(scene, settings: Settings, patch, drive):
     if acts(scene):
         from .simulate_wrench_scene import model_of
 
-        return model_of(scene, modes_of(scene), patch, speed_of(scene, drive))
+        return model_of(scene, modes_of(scene), patch, speed_of(scene, drive), settings.shear_modes)
     load = patch.pressure.load if patch is not None else scene.normal.load
     limit = f.static * load
     shear = contact.gives_way if contact is not None else ""

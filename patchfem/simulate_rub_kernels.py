@@ -20,7 +20,8 @@ class Rub(NamedTuple):
     """force (4,): mu_s, mu_k (v_0 of a rate law), bond length [m], initial density m_0; memory (3, m): elastic-plastic
     traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; half (3, m): the same after half of the change of load;
     before, now (m,): nodal forces at the ends of the step [N]; middle, eps (1,): bond length in the step and at its
-    start; growth (6,) of eq. 2.10."""
+    start; growth (6,) of eq. 2.10. Pieces that give way in shear: psi (m, r), kappa (r,) [N/m], b (r,) their
+    coordinates, none of rigid ones; y (1 + r,) increments of slide and coordinates, the scratch of their solve."""
 
     force: np.ndarray
     memory: np.ndarray
@@ -30,6 +31,26 @@ class Rub(NamedTuple):
     middle: np.ndarray
     eps: np.ndarray
     growth: np.ndarray
+    psi: np.ndarray
+    kappa: np.ndarray
+    b: np.ndarray
+    y: np.ndarray
+    last: np.ndarray
+    rest: np.ndarray
+    room: np.ndarray
+    hess: np.ndarray
+    ready: np.ndarray
+    slope: np.ndarray
+    under: np.ndarray
+    scale: np.ndarray
+
+
+@njit(error_model="numpy", **LEAN)
+def local_slide(j, dq, psi, y):
+    """Slide [m] of point j where the holder slides by dq and the pieces give way by y[1:]."""
+    for k in range(psi.shape[1]):
+        dq -= psi[j, k] * y[k + 1]
+    return dq
 
 
 @njit(error_model="numpy", **LEAN)
@@ -150,6 +171,19 @@ def rub_solve(free, beta, v0, dt, kind, rub, mean, goal, guess):
 
 
 @njit(error_model="numpy", **LEAN)
+def give_way(rub):
+    """Move the coordinates of the pieces by the solved step and leave the next guess in y."""
+    y, last = rub.y, rub.last
+    for k in range(rub.b.size):
+        rub.b[k] += y[k + 1]
+    for k in range(y.size):
+        here = y[k]
+        y[k] = 2 * here - last[k]
+        last[k] = here
+    rub.ready[:] = 0.0
+
+
+@njit(error_model="numpy", **LEAN)
 def rub_commit(dq, used, v0, v1, dt, kind, rub):
     """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
     if kind == COULOMB or kind == RATE:
@@ -161,32 +195,45 @@ def rub_commit(dq, used, v0, v1, dt, kind, rub):
             load = 0.5 * (rub.before[j] + rub.now[j])
             y, springs = half[0, j], half[1, j]
             if load > 0:
-                y, springs = spring_step(y, springs, load, dq, length)
+                y, springs = spring_step(y, springs, load, local_slide(j, dq, rub.psi, rub.y), length)
             memory[0, j], memory[1, j] = press_springs(y, springs, rub.now[j])
+        give_way(rub)
         return used * dq + before - held_energy(kind, rub, memory)
     burnt = before - held_energy(kind, rub, half)
     for j in range(rub.now.size):
         load = 0.5 * (rub.before[j] + rub.now[j])
         m, z, s2 = half[0, j], half[1, j], half[2, j]
         if load > 0:
-            m, z, s2, part = bond_step(m, z, s2, dq, load, rub.middle[0])
+            m, z, s2, part = bond_step(m, z, s2, local_slide(j, dq, rub.psi, rub.y), load, rub.middle[0])
             burnt += 0.5 * mu / length * part
         memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[3], length)
         burnt += 0.5 * mu / length * (s2 - memory[2, j])
+    give_way(rub)
     rub.eps[0] = grow(rub.eps[0], v0, v1, abs(dq), dt, rub.growth)[0]
     return burnt
 
 
 @njit(error_model="numpy", **LEAN)
 def held_energy(kind, rub, memory):
-    """Elastic energy of a memory [J]."""
+    """Elastic energy of a memory and of the pieces [J]."""
     out, mu, length = 0.0, rub.force[0], rub.force[2]
+    for k in range(rub.b.size):
+        out += 0.5 * rub.kappa[k] * rub.b[k] * rub.b[k]
     for j in range(memory.shape[1]):
         if kind == PLASTIC:
             if memory[1, j] > 0:
                 out += 0.5 * mu * length * memory[0, j] * memory[0, j] / memory[1, j]
         else:
             out += 0.5 * mu / length * memory[2, j]
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def bend(j, rub):
+    """Slide [m] of point j that the pieces take."""
+    out = 0.0
+    for k in range(rub.b.size):
+        out += rub.psi[j, k] * rub.b[k]
     return out
 
 
@@ -204,6 +251,7 @@ def rub_state(kind, rub, q, held):
         else:
             force += mu / length * memory[1, j]
             stretch = memory[1, j] / memory[0, j] if memory[0, j] > 0 else 0.0
-        slip += rub.now[j] * (q - stretch)
-        total += rub.now[j]
+        if rub.now[j] > 0:
+            slip += rub.now[j] * (q - stretch - bend(j, rub))
+            total += rub.now[j]
     return force, held_energy(kind, rub, memory), slip / total if total > 0 else q

@@ -16,6 +16,7 @@ from .core import ModalBasis, Outcome, PatchfemError, Response
 from .simulate_march import GOAL, ContactModel, Run
 
 COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
+FLOOR = 1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
 PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
@@ -94,13 +95,15 @@ def contact_frequencies(modes: ModalBasis, atlas: Atlas) -> np.ndarray:
 class WrenchModel:
     """What `simulate_march.march` needs to know: law, atlas of the contact, rows (3, n) of slide, heave and pitch.
 
-    load: function of times (k,) [s] to a load [N] >= 0 that is prescribed on one point, in place of the atlas.
+    load: function of times (k,) [s] to a load [N] >= 0 that is prescribed on one point, in place of the atlas; shear:
+    ShearModes on every node of the atlas where the pieces give way, see `shear_of`.
     """
 
     law: Rubbing
     atlas: Atlas | None
     rows: np.ndarray
     load: object = None
+    shear: object = None
 
     @property
     def preload(self) -> float:
@@ -124,8 +127,8 @@ class WrenchModel:
 
     @property
     def reduction(self):
-        """None."""
-        return None
+        """ShearModes, None of pieces that are rigid in shear."""
+        return self.shear
 
     @property
     def kind(self) -> int:
@@ -142,12 +145,37 @@ class WrenchModel:
         return ContactModel(COULOMB, 1.0, {"force": [0.0, 0.0, 0.0]}).build(hub)
 
 
-def wrench_model(modes: ModalBasis, law: Rubbing, atlas: Atlas | None, load=None) -> WrenchModel:
-    """The model of a basis on an atlas, or under a prescribed load on one point, which no heave or pitch can move."""
+def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tolerance: float = 1e-3):
+    """ShearModes of pieces whose contact set changes: of the tangential compliance (m, m) [m/N] on every node.
+
+    force (m,) [N]: nodal forces of the preload, weight (m,) areas. Modes are weighted with mu_s times the preload and
+    `FLOOR` of its mean pressure, so nodes that are open at first have their share; with m modes they are exact whatever
+    the weights. count: how many, None: as the backbone under these weights asks for at a tenth of the tolerance.
+    """
+    from .contact.slip import enough_modes, shear_modes
+    from .simulate_plan import SHEAR_MODES
+
+    limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
+    if law.growth[0] >= 0:  # a patch that could jump by itself is refused, under its preload as where the load stays
+        shear_modes(giving, law.static * force, law.length, 1,
+                    law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf)
+    if count is not None:
+        return shear_modes(giving, limit, law.length, count)
+    return enough_modes(giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance)
+
+
+def wrench_model(modes: ModalBasis, law: Rubbing, atlas: Atlas | None, load=None, shear=None) -> WrenchModel:
+    """The model of a basis on an atlas, or under a prescribed load on one point, which no heave or pitch can move.
+    shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
+    if shear is not None and law.kind not in (PLASTIC, POINTS):
+        raise PatchfemError("contact.shear: under a load that changes it takes law 'elastic-plastic' (for Coulomb with "
+                            "a short bond_length) or 'nonlocal'; not yet built")
+    if shear is not None and shear.points.size != atlas.x.size:
+        raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
         raise PatchfemError("structure.mode.normal: a load on one rigid point leaves no room for heave or pitch; name "
                             "[contact] in place of [normal]")
-    return WrenchModel(law, atlas, rows_of(modes), load)
+    return WrenchModel(law, atlas, rows_of(modes), load, shear)
 
 
 class WrenchRun(Run):
@@ -169,11 +197,18 @@ class WrenchRun(Run):
             self.press.press_state(self.sets, slot, -heave, turn, now)
         self.slot, memory = np.array([slot]), np.zeros((3, x.size))
         memory[1 if law.kind == PLASTIC else 0] = now * (1.0 if law.kind == PLASTIC else law.force[3])
-        self.rub = compiled("simulate_rub_kernels").Rub(np.array(law.force, float), memory, memory.copy(), now.copy(),
-                                                        now, *np.full((2, 1), law.length), np.array(law.growth, float))
+        self.rub = compiled("simulate_rub_kernels").Rub(
+            np.array(law.force, float), memory, memory.copy(), now.copy(), now, *np.full((2, 1), law.length),
+            np.array(law.growth, float), *_shear_arrays(model.shear, x.size, law.static * model.preload))
         self.held = np.zeros(2)
         self.width += 5
         self.ledger[0] += self.strained()
+
+    def fork(self, drive):
+        """As of a Run; the pieces of the atlas are shared, which any run may ask."""
+        twin = super().fork(drive)
+        twin.rub = type(self.rub)(*(array.copy() for array in self.rub))
+        return twin
 
     def _steps(self, count: int, rows) -> tuple:
         table, row = self.table(count)
@@ -207,8 +242,9 @@ class WrenchRun(Run):
             self.message = f"no contact set fits the motion at step {self.done}; raise accuracy.steps_per_cycle"
 
     def _snapshot(self, row) -> dict:
-        return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": self.rub.now.copy(),
-                                         "memory": self.rub.memory.copy()}
+        rub = self.rub
+        return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": rub.now.copy(), "b": rub.b.copy(),
+                                         "memory": rub.memory.copy(), "bend": rub.psi @ rub.b}
 
     def strained(self) -> float:
         """Energy of the preloaded contact and of what stretches in it [J]."""
@@ -222,7 +258,7 @@ class WrenchRun(Run):
             out += law.static * law.length / 2 * float(np.sum(top[on]**2 / bottom[on]))
         elif law.kind == POINTS:
             out += law.static / law.length / 2 * float(square.sum())
-        return float(out)
+        return float(out) + float(self.rub.kappa @ self.rub.b**2) / 2
 
     def book(self) -> dict:
         """The energy ledger [J], contact sets made, pivots, tableaus made anew."""
@@ -239,6 +275,16 @@ class WrenchRun(Run):
                        extra=extra)
 
 
+def _shear_arrays(shear, size: int, limit: float) -> tuple:
+    """psi, kappa, b, y, last, rest, room, hess, ready, slope, under and scale of a Rub."""
+    psi = np.zeros((size, 0)) if shear is None else np.array(shear.shape, order="C")
+    kappa = np.zeros(0) if shear is None else np.array(shear.stiffness)
+    r = kappa.size
+    scale = np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0)))
+    return (psi, kappa, np.zeros(r), *np.zeros((3, 1 + r)), np.zeros((3, 1 + r)), np.zeros((2, 1 + r, 1 + r)),
+            np.zeros(2), np.zeros(size), np.zeros(size, np.int64), scale)
+
+
 def _one_point(load: float) -> dict:
     """Arrays of a book that is never asked, for a load that is prescribed."""
     return {"c": np.ones((1, 1)), "x": np.zeros(1), "b": np.zeros(1), "tableau": np.zeros((1, 4)),
@@ -250,9 +296,10 @@ def _one_point(load: float) -> dict:
 
 
 def march(modes: ModalBasis, drive, atlas: Atlas | None, law: Rubbing, cycles: float, steps_per_cycle: int,
-          window: int = 10, travel: float = np.inf, frames: int = 0, start=None, load=None, say=None, progress=None):
+          window: int = 10, travel: float = np.inf, frames: int = 0, start=None, load=None, say=None, progress=None,
+          shear=None):
     """`simulate_march.march` of a basis on an atlas, or under a prescribed load, from rest or from `start`."""
     from .simulate_march import march as run
 
-    return run(modes, drive, wrench_model(modes, law, atlas, load), cycles, steps_per_cycle, window, travel, frames,
-               say, progress, start)
+    model = wrench_model(modes, law, atlas, load, shear)
+    return run(modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start)

@@ -24,6 +24,7 @@ from .simulate_rub_kernels import (
     rub_solve,
     rub_state,
 )
+from .simulate_rub_shear_kernels import shear_solve, spring_back
 
 
 class Ports(NamedTuple):
@@ -161,7 +162,10 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
                     press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
             slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
             press_all(kind, rub)
-            dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
+            if rub.b.size:
+                dq, used, its = shear_solve(slides, beta[0, 0], v, dt, kind, rub, goal)
+            else:
+                dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
             count += abs(its)
             bad = its < 0 or wrong > goal
             miss = used - guess
@@ -198,6 +202,11 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
         for j in range(n):
             v1 += slide[j] * state[1, j]
         ledger[3] += rub_commit(dq, used, v, v1, dt, kind, rub)
+        if rub.b.size:
+            lost, its = spring_back(kind, rub, goal)
+            ledger[3] += lost
+            ledger[5] += abs(its)
+            ledger[7] += 1.0 if its < 0 and not bad else 0.0
         if given:
             load = loads[i + 1]
         elif not apart:

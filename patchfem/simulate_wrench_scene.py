@@ -42,12 +42,27 @@ def atlas_of(scene, patch):
     return wrench.atlas_of(patch, spring_of(scene.contact))
 
 
-def model_of(scene, modes: ModalBasis, patch, speed: float):
-    """The simulate_wrench.WrenchModel of a rig whose load changes; patch: the solved Patch or None for [normal]."""
+def model_of(scene, modes: ModalBasis, patch, speed: float, count: int | None = None):
+    """The simulate_wrench.WrenchModel of a rig whose load changes; patch: the solved Patch or None for [normal]; count:
+    how many shear modes stand for pieces that give way, None: by the tolerance."""
     from . import simulate_wrench as wrench
 
     load = None if patch is not None else lambda t: load_at(scene, t)
-    return wrench.wrench_model(modes, rubbing_of(scene, speed), atlas_of(scene, patch), load)
+    law, shear = rubbing_of(scene, speed), None
+    if scene.contact is not None and scene.contact.gives_way:
+        weight = patch.pieces.interface.weight
+        shear = wrench.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, count,
+                                scene.accuracy.tolerance)
+    return wrench.wrench_model(modes, law, atlas_of(scene, patch), load, shear)
+
+
+def shear_note(scene, model) -> list:
+    """The sentence on the shear modes of a run whose load changes; empty where none stand for the pieces."""
+    if model is None or model.reduction is None:
+        return []
+    kept, nodes = model.reduction.stiffness.size, model.atlas.x.size
+    return [f"{scene.contact.gives_way}: the load changes with the motion, so no exact set of elements exists; {kept} "
+            f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
 
 
 def frames_of(scene, patch, raw) -> dict:
@@ -64,7 +79,7 @@ def frames_of(scene, patch, raw) -> dict:
     tau, local = np.zeros_like(nodal), np.zeros_like(nodal)
     for k, shot in enumerate(shots, 1):
         tau[k], stretch = _shear(law, shot, nodal[k])
-        local[k] = slide[k] - stretch
+        local[k] = slide[k] - stretch - shot["bend"]
     moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
     moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
     status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(np.int8)

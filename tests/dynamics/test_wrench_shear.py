@@ -1,0 +1,189 @@
+"""Pieces that give way in shear under a contact whose load and set change: a dense march, limits, energy."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import root
+from test_wrench import LAWS, LOAD, MASS, balance, crowned, modes
+
+from patchfem import simulate_march as plain
+from patchfem import simulate_wrench as wrench
+from patchfem.contact.slip import jenkins_set, shear_modes
+from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.dynamics.propagator import propagator
+from patchfem.friction.law import Bonds
+from patchfem.friction.local import ElasticPlastic
+from patchfem.friction.recursion import Recursion, advance
+
+SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": Recursion(Bonds(0.3, 1e-6))}
+
+
+def giving(x, depth: float = 3e-8) -> np.ndarray:
+    """A tangential compliance [m/N] like that of pieces with a skin."""
+    return depth * (0.5 * np.exp(-np.abs(x[:, None] - x) / 2e-3) + 0.3 * np.eye(x.size))
+
+
+def reduced(atlas, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3):
+    """Shear modes on the nodes of an atlas, as many as there are nodes where no count is given."""
+    force = atlas.reference.forces(0.0, 0.0)
+    count = atlas.x.size if count is None else count
+    return wrench.shear_of(giving(atlas.x, depth), law, force, np.ones(force.size), count or None, tolerance)
+
+
+def dense(basis, drive, law, atlas, response, steps: int) -> tuple:
+    """Slides, friction forces and energy lost by a march on the nodes themselves: displacements u (m,) of the pieces
+    behind the stiffness C^-1, bench laws, a general root finder; the nodal forces from heave and turn of a run."""
+    p = propagator(basis, drive, steps)
+    table, beta = p.tables(drive, 0, steps), p.beta[0, 0]
+    stiff = np.linalg.inv(giving(atlas.x))
+    motion = zip(-response.extra["heave"], response.extra["turn"])
+    loads = np.array([atlas.at(d, t).forces(d, t) for d, t in motion])
+    z = v = 0.0
+    u, state, slides, forces = np.zeros(atlas.x.size), law.start(loads[0]), [0.0], [0.0]
+    bonds = isinstance(law, Recursion)
+
+    def moved(state, xi, load):
+        """(mean tractions, state) after the slides xi (m,)."""
+        if not bonds:
+            step = law.step(state, xi, load, load, p.dt)
+            return step.mean, step.state
+        out, mean, _, _ = advance(state.bonds, xi, load, 1e-6)
+        kept = np.where(load > 0, out, state.bonds)
+        return 0.3 / 1e-6 * np.where(load > 0, mean, 0.0), state._replace(bonds=kept)
+
+    for i in range(len(loads) - 1):
+        middle = (loads[i] + loads[i + 1]) / 2
+        ready, row = law.press(state, loads[i], middle).state, table[i % steps]
+        rest = p.free[0, 0] * z + p.free[1, 0] * v + row[0], p.free[2, 0] * z + p.free[3, 0] * v + row[1]
+
+        def miss(y, ready=ready, middle=middle, free=rest[0] - z, u=u):
+            mean = moved(ready, 1e-6 * (y[0] - y[1:]), middle)[0]
+            return np.append((1e-6 * y[0] - free) / beta + mean.sum(), stiff @ (u + 0.5e-6 * y[1:]) - mean)
+
+        y = 1e-6 * root(miss, np.zeros(u.size + 1), tol=1e-14).x
+        state = law.press(moved(ready, y[0] - y[1:], middle)[1], middle, loads[i + 1]).state
+        u = u + y[1:]
+
+        def away(y, state=state, load=loads[i + 1], u=u):
+            return stiff @ (u + 1e-6 * y) - law.traction(moved(state, -1e-6 * y, load)[1])
+
+        y_back = 1e-6 * root(away, np.zeros(u.size), tol=1e-14).x
+        state, u = moved(state, -y_back, loads[i + 1])[1], u + y_back
+        accel = -(rest[0] - z - y[0]) / beta / MASS
+        z, v = rest[0] + p.push[0, 0] * accel, rest[1] + p.push[1, 0] * accel
+        slides.append(z)
+        forces.append(law.traction(state).sum())
+    return np.array(slides), np.array(forces), loads
+
+
+@pytest.mark.parametrize("name", ["plastic", "bonds"])
+def test_exact_all_modes_are_the_nodes_themselves(name):
+    """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
+    basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
+    drive, atlas, law, steps = BaseSine(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
+    done = wrench.march(basis, drive, atlas, law, 1, steps, 1, start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
+                        shear=reduced(atlas, law))
+    single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
+    slides, forces, loads = dense(single, drive, SOFT[name], atlas, done.response, steps)
+    r, sets = done.response, (loads > 0).sum(axis=1)
+    assert sets.min() < 10 and sets.max() == 21 and np.abs(r.force).max() > 0.9 * 0.3 * LOAD
+    assert r.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
+    assert r.force == pytest.approx(forces, abs=1e-7 * 0.3 * LOAD)
+    assert done.outcome is None and balance(done, basis) <= 1e-11
+
+
+@pytest.mark.parametrize("name", ["plastic", "bonds", "growing"])
+def test_exact_a_still_load_is_the_march_on_the_preload(name):
+    """normal = 1e-9: bonds as by shear modes of the preloaded set, elastic-plastic as by its exact parallel elements.
+    The two differ by what springs back, which falls with the square of the step, to 3e-8 at 3200 steps a cycle."""
+    basis = modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
+    drive, atlas, law = BaseSine(40.0, 2 * np.pi * 300), crowned(), LAWS[name]
+    force, soft = atlas.reference.forces(0.0, 0.0), giving(crowned().x)
+    if name == "plastic":
+        group = jenkins_set(soft, 0.3 * force, 1e-6)
+        model = plain.jenkins_model(group.stiffness, group.yield_slide)
+    else:
+        bonds = {"bonds": Bonds(0.3, 1e-6), "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)}
+        model = plain.points_model(bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21))
+    want = plain.march(basis, drive, model, 3, 1600, 3).response
+    got = wrench.march(basis, drive, atlas, law, 3, 1600, 3, shear=reduced(atlas, law)).response
+    assert np.abs(got.force).max() > 0.7 * 0.3 * LOAD and 3e-6 < np.abs(got.slide).max() < 2e-5
+    assert got.slide == pytest.approx(want.slide, abs=1e-6 * np.abs(want.slide).max())
+    assert got.force == pytest.approx(want.force, abs=5e-6 * 0.3 * LOAD)
+
+
+def test_exact_pieces_spring_back_when_they_part():
+    """In flight the pieces hold nothing: no force, no energy, no coordinate; what they held is booked as lost."""
+    basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
+    for name in ("plastic", "bonds"):
+        law = LAWS[name]
+        done = wrench.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), law, 6, 400, 6,
+                            start=Start([0, 5e-7], [0, 0.0]), shear=reduced(crowned(), law))
+        r = done.response
+        apart = r.extra["normal_load"] == 0
+        assert 0.02 < apart.mean() < 0.95 and not r.force[apart].any()
+        assert r.extra["ledger"][1][apart].max() <= 1e-20 * r.extra["ledger"][1].max()
+        assert balance(done, basis) <= 1e-11 and done.outcome is None and r.extra["ledger"][3][-1] == 0
+        assert np.abs(r.force).max() > 0.1 * 0.3 * LOAD and np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+
+
+@settings(max_examples=25)
+@given(st.sampled_from(["plastic", "bonds", "growing"]), st.integers(0, 10**6), st.sampled_from([60, 200]),
+       st.sampled_from([2, 6, 21]), st.sampled_from([1e-9, 3e-8, 1.5e-7]))
+def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, depth):
+    """Random modes, starts, drives and reductions, coarse steps, bouncing: the balance closes, every step loses, the
+    work of the holder is what is stored and lost, and no force exceeds mu N."""
+    rng = np.random.default_rng(seed)
+    n = rng.integers(1, 5)
+    basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
+                  rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)
+    drive, law = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143), LAWS[name]
+    done = wrench.march(basis, drive, crowned(), law, 3, steps, 3, shear=reduced(crowned(), law, count, depth),
+                        start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)))
+    r = done.response
+    assert done.outcome is None, done.message
+    assert balance(done, basis) <= 1e-11
+    work, held, spent, created = r.extra["ledger"]
+    assert created[-1] == 0 and (np.diff(spent) >= -1e-12 * done.ledger["peak_stored"]).all()
+    assert work[-1] == pytest.approx(held[-1] + spent[-1], rel=1e-9, abs=1e-12 * done.ledger["peak_stored"])
+    assert done.ledger["friction"] == pytest.approx(spent[-1], abs=1e-9 * (spent[-1] + held[-1]) + 1e-18)
+    assert (np.abs(r.force) <= 0.3 * r.extra["normal_load"] + 1e-9 * LOAD).all()
+
+
+@pytest.mark.parametrize("count", [0, 6])
+def test_exact_a_fork_goes_on_by_itself(count):
+    """The twin of a run, forked after a cycle and marched after the run itself went on: the same samples."""
+    basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
+    law, drive = LAWS["bonds"], BaseSine(60.0, 2 * np.pi * 143)
+    shear = reduced(crowned(), law, count) if count else None
+    run = plain.fresh(basis, drive, wrench.wrench_model(basis, law, crowned(), None, shear), 200)
+    run.cycle(200, 0, [])
+    twin = run.fork(drive)
+    first, second = run.cycle(200, 0, [])[1], twin.cycle(200, 0, [])[1]
+    assert np.abs(first - second).max() <= 1e-13 * np.abs(first).max() and np.ptp(first[:, 0]) > 0
+
+
+def test_refuses_shear_beside_a_set_valued_law():
+    law = LAWS["plastic"]
+    for other in ("coulomb", "tanh"):
+        with pytest.raises(PatchfemError, match="elastic-plastic"):
+            wrench.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
+                                shear=reduced(crowned(), law, 4))
+    few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
+    with pytest.raises(PatchfemError, match="span every node"):
+        wrench.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
+
+
+@pytest.mark.parametrize("name", ["plastic", "bonds"])
+def test_order_two_of_pieces_that_give_way(name):
+    """Slide, heave and pitch in every mode, sets that change: the error falls by nearly four when the step is halved;
+    what springs back at the end of a step does not lower the order."""
+    basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
+    drive, law, ends = BaseSine(40.0, 2 * np.pi * 143), LAWS[name], []
+    for steps in (800, 1600, 3200, 6400):
+        done = wrench.march(basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8))
+        ends.append(np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega]))
+    change = np.abs(np.diff(ends, axis=0)).max(axis=1)
+    assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()
+    assert np.log2(change[0] / change[2]) / 2 == pytest.approx(2, abs=0.45)
