@@ -33,9 +33,9 @@ class ContactModel:
         r = contact.kappa.size
         scale = np.ones(1 + r)
         if r:
-            scale[1:] = self.limit / np.maximum(contact.psi.T @ (contact.weight * contact.source), 1e-300)
-            scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((contact.psi**2).mean(axis=0)))
-        work = hub.Work(np.zeros(1 + r), np.zeros(1 + r), np.zeros((1 + r, 1 + r)), np.zeros(contact.weight.size),
+            scale[1:] = self.limit / np.maximum(contact.psi @ (contact.weight * contact.source), 1e-300)
+            scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((contact.psi**2).mean(axis=1)))
+        work = hub.Work(np.zeros(1 + r), np.zeros(1 + r), np.zeros((1 + r, 1 + r)), np.zeros((3, contact.weight.size)),
                         np.zeros(1 + r), np.zeros(1 + r), scale, np.zeros((2, 1 + r)), np.full(1, self.length))
         return contact, work
 
@@ -84,7 +84,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     fields = {"force": [limit, limit, limit], "weight": law.static * area / law.length, "bonds": bonds,
               "source": sigma, "growth": growth_numbers(law)}
     if shear is not None:
-        fields |= {"psi": shear.shape, "kappa": shear.stiffness, "b": np.zeros(shear.stiffness.size)}
+        fields |= {"psi": np.asarray(shear.shape).T, "kappa": shear.stiffness, "b": np.zeros(shear.stiffness.size)}
     if pattern is not None:
         fields |= {"place": places, "x": pattern[0], "sigma": pattern[1]}
     return ContactModel(2, limit, fields, pattern is not None, law.length)

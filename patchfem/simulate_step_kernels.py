@@ -36,7 +36,7 @@ class Contact(NamedTuple):
     force: (static or scale, kinetic, bound) [N]; of a rate law (limit [N], v_0 [m/s], limit). Jenkins: stretch,
     stiffness, limit (t,), now (3,) = force, energy, mean stretch. Points: weight (m,) = mu_s area/eps_0, bonds (4, m)
     = m, z, s2, local slide, and play (5, m) where bonds stretch freely over the share growth[5] of their length;
-    source (m,), shear modes psi (m, r), kappa (r,), b (r,).
+    source (m,), shear modes psi (r, m), kappa (r,), b (r,).
     List: bondlist (10, capacity), now (6,), tally (12,), law (24,), table (k,) as in friction.bond_kernels, or
     summed over place, as in simulate_list_kernels. growth of eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
@@ -64,12 +64,13 @@ class Contact(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Scratch of the step solve: y = (dq, db), residual, Hessian, slopes, trial point, scales, last two steps, eps."""
+    """Scratch of the step solve: y = (dq, db), residual, Hessian, points (3, m), trial point, scales, last two steps,
+    eps."""
 
     y: np.ndarray
     out: np.ndarray
     hess: np.ndarray
-    slope: np.ndarray
+    points: np.ndarray
     trial: np.ndarray
     other: np.ndarray
     scale: np.ndarray
@@ -178,51 +179,56 @@ def solve_scalar(free, beta, guess, kind, c, eps, dt, goal):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def residual(y, free, beta, c, eps, out, slope):
-    """Residual (1 + r,) of the step with shear modes, y = (dq, db), and the slope (m,) of every point [N/m].
+def residual(y, free, beta, c, eps, out, points):
+    """Residual (1 + r,) of the step with shear modes, y = (dq, db), and the slope points[0] of every point [N/m];
+    points (3, m). Loops run over the points, which lie side by side.
 
     beta = 0: the slide is given, dq = free. Returns the friction force [N].
     """
     weight, psi, kappa, b = c.weight, c.psi, c.kappa, c.b
-    r = kappa.size
+    m, r = weight.size, kappa.size
+    for j in range(m):
+        points[1, j] = y[0]
     for k in range(r):
-        out[k + 1] = kappa[k] * (b[k] + 0.5 * y[k + 1])
+        moved = y[k + 1]
+        for j in range(m):
+            points[1, j] -= psi[k, j] * moved
     force = 0.0
-    for j in range(weight.size):
-        xi = y[0]
-        for k in range(r):
-            xi -= psi[j, k] * y[k + 1]
-        mean, gain = point_mean(c, j, xi, eps)
-        f = weight[j] * mean
-        slope[j] = weight[j] * gain
-        force += f
-        for k in range(r):
-            out[k + 1] -= psi[j, k] * f
+    for j in range(m):
+        mean, gain = point_mean(c, j, points[1, j], eps)
+        points[0, j] = weight[j] * gain
+        points[2, j] = weight[j] * mean
+        force += points[2, j]
+    for k in range(r):
+        pull = 0.0
+        for j in range(m):
+            pull += psi[k, j] * points[2, j]
+        out[k + 1] = kappa[k] * (b[k] + 0.5 * y[k + 1]) - pull
     out[0] = (y[0] - free) / beta + force if beta > 0 else 0.0
     return force
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def hessian(beta, c, slope, hess):
-    """Hessian (1 + r, 1 + r) at the slopes of the points, whole rows of modes (they vectorise), the lower half of the
-    rest; beta = 0: the slide is given."""
+def hessian(beta, c, points, hess):
+    """Lower half of the Hessian (1 + r, 1 + r) at the slopes points[0] (m,); beta = 0: the slide is given."""
     psi, kappa = c.psi, c.kappa
-    r = kappa.size
-    hess[:] = 0.0
-    hess[0, 0] = 1 / beta if beta > 0 else 1.0
+    m, r = c.weight.size, kappa.size
+    total = 0.0
+    for j in range(m):
+        total += points[0, j]
+    hess[0, 0] = 1 / beta + total if beta > 0 else 1.0
     for k in range(r):
-        hess[k + 1, k + 1] = 0.5 * kappa[k]
-    for j in range(slope.size):
-        if beta > 0:
-            hess[0, 0] += slope[j]
-            for l in range(r):
-                hess[0, l + 1] -= slope[j] * psi[j, l]
-        for k in range(r):
-            sp = slope[j] * psi[j, k]
-            for l in range(r):
-                hess[k + 1, l + 1] += sp * psi[j, l]
-    for k in range(r):
-        hess[k + 1, 0] = hess[0, k + 1]
+        total = 0.0
+        for j in range(m):
+            points[1, j] = points[0, j] * psi[k, j]
+            total += points[1, j]
+        hess[k + 1, 0] = -total if beta > 0 else 0.0
+        for l in range(k + 1):
+            dot = 0.0
+            for j in range(m):
+                dot += points[1, j] * psi[l, j]
+            hess[k + 1, l + 1] = dot
+        hess[k + 1, k + 1] += 0.5 * kappa[k]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -263,19 +269,19 @@ def weighted(out, scale):
 def solve_modes(y, free, beta, c, eps, goal, work):
     """Newton with step halving on y = (dq, db) in place. Returns (F, iterations), iterations < 0 when it failed."""
     out, hess, trial, other, scale = work.out, work.hess, work.trial, work.other, work.scale
-    force = residual(y, free, beta, c, eps, out, work.slope)
+    force = residual(y, free, beta, c, eps, out, work.points)
     size = weighted(out, scale)
     for count in range(1, 60):
         if size <= goal:
             return force, count
-        hessian(beta, c, work.slope, hess)
+        hessian(beta, c, work.points, hess)
         if not cholesky_solve(hess, out):
             return force, -count
         part = 1.0
         for _ in range(30):
             for i in range(y.size):
                 trial[i] = y[i] - part * out[i]
-            force = residual(trial, free, beta, c, eps, other, work.slope)
+            force = residual(trial, free, beta, c, eps, other, work.points)
             new = weighted(other, scale)
             if new < (1 - 0.1 * part) * size or new <= goal:
                 break
@@ -339,7 +345,7 @@ def commit(dq, force, v0, v1, dt, kind, c, work, middle, q0, follow):
     for j in range(weight.size):
         xi = dq
         for k in range(b.size):
-            xi -= psi[j, k] * y[k + 1]
+            xi -= psi[k, j] * y[k + 1]
         if bonds.shape[0] > 4:
             m, z, s2, play, part = loose_step(bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j], c.growth[5] * middle,
                                               xi, source[j], middle)

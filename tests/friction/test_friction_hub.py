@@ -110,7 +110,7 @@ def test_exact_shear_modes_are_the_full_tangential_compliance(stiffness):
     assert forces[:-1, 1] == pytest.approx(want[:, 0], abs=1e-10)
     assert forces[1:, 0] == pytest.approx(want[:, 1], abs=1e-9)
     assert burnt[:-1, 0] == pytest.approx(want[:, 2], abs=1e-9)
-    assert contact.psi @ contact.b == pytest.approx(deflection, abs=1e-9)
+    assert contact.b @ contact.psi == pytest.approx(deflection, abs=1e-9)
 
 
 def test_exact_ledger_with_shear_modes():
