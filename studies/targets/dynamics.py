@@ -3,12 +3,10 @@
 All of accuracy. Of the times (CPU seconds of one core, a busy machine, least of several turns) those of the event
 engine: 1.6 us for a cycle of stick-slip in a long run (wanted 3), 1400 to 1600 times less than DOP853 with events at
 1e-8 and 650 to 850 times less than the fastest CVODE run (300), 19 ms for 200 cycles in plain Python (20), 6.8 us for
-a steady point (10, 80 times less than its plain form). Of the march 0.7 us per step for 200 points of bonds on ten
-modes (3); harmonic balance of 100 elements with 15 harmonics takes 1.0 to 1.3 ms a point (5), 25 times less than 200
-cycles of the march. Missed: 100 elements on five modes 380 to 400 ns (200), 480 to 530 with the samples and energies
-that a run keeps, 30 elements on ten modes 360 to 370 ns (300), of which a single element on one mode takes 250
-already: what a step books costs more than the elements, 1 to 1.5 ns each. 16 shear modes are on the edge, 14.5 to
-19.5 us (15).
+a steady point (10, 80 times less than its plain form). Of the march 195 ns per step for 100 elements on five modes
+(200; 300 with the samples and energies that a run keeps), 185 ns for 30 elements on ten modes (300), 0.74 us for 200
+points of bonds on ten modes (3) and 11 us with 16 shear modes (15). Harmonic balance of 100 elements with 15 harmonics
+takes 1.2 ms a point (5), 12 to 25 times less than 200 cycles of the march.
 
 Run: python studies/targets/dynamics.py [--alone]      (--alone: without the peers that are not Python's own)
 """
