@@ -22,11 +22,11 @@ from .response.measures import (
 )
 from .simulate_acting import acting
 from .simulate_interfaces import yaws
+from .simulate_methods import COMPARED, engine_of, unique_steps
 from .simulate_structure import highest_frequency, mode_stiffness
 from .simulate_wrench_scene import acts
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
-COMPARED = ("duhamel", "newmark", "euler")
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 LEAST_KEPT = 100  # samples of a run that has no cycles
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
@@ -139,64 +139,6 @@ def choose(scene, per_point: bool = False) -> Settings:
                     frozenset(pinned))
 
 
-def unique_steps(scene, drive) -> int:
-    """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
-    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
-    f = scene.friction
-    if f is None or f.law != "nonlocal" or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
-        return 0
-    from .simulate_plan import nominal_load
-
-    modes = modes_of(scene)
-    stiff = f.static * nominal_load(scene) / f.bond_length * (f.static / f.kinetic - 1)
-    return 2 * int(np.ceil(0.55 * drive.period * sqrt(stiff * float(np.sum(modes.slide**2)) / (2 * modes.mass))))
-
-
-def engine_of(scene, drive, side: str) -> str:
-    """"exact" where a closed form exists, else "march", or the method that the scene names."""
-    method, f, contact = scene.accuracy.method, scene.friction, scene.contact
-    shear = contact.gives_way if contact is not None else ""
-    if method in COMPARED:
-        if shear:
-            raise PatchfemError(f"{scene.where('accuracy.method')}: '{method}' takes an interface as a whole, not "
-                                f"{shear}; use method = \"march\"")
-        return method
-    if method == "harmonic":
-        return method
-    why = no_closed_form(scene, drive, shear)
-    if method == "exact" and why:
-        raise PatchfemError(f"{scene.where('accuracy.method')}: no exact solution exists {why}; use method = \"march\"")
-    if not why and method != "march":
-        return "exact"
-    if f is not None:
-        _refuse(scene, shear, side)
-    if side == "lower" and scene.accuracy.quadrature not in ("auto", "recursion"):
-        raise PatchfemError(f"{scene.path}: accuracy.quadrature: '{scene.accuracy.quadrature}' with pressure on the "
-                            "lower piece in the rig: not yet built; use \"recursion\" or the upper piece")
-    return "march"
-
-
-def no_closed_form(scene, drive, shear: str) -> str:
-    """Why a run has no exact solution; empty where it has one."""
-    f, structure = scene.friction, scene.structure
-    laws = [one.law for one in structure.interface] or ([f.law] if f is not None else [])
-    if odd := [law for law in laws if law not in ("coulomb", "convolution")]:
-        return f"for law '{odd[0]}'{f' with {shear}' if shear else ''}"
-    if shear and laws:
-        return f"with {shear}"
-    if acts(scene):
-        return "under a load that changes"
-    if yaws(scene) and scene.drive.waveform == "levels":
-        return "with strips that yaw, level by level"
-    if not drive.segments:
-        return f"under a drive of waveform '{scene.drive.waveform}'"
-    if structure.stiffening is not None:
-        return "with [structure.stiffening]"
-    if structure.bonded is not None and structure.bonded.wavelength is not None:
-        return "with structure.bonded.wavelength"
-    return ""
-
-
 def quadrature_of(scene, settings: Settings, drive):
     """The engines.Choice of a nonlocal law; a stroke is taken as the drive's own amplitude."""
     from .friction.engines import choose as engine_for
@@ -206,17 +148,6 @@ def quadrature_of(scene, settings: Settings, drive):
     stroke = max(4 * speed / simulate_drive.omega_of(drive) / law.length, 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engine_for(law, accuracy.tolerance, stroke, settings.steps / 2, accuracy.quadrature, tail, accuracy.merge)
-
-
-def _refuse(scene, shear: str, side: str) -> None:
-    f = scene.friction
-    recursion = f.law == "nonlocal" and f.reading == "stretch" and f.order == 1
-    if side == "lower" and (shear or not recursion):
-        what = shear if shear else f"law '{f.law}' other than the stretch reading with order = 1"
-        raise PatchfemError(f"{scene.path}: pressure on the lower piece with {what} in the rig: not yet built; "
-                            "put the shapes on the upper piece")
-    if shear and f.law == "nonlocal" and not recursion:
-        raise PatchfemError(f"{scene.path}: {shear} with order = {f.order:g}: not yet built; use order = 1")
 
 
 def contact_model(scene, settings: Settings, patch, drive):

@@ -32,7 +32,7 @@ def steady(scene, settings, modes, drive, patch, load: float, say=None):
     """(simulate_rig.Raw, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on
     a curve over a sweep or over levels, whose sine is extra["at"]."""
     refuse(scene, drive)
-    from .simulate_rig import no_closed_form
+    from .simulate_methods import no_closed_form
 
     sine = drive if isinstance(drive, BaseSine) else None
     shear = scene.contact.gives_way if scene.contact is not None else ""
