@@ -27,16 +27,14 @@ class Kind(str):
 
 
 LARGEST = 1e50  # SI; its fourth power and what is multiplied with it stay within double precision
+DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubic stiffness", "sweep rate"}  # of a rig
 
 
-def _within(value: float) -> float:
-    if value and not 1 / LARGEST <= abs(value) <= LARGEST:
-        raise ValueError(f"{value:g} in SI is beyond what can be computed with; 0 or a size from {1 / LARGEST:g} to "
+def _within(value: float, least: float) -> float:
+    if value and not least <= abs(value) <= LARGEST:
+        raise ValueError(f"{value:g} in SI is beyond what can be computed with; 0 or a size from {least:g} to "
                          f"{LARGEST:g} is wanted")  # fmt: skip
     return value
-
-
-Within = AfterValidator(_within)
 
 
 def quantity(kind: str, **limits: float) -> Any:
@@ -44,13 +42,13 @@ def quantity(kind: str, **limits: float) -> Any:
     schema = {"type": "string", "examples": [EXAMPLES[kind]]}
     return Annotated[
         float, Kind(kind), BeforeValidator(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits),
-        Within,
+        AfterValidator(partial(_within, least=1 / LARGEST if kind in DIVIDED_BY else 0.0)),
     ]
 
 
 def number(**limits: float) -> Any:
     """The type of a key that holds a plain finite number within limits; neither a text nor a boolean."""
-    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), Within]
+    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), AfterValidator(partial(_within, least=0.0))]
 
 
 def whole(least: int) -> Any:
