@@ -34,14 +34,17 @@ def march_follow(first, steps, state, modes, prop, table, mass, c, work, goal, t
             break
         at = (first + i) % around
         free = free_slide(state, reach, 0, table, at)
-        dq, force, count, middle = 0.0, 0.0, 0, 0.0
+        dq, force, count, middle, change = 0.0, 0.0, 0, 0.0, 0.0
         guess = free if abs(free) < 1e-3 else 0.0
         for _ in range(21):
             sources(c, q, guess)
             dq, force, count, middle = contact_step(free, beta, v, dt, POINTS, c, work, goal)
-            if abs(dq - guess) <= 1e-12 * (abs(dq) + 1e-12):
-                break
+            change = abs(dq - guess)
             guess = dq
+            if change <= 1e-12 * (abs(dq) + 1e-12):
+                break
+        if change > max(1e-12 * (abs(dq) + 1e-12), beta * goal):
+            count = -abs(count)  # place and pressure still disagree: booked as a missed step
         used = (free - dq) / beta
         tell(count, used * dq, ledger)
         push_back(used, slide, mass, accel)

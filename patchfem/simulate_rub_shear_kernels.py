@@ -22,6 +22,7 @@ from .simulate_rub_kernels import (
     spring_mean,
     spring_step,
 )
+from .simulate_step_kernels import weighted
 
 GRADIENT, STEP, TRIAL = range(3)
 TIGHT = 0.001  # share of the goal down to which a residual is brought
@@ -208,15 +209,6 @@ def descend(y, free, beta, kind, rub, ending, goal):
         if stall >= 4 and size <= goal:
             return force, count
     return force, -200
-
-
-@njit(error_model="numpy", **LEAN)
-def weighted(out, scale):
-    """Largest residual as a force: those of the coordinates times what they stand for."""
-    worst = abs(out[0])
-    for k in range(1, out.size):
-        worst = max(worst, abs(out[k]) * scale[k])
-    return worst
 
 
 @njit(error_model="numpy", **LEAN)

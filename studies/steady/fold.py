@@ -111,7 +111,7 @@ def picture(steady: Curve, sweeps: list, path: Path = HERE / "fold.svg") -> Path
         for s in sweeps:
             colour, name = (ORANGE, "up") if s.up else (GREY, "down")
             if s.rate == slow:
-                left.plot(s.frequency[::5], 1e3 * s.amplitude[::5], ".", color=colour, ms=1.5)
+                left.plot(s.frequency[::5], 1e3 * s.amplitude[::5], ".", color=colour, ms=1.5, rasterized=True)
                 left.plot([], [], ".", color=colour, label=f"marched {name}, {s.rate:g} Hz/s")
         for part, style in ((steady.stable, "-"), (~steady.stable, "--")):
             near = part | np.roll(part, 1) | np.roll(part, -1) if style == "--" else part
@@ -124,7 +124,7 @@ def picture(steady: Curve, sweeps: list, path: Path = HERE / "fold.svg") -> Path
             right.plot([s.rate**(2 / 3) for s in mine], [s.jump for s in mine], "o-", color=colour, ms=4)
             right.plot([0], [fold], "x", color=BLUE)
         right.set(xlabel="rate$^{2/3}$ [(Hz/s)$^{2/3}$]", ylabel="jump [Hz] (x: folds)")
-        figure.savefig(path, metadata={"Date": None})
+        figure.savefig(path, dpi=200, metadata={"Date": None})
     return path
 
 
