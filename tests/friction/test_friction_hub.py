@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from patchfem.compiled import load_kernels
 from patchfem.contact.slip import jenkins_set, shear_modes
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import BaseSine, ModalBasis, Outcome
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.law import Bonds
 from patchfem.friction.quadrature import Quadrature
@@ -222,6 +222,19 @@ def test_exact_march_with_a_pressure_on_the_lower_piece_replayed():
     run = walk(Recursion(law), path, lambda q: np.interp(x + q, x, sigma, left=0.0, right=0.0))
     assert np.ptp(path) > 5e-6 and (run.traction == 0).any()
     assert got.window.force[1:] == pytest.approx(run.traction @ area, abs=1e-9 * limit)
+
+
+def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
+    """Steps longer than the waves of the pressure: where the new bonds' pressure and the slide do not settle, it is
+    said; steps that follow the waves settle all."""
+    x = np.linspace(-30e-6, 30e-6, 1201)
+    sigma, area = 1e6 * np.maximum(0.0, 0.3 + np.sin(x / 1e-6)), np.full(1201, 1e-4 / 1201)
+    drive = BaseSine(1.5 * 0.4 * area @ sigma, OMEGA)
+    coarse, fine = (march(one_mode(OMEGA, 0.01, 1.0), drive, points_model(Bonds(0.4, 2e-6), area, sigma,
+                                                                          pattern=(x, sigma)), 2, steps, window=2)
+                    for steps in (12, 100))
+    assert coarse.outcome is Outcome.NOT_CONVERGED and "steps missed" in coarse.message
+    assert fine.outcome is None and fine.message == ""
 
 
 def test_exact_march_of_a_list_is_the_march_of_points():
