@@ -1,21 +1,27 @@
 """patchfem: from a scene file to the friction, the motion and the error of a rubbing contact patch.
 
-Read the package in the order of the physics; each stage imports `core` and itself, nothing else of ours:
+Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
-1. `core`        the nouns that travel between stages
-2. `scene`       a TOML file becomes SI values, every mistake named at once (`quantities`: the unit table)
-3. `effects`     which table of a scene needs which stage
-4. `mesh`        two coated pieces as one tagged mesh
-5. `surface`     measured or made height profiles as a share of the gap
-6. `contact`     elasticity condensed to the interface, unilateral contact, partial slip
-7. `friction`    local laws and the nonlocal quadrature over the path
-8. `structure`   the modes of the rig
-9. `dynamics`    drives, exact events, the march in time
-10. `response`    measures of a run and their errors
-11. `identify`   values of a scene from measurements, with intervals
-12. `export`     summary, netCDF, VTK, report
-13. `closed_forms` exact answers that tests, studies and users share
-14. `simulate`   the page where the stages meet
+1. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
+2. `effects`      which key of a scene needs which module and equation
+3. `compiled`     where compiled code is kept
+4. `closed_forms` exact answers that tests, studies and users share
+5. `scene`        a TOML file becomes SI values, every mistake named at once
+6. `inputs`       files of measurements: columns, slide paths, signals, loops
+7. `mesh`         two coated pieces as tagged meshes
+8. `surface`      measured or made height profiles as a share of the gap
+9. `elasticity`   the pieces condensed to their interface, fields recovered inside
+10. `contact`     gap shapes, unilateral contact, skins, strips, contact maps
+11. `friction`    laws of friction and the sum over bonds along the path
+12. `slip`        partial slip of the pieces: elements, shear modes, load paths
+13. `structure`   the modes of the rig and what drives it
+14. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+15. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
+16. `response`    measures of a run, outcome, events, levels, ringing
+17. `runs`        patch, bench and rig: where the pillars meet
+18. `identify`    values from measurements with intervals
+19. `campaigns`   many runs: fits, error against cost
+20. `export`      summary, netCDF, VTK, report
 """
 
 __version__ = "0.4.0"

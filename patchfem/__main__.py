@@ -29,7 +29,7 @@ def say(text: str) -> None:
 
 
 def _scene(path: Path, sets):
-    from .scene import load
+    from .scene.scene import load
 
     return load(path, sets)
 
@@ -39,7 +39,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(n
     """Name every mistake in SCENE and in the path it slides along; compute nothing."""
     found = _scene(scene, set_)
     if found.slide is not None and found.slide.file is not None:
-        from .simulate_slide import file_corners
+        from .model.slide import file_corners
 
         file_corners(found)
     for remark in found.remarks:
@@ -54,13 +54,13 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(n
 def plan(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
          probe: Annotated[bool, Parameter(negative=())] = False):
     """Say what SCENE would run and not, its size, cost, stiffness chain and groups; --probe solves the static patch."""
-    from .simulate_plan import plan as make
+    from .runs.plan import plan as make
 
     found = make(_scene(scene, set_))
     answer = found.as_json()
     if probe and found.scene.contact is not None:
-        from .simulate_measures import values
-        from .simulate_patch import solve_all
+        from .runs.patch.ladder import solve_all
+        from .runs.patch.values import values
 
         solved = values(solve_all(found.scene, False)[0])
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] \
@@ -99,8 +99,8 @@ def run(scene: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--
     if resume:
         raise Refused("run: --resume is not yet built; run the scene again")
     found = _scene(scene, set_)
-    from .simulate import plan as make
-    from .simulate_files import run_into
+    from .export.folder import run_into
+    from .runs.plan import plan as make
 
     talk = (lambda text: None) if quiet else say
     what = make(found)
@@ -162,11 +162,11 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     if found.contact is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
-    from .simulate_bodies import bodies_of
-    from .simulate_plan import chosen_mesh
+    from .model.accuracy import chosen_mesh
+    from .model.pieces import bodies_of
 
     if chosen_mesh(found):
-        from .simulate_patch import solve_all
+        from .runs.patch.ladder import solve_all
 
         pair = solve_all(found)[0].pair
         low, high = pair.grid, None if pair.upper is pair.piece else pair.upper_grid
@@ -182,7 +182,7 @@ def cost(scene: Path, /, *, over: str = "", out: Annotated[Path | None, Paramete
          set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
          quiet: Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())] = False):
     """Error against time of SCENE for a knob (--over element_size, steps_per_cycle, shear_modes), or for all it has."""
-    from .simulate_cost import KNOBS, cheapest, curve, knobs_of, turned_by
+    from .campaigns.cost import KNOBS, cheapest, curve, knobs_of, turned_by
 
     found = _scene(scene, set_)
     if over and over not in KNOBS:
@@ -216,8 +216,8 @@ def fit(scene: Path, /, *, to: Path, free: Annotated[tuple[str, ...], Parameter(
     """Fit keys of SCENE (--free table.key=low..high,...) to the measured loop --to FILE; rows that --hold names
     (column=value,...) are only predicted."""
     found = _scene(scene, set_)
-    from .simulate_fit import fit_loop
-    from .simulate_fit_files import fit_into
+    from .campaigns.fit import fit_loop
+    from .export.fit_folder import fit_into
 
     fitted = fit_loop(found, to, free, hold, None if quiet else say)
     target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
@@ -284,7 +284,7 @@ def main(argv: list | None = None) -> None:
 
 def _guarded(words: list) -> int:
     try:
-        from .scene import SceneError
+        from .scene.scene import SceneError
     except KeyboardInterrupt:
         return 130
     try:

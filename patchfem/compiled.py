@@ -48,7 +48,7 @@ def cache_folder() -> Path:
 
 
 def load(module: str, say=None):
-    """A module of compiled code of the package, such as "dynamics.event_kernels", its code cached on disk; `say` is
+    """A module of compiled code of the package, such as "dynamics.modal_kernels", its code cached on disk; `say` is
     told when nothing is there yet and it has to compile first."""
     if f"patchfem.{module}" not in sys.modules:
         folder = cache_folder()
@@ -62,5 +62,5 @@ def load(module: str, say=None):
 
 
 def load_kernels(say=None):
-    """The compiled hub `simulate_kernels`."""
-    return load("simulate_kernels", say)
+    """The compiled hub `dynamics.march.loop_kernels`."""
+    return load("dynamics.march.loop_kernels", say)

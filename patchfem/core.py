@@ -10,6 +10,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
+
 G_N = 9.80665  # standard gravity [m s-2]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from patchfem.scene import SceneError, loads
+from patchfem.scene.scene import SceneError, loads
 
 RIG = """\
 title = "143 Hz, 5 g"

@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from test_run import PATCH, POINT, SHEAR, cli
 
-from patchfem import simulate_bench as bench
-from patchfem.closed_forms import steady_bond_length
+from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.core import Missing, PatchfemError
-from patchfem.response.paths import read_path
-from patchfem.scene import SceneError, load, loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_slide import path_of, peak_speed, steps_of
+from patchfem.inputs.paths import read_path
+from patchfem.model.slide import path_of, peak_speed, steps_of
+from patchfem.runs.bench import bench
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, load, loads
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
 NONLOCAL = """[friction]
@@ -212,7 +213,7 @@ def test_always_more_steps_than_rows_and_rows_are_samples(table):
 @given(st.lists(st.tuples(st.floats(1e-6, 10), st.floats(-1e-3, 1e-3)), min_size=1, max_size=20),
        st.integers(1, 500))
 def test_always_the_corners_stand_in_the_cut_path(legs, steps):
-    from patchfem.simulate_slide import _cut
+    from patchfem.model.slide import _cut
 
     time = np.append(0, np.cumsum([leg[0] for leg in legs]))
     slide = np.append(0, [leg[1] for leg in legs])

@@ -22,12 +22,12 @@ SCENE = (
 )
 MARCH = """\
 import json, sys
-import patchfem.simulate as simulate
+import patchfem.runs.run as simulate
 from patchfem.compiled import load, load_kernels
-from patchfem.scene import loads
+from patchfem.scene.scene import loads
 said = []
 result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estimate=False)
-hub, loop = load_kernels(), load("simulate_jenkins_kernels").march_jenkins
+hub, loop = load_kernels(), load("dynamics.march.jenkins_kernels").march_jenkins
 print(json.dumps({"amplitude": result.measures["relative_displacement_amplitude"].value,
                   "peak": result.measures["friction_force_peak"].value, "home": simulate.__file__, "said": said,
                   "missed": sum(sum(f.stats.cache_misses.values()) for f in (loop, hub.contact_state)),

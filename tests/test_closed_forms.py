@@ -12,6 +12,13 @@ from scipy.optimize import brentq
 from scipy.special import gamma
 
 from patchfem import closed_forms as exact
+from patchfem.closed_forms.dynamics import (
+    bounded_input,
+    decay_rest,
+    sliding_amplitude,
+    two_stop_amplitude,
+    two_stop_relation,
+)
 
 GAUSS = np.polynomial.legendre.leggauss(20)
 HERTZ = {"line_load": 1e5, "radius": 1.0, "modulus": 6.74e10}
@@ -248,26 +255,26 @@ def test_exact_decay_by_an_integrator_with_events(start, friction, omega):
     times = np.linspace(0, 25 / omega, 400)
     want, stop, place = _coulomb_ivp(start, friction, omega, times)
     assert np.abs(exact.decay(times, start, friction, omega) - want).max() <= 1e-8 * abs(start)
-    assert exact.decay_rest(start, friction, omega) == pytest.approx((stop, place), abs=1e-7)
+    assert decay_rest(start, friction, omega) == pytest.approx((stop, place), abs=1e-7)
 
 
 @pytest.mark.parametrize("start, friction, omega, time, place", [
     (11.5, 1, 1, 6 * np.pi, -0.5), (11, 1, 1, 5 * np.pi, -1), (11 + 1e-9, 1, 1, 6 * np.pi, -0.999999999),
     (1, 0.125, 1, 4 * np.pi, 0), (1, 0.13, 1, 4 * np.pi, -0.04), (1, 1 / 15, 2, 3.5 * np.pi, -1 / 15), (1, 1, 1, 0, 1)])
 def test_exact_rest_of_3_11_with_the_count_rounded_up(start, friction, omega, time, place):
-    assert exact.decay_rest(start, friction, omega) == pytest.approx((time, place), abs=1e-12)
+    assert decay_rest(start, friction, omega) == pytest.approx((time, place), abs=1e-12)
     assert exact.decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx([place, place], abs=1e-12)
 
 
 def test_exact_decay_as_printed_would_rest_off_the_elastic_line():
     """With N_0 = 5.25 unrounded, x_0 = 11.5 F/k would rest at 1.0 F/k in size; the oscillator rests at -0.5."""
     raw = (11.5 - 1) / 2
-    assert abs(11.5 - 2 * raw) == 1.0 and exact.decay_rest(11.5, 1.0, 1.0)[1] == -0.5
+    assert abs(11.5 - 2 * raw) == 1.0 and decay_rest(11.5, 1.0, 1.0)[1] == -0.5
 
 
 @given(st.floats(-20, 20), st.floats(0.01, 2), st.floats(0.1, 10))
 def test_always_a_decay_rests_inside_the_friction_band_and_is_continuous(start, friction, omega):
-    stop, place = exact.decay_rest(start, friction, omega)
+    stop, place = decay_rest(start, friction, omega)
     assert abs(place) <= friction * (1 + 1e-9) or (stop == 0 and place == start)
     near = exact.decay(np.array([max(stop - 1e-7 / omega, 0), stop]), start, friction, omega)
     assert abs(near[1] - near[0]) <= 1e-9 * (abs(start) + friction)
@@ -276,9 +283,9 @@ def test_always_a_decay_rests_inside_the_friction_band_and_is_continuous(start, 
 @pytest.mark.parametrize("r, friction, damping, want", [
     (1, 0.5, 0.003, 60.5632260810004979), (1, 2 / 3, 0.003, 25.1953787788816), (1, 4 / 7, 0.003, 45.4055793050063)])
 def test_exact_sliding_amplitude_at_resonance(r, friction, damping, want):
-    assert exact.sliding_amplitude(r, friction, damping) == pytest.approx(want, rel=1e-11)
+    assert sliding_amplitude(r, friction, damping) == pytest.approx(want, rel=1e-11)
     harmonic = (1 - 4 * friction / np.pi) / (2 * damping)
-    assert exact.sliding_amplitude(r, friction, damping) == pytest.approx(harmonic, rel=1e-4)
+    assert sliding_amplitude(r, friction, damping) == pytest.approx(harmonic, rel=1e-4)
 
 
 @pytest.mark.parametrize("hertz, input_g, bare, damped", [
@@ -286,16 +293,16 @@ def test_exact_sliding_amplitude_at_resonance(r, friction, damping, want):
 def test_exact_sliding_amplitude_is_den_hartog(hertz, input_g, bare, damped):
     r, friction = hertz / 143, 4 / input_g
     u = np.sin(np.pi / r) / (r * (1 + np.cos(np.pi / r)))
-    got = exact.sliding_amplitude(r, friction)
+    got = sliding_amplitude(r, friction)
     assert got == pytest.approx(np.sqrt(1 / (1 - r * r)**2 - (u * friction)**2), rel=1e-12)
     assert got == pytest.approx(bare, abs=6e-6)
-    assert exact.sliding_amplitude(r, friction, 0.003) == pytest.approx(damped, abs=6e-6)
+    assert sliding_amplitude(r, friction, 0.003) == pytest.approx(damped, abs=6e-6)
 
 
 @pytest.mark.parametrize("r, friction, damping", [(135 / 143, 4 / 6, 0.003), (1.0, 0.5, 0.003), (155 / 143, 0.5, 0.05)])
 def test_exact_sliding_amplitude_by_shooting_half_a_cycle(r, friction, damping):
     """From the turn at +A some drive phase must bring the block to rest at -A half a drive period later."""
-    top = exact.sliding_amplitude(r, friction, damping)
+    top = sliding_amplitude(r, friction, damping)
 
     def end(phase):
         run = solve_ivp(lambda t, y: [y[1], np.cos(r * t + phase) + friction - y[0] - 2 * damping * y[1]],
@@ -312,13 +319,13 @@ def test_exact_sliding_amplitude_by_shooting_half_a_cycle(r, friction, damping):
 @pytest.mark.parametrize("hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)])
 def test_exact_knee_of_the_sliding_motion(hertz, knee):
     """The motion without stops begins at a/f = 1.2466 ... 1.3337 (damping 0.003), to 5e-4."""
-    assert exact.sliding_amplitude(hertz / 143, 1 / (knee + 5e-4), 0.003) > 0
+    assert sliding_amplitude(hertz / 143, 1 / (knee + 5e-4), 0.003) > 0
     with pytest.raises(ValueError):
-        exact.sliding_amplitude(hertz / 143, 1 / (knee - 5e-4), 0.003)
+        sliding_amplitude(hertz / 143, 1 / (knee - 5e-4), 0.003)
 
 
 def test_exact_bounded_input_is_four_over_pi():
-    assert exact.bounded_input(4.0) == pytest.approx(5.09295817894, rel=1e-11)
+    assert bounded_input(4.0) == pytest.approx(5.09295817894, rel=1e-11)
 
 
 @pytest.mark.parametrize("friction, want, within", [
@@ -326,11 +333,11 @@ def test_exact_bounded_input_is_four_over_pi():
     (0.8, 0.299431041748427515, 1e-12), (0.79, 0.435537658848, 1e-11), (0.786, 0.599134, 1e-6),
     (np.pi / 4 + 1e-6, 0.76259, 1e-5)])
 def test_exact_two_stop_amplitude(friction, want, within):
-    assert exact.two_stop_amplitude(friction) == pytest.approx(want, abs=within)
+    assert two_stop_amplitude(friction) == pytest.approx(want, abs=within)
 
 
 def test_exact_two_stop_amplitude_of_015_needs_082884():
-    found = brentq(lambda d: exact.two_stop_amplitude(d) - 0.15, 0.8, 0.9, xtol=1e-12)
+    found = brentq(lambda d: two_stop_amplitude(d) - 0.15, 0.8, 0.9, xtol=1e-12)
     assert found == pytest.approx(0.828843, abs=1e-6)
 
 
@@ -345,13 +352,13 @@ def test_exact_two_stop_amplitude_near_onset_in_60_digits(miss):
         friction = mpmath.mpf(1 - miss)
         s = mpmath.findroot(lambda s: ends(s)[0] - friction, mpmath.sqrt(18 * miss))
         want = float(ends(s)[1])
-    assert exact.two_stop_amplitude(1 - miss) == pytest.approx(want, rel=2e-7)
+    assert two_stop_amplitude(1 - miss) == pytest.approx(want, rel=2e-7)
 
 
 @pytest.mark.parametrize("slip", [0.5, 1.5, 2.4726, 3.0])
 def test_exact_two_stop_relation_by_integrating_the_slip(slip):
     """u'' + u = sin T + f from the release at -A: after `slip` the block must stand at +A."""
-    friction, top = exact.two_stop_relation(slip)
+    friction, top = two_stop_relation(slip)
     start = np.arcsin(friction - top)
     run = solve_ivp(lambda t, y: [y[1], np.sin(t) - friction - y[0]], (start, start + slip), [-top, 0.0],
                     method="DOP853", rtol=1e-12, atol=1e-14)
@@ -359,9 +366,9 @@ def test_exact_two_stop_relation_by_integrating_the_slip(slip):
 
 
 def test_exact_two_stop_limits():
-    assert exact.two_stop_amplitude(1.0) == 0 and exact.two_stop_amplitude(0.785) == np.inf
-    assert exact.two_stop_amplitude(np.pi / 4) == pytest.approx(np.pi / 4, abs=1e-12)
-    friction, top = exact.two_stop_relation(np.pi - 1e-6)
+    assert two_stop_amplitude(1.0) == 0 and two_stop_amplitude(0.785) == np.inf
+    assert two_stop_amplitude(np.pi / 4) == pytest.approx(np.pi / 4, abs=1e-12)
+    friction, top = two_stop_relation(np.pi - 1e-6)
     assert friction == pytest.approx(np.pi / 4, abs=1e-9) and top == pytest.approx(np.pi / 4, abs=1e-5)
 
 
@@ -375,8 +382,8 @@ def test_exact_two_stop_limits():
     lambda: exact.reversal_force(1.0, 1.0, -0.5), lambda: exact.reversal_force(1.0, 1.0, -1.5, "report"),
     lambda: exact.stretch_loop(0.0, 1.0), lambda: exact.report_loop(1.0, 0.0), lambda: exact.jenkins_loop(-1.0, 1.0),
     lambda: exact.decay(1.0, 1.0, 0.0, 1.0), lambda: exact.decay([-1.0], 1.0, 1.0, 1.0),
-    lambda: exact.sliding_amplitude(1.0, 0.5), lambda: exact.sliding_amplitude(1.0, 0.9, 0.003),
-    lambda: exact.sliding_amplitude(0.9, -0.1, 0.003), lambda: exact.two_stop_relation(np.pi)])
+    lambda: sliding_amplitude(1.0, 0.5), lambda: sliding_amplitude(1.0, 0.9, 0.003),
+    lambda: sliding_amplitude(0.9, -0.1, 0.003), lambda: two_stop_relation(np.pi)])
 def test_refuses_arguments_without_a_meaning(call):
     with pytest.raises(ValueError):
         call()

@@ -8,12 +8,14 @@ import sys
 import numpy as np
 import pytest
 
-from patchfem import simulate_grading as grading
 from patchfem.mesh.tensor import TensorGrid, coarser, finer
-from patchfem.scene import loads
-from patchfem.simulate_bodies import condensed
-from patchfem.simulate_measures import measures, remainder, values
-from patchfem.simulate_patch import pressed, solve_all
+from patchfem.runs.patch import grading
+from patchfem.runs.patch.condensed import condensed
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.patch.measures import measures, remainder
+from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.values import values
+from patchfem.scene.scene import loads
 
 PIECE = """\
 [contact]

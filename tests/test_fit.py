@@ -10,12 +10,12 @@ from command_line import cli
 from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
-from patchfem import simulate_bench as bench
+from patchfem.campaigns.fit import fit_loop
 from patchfem.core import PatchfemError
-from patchfem.response.loops import read_loop
-from patchfem.scene import SceneError, load, loads
-from patchfem.simulate_fit import fit_loop
-from patchfem.simulate_fit_files import fitted_scene
+from patchfem.export.fit_folder import fitted_scene
+from patchfem.inputs.loops import read_loop
+from patchfem.runs.bench import bench
+from patchfem.scene.scene import SceneError, load, loads
 
 LOAD = 100.0
 POINT = '[normal]\nload = "100 N"\n'

@@ -9,8 +9,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from patchfem.core import PatchfemError
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 W = 2 * pi * 100  # rad/s, of 1 kg
 LOAD = 100.0

@@ -5,8 +5,9 @@ import pytest
 from scene_texts import BENCH, PATCH, RIG, only
 from scipy.integrate import solve_ivp
 
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 STIFF, LIMIT = 5e6, 0.3 * 26 * 4.4482216152605
 PIECE = PATCH + BENCH[BENCH.index("[friction]"):]

@@ -41,8 +41,9 @@ speed = "5 mm/s"
 MODULES = "import json, sys; print(json.dumps(sorted(sys.modules)))"
 FROM_PYTHON = f"""\
 import sys
-from patchfem.scene import load
-from patchfem.simulate import plan, run
+from patchfem.scene.scene import load
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
 result = run(plan(load(sys.argv[1])))
 assert result.measures
 {MODULES}
@@ -85,10 +86,11 @@ def scene(tmp_path):
 
 def test_exact_a_patch_needs_no_motion(scene):
     modules = loaded(FROM_PYTHON, scene(PATCH))
-    absent(modules, "friction", "structure", "dynamics", "response", "simulate_rig", "simulate_march",
-           "simulate_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
-           "contact.mortar", "contact.substructure", "contact.fronts", "contact.halfspace", "contact.partial_slip",
-           "contact.maps", "contact.recovery", "mesh.anymesh", "mesh.rounded", "export")
+    absent(modules, "friction", "structure", "dynamics", "response", "runs.rig.march", "dynamics.march.march",
+           "dynamics.march.loop_kernels", "compiled", "surface", "contact.skin", "contact.skin_laws", "contact.strips",
+           "elasticity.mortar", "elasticity.substructure", "elasticity.fronts", "contact.halfspace",
+           "slip.partial_slip",
+           "contact.maps", "elasticity.recovery", "mesh.anymesh", "mesh.rounded", "export")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor", "skfem"} <= modules
 
 
@@ -99,50 +101,57 @@ def test_exact_a_patch_needs_no_motion(scene):
 def test_exact_an_effect_brings_its_own_module(scene, table, module):
     modules = loaded(FROM_PYTHON, scene(PATCH + table))
     assert f"patchfem.{module}" in modules
-    absent(modules, *{"contact.mortar", "surface", "contact.partial_slip"})
+    absent(modules, *{"elasticity.mortar", "surface", "slip.partial_slip"})
 
 
 def test_exact_a_rubbing_point_needs_no_patch(scene):
     modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE))
-    absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled")
-    assert {"patchfem.dynamics.events", "patchfem.structure.modes"} <= modules
+    absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
+           "dynamics.march.loop_kernels", "compiled")
+    assert {"patchfem.dynamics.events.events", "patchfem.structure.modes"} <= modules
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
     """One mode, one sine, one point: no masses, files, springs, wrench, other drives, other engines."""
     modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE))
     absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
-           "structure.bonded", "structure.identify", "dynamics.drives", "dynamics.duhamel", "dynamics.newmark",
-           "dynamics.euler", "dynamics.comparison", "dynamics.harmonic", "dynamics.steady", "dynamics.steady_events",
-           "dynamics.continuation", "dynamics.propagator", "simulate_slots", "simulate_wrench", "simulate_comparison",
-           "simulate_steady", "simulate_harmonic", "contact.atlas", "response.signals")
+           "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
+           "dynamics.comparison.newmark",
+           "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
+           "dynamics.events.steady", "dynamics.events.steady_events",
+           "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
+           "dynamics.march.varying_load", "runs.rig.comparison",
+           "runs.rig.steady", "dynamics.harmonic.balance", "contact.atlas", "inputs.signals")
     assert "pyuff" not in modules
 
 
 @pytest.mark.parametrize("lines, module", [
-    ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "simulate_slots"),
+    ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "dynamics.march.joints"),
     ('[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
-    ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.newmark"),
-    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.steady_events"),
+    ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.comparison.newmark"),
+    ('[accuracy]\nmethod = "harmonic"\n', "dynamics.events.steady_events"),
 ], ids=["stiffening", "bonded", "newmark", "harmonic"])
 def test_exact_a_rig_brings_what_it_names(scene, lines, module):
     modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE + lines))
     assert f"patchfem.{module}" in modules
-    others = {"simulate_slots", "structure.bonded", "dynamics.newmark", "dynamics.steady_events"} - {module}
+    others = {"dynamics.march.joints", "structure.bonded", "dynamics.comparison.newmark",
+              "dynamics.events.steady_events"} - {module}
     assert not {f"patchfem.{name}" for name in others} & modules
 
 
 def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
-    absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled")
-    assert "patchfem.dynamics.events" in modules
+    absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
+           "dynamics.march.loop_kernels", "compiled")
+    assert "patchfem.dynamics.events.events" in modules
 
 
 def test_exact_a_bench_needs_no_structure(scene):
     modules = loaded(FROM_PYTHON, scene(BENCH))
-    absent(modules, "contact", "mesh", "skfem", "simulate_patch", "simulate_march", "simulate_kernels", "compiled",
-           "dynamics.events", "dynamics.histories")
-    assert "patchfem.friction.local" in modules
+    absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
+           "dynamics.march.loop_kernels", "compiled",
+           "dynamics.events.events", "dynamics.events.histories")
+    assert "patchfem.friction.laws.elastic_plastic" in modules
 
 
 @pytest.mark.parametrize("text", [POINT + STRUCTURE, STRUCTURE, BENCH], ids=["rig", "linear", "bench"])

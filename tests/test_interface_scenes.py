@@ -8,8 +8,9 @@ import xarray as xr
 from command_line import cli
 
 from patchfem.response.events import MEANINGS
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 FIG16 = f"""\
 [structure]

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from patchfem.core import G_N, Outcome
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_rig import drive_of
+from patchfem.model.drive import drive_of
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 POINT = '[normal]\nload = "26 lbf"\n'
 MODE = """\
@@ -66,7 +67,7 @@ def done(tmp_path_factory):
                 words += ["accuracy.stick_speed=1e-6 m/s"]
             path = folder / "scene.toml"
             path.write_text(ENGINES[engine] + DRIVES[drive], "utf-8")
-            from patchfem.scene import load
+            from patchfem.scene.scene import load
 
             scene = load(path, words)
             kept[engine, drive] = scene, run(plan(scene), estimate=False)
@@ -120,7 +121,7 @@ def test_always_every_stop_and_release_is_kept(done, engine):
         return
     step = result.extra["steps_per_cycle"]
     from patchfem.response.events import detected
-    from patchfem.simulate_events import slips_of
+    from patchfem.response.run_events import slips_of
 
     short = loads(ENGINES[engine] + SINE.replace("cycles = 30", "cycles = 5"),
                   sets=["accuracy.method=march", f"accuracy.steps_per_cycle={step}"])

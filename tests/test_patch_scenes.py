@@ -7,16 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchfem import closed_contact
+from patchfem import closed_forms
 from patchfem.core import Outcome, PatchfemError, frozen_array
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_bodies import bodies_of, condensed
-from patchfem.simulate_measures import measures, plane_band, values
-from patchfem.simulate_patch import pressed, solve, solve_all
+from patchfem.model.pieces import bodies_of
+from patchfem.runs.patch.condensed import condensed
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.patch.measures import measures, plane_band
+from patchfem.runs.patch.press import pressed, solve
+from patchfem.runs.patch.values import values
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
 TEXT = """
@@ -54,13 +58,13 @@ def solved(*args, **kwargs) -> tuple:
 @pytest.mark.parametrize("angle", [1e-5, 1e-4, 1e-3])
 def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     _, found = solved(TILT.format(angle) + SKINS["exponential"], material=RIGID)
-    fraction, centre = closed_contact.wedge_skin(angle, LENGTH, 2.5e-6)
+    fraction, centre = closed_forms.wedge_skin(angle, LENGTH, 2.5e-6)
     assert found["loaded_fraction"] == pytest.approx(fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6)**2 / 11)
     assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
     assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)  # k_t follows the pressure
     assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
     _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
-    fraction, centre, _, most = closed_contact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
+    fraction, centre, _, most = closed_forms.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
     cell = 0.127e-3 / LENGTH
     assert found["contact_fraction"] == pytest.approx(fraction, abs=0.55 * cell)
     assert found["pressure_centre"] == pytest.approx(centre, rel=6e-4)
@@ -101,10 +105,10 @@ def test_exact_asperities_give_way_in_shear_without_the_pieces(law):
 @pytest.mark.parametrize("count", [2, 8])
 def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
     """Below the opening roll the pressure is linear over the width: the wedge's centre times 1 - 1/count^2."""
-    roll = 0.5 * closed_contact.wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    roll = 0.5 * closed_forms.wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
     tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\nroll = "{roll!r} rad"\n'
     patch, found = solved(tables, material=RIGID)
-    centre = closed_contact.wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
+    centre = closed_forms.wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
     assert found["pressure_centre_lateral"] == pytest.approx(centre * (1 - 1 / count**2), rel=1e-5)
     assert found["roll_moment"] == pytest.approx(LOAD * found["pressure_centre_lateral"], rel=1e-12)
     assert found["contact_fraction"] == pytest.approx(1.0, rel=1e-12)
@@ -115,7 +119,7 @@ def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
 def test_exact_strips_are_written_one_by_one(tmp_path):
     import xarray as xr
 
-    from patchfem.simulate_files import write
+    from patchfem.export.folder import write
 
     found = scene(TILT.format(1e-5) + '[contact.strips]\ncount = 3\nroll = "0.01 mrad"\n',
                   'load = "26 lbf"\nelement_size = "0.5 mm"')
@@ -196,7 +200,7 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
         assert mine[name] == pytest.approx(same[name], rel=0.02), name
     result = run(plan(found), estimate=False)
-    from patchfem.simulate_fields import write_fields
+    from patchfem.export.bodies import write_fields
 
     write_fields(result, tmp_path / "fields.vtkhdf")
     assert (tmp_path / "fields.vtkhdf").stat().st_size > 1e4
@@ -248,9 +252,9 @@ def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
     found = scene('[contact.crown]\nradius = "0.2 m"\n[accuracy]\ntolerance = 1e-2\n', 'load = "40 N"')
     series = solve_all(found)
     mine = measures(*series)
-    modulus = closed_contact.combined_modulus(210e9, 0.3, 210e9, 0.3)
-    half = closed_contact.hertz_half_width(40 / WIDTH, 0.2, modulus)
-    peak = closed_contact.hertz_peak(40 / WIDTH, 0.2, modulus)
+    modulus = closed_forms.combined_modulus(210e9, 0.3, 210e9, 0.3)
+    half = closed_forms.hertz_half_width(40 / WIDTH, 0.2, modulus)
+    peak = closed_forms.hertz_peak(40 / WIDTH, 0.2, modulus)
     assert series[0].x.size < 420 and half < 0.01 * LENGTH
     assert mine["pressure_peak"].value == pytest.approx(peak, rel=2e-3)
     assert mine["contact_half_width"].value == pytest.approx(half, rel=5e-3)
@@ -314,7 +318,7 @@ def test_exact_cost_times_every_value_and_measures_it_against_the_best(tmp_path,
 
 
 def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
-    from patchfem.simulate_cost import Cost, cheapest
+    from patchfem.campaigns.cost import Cost, cheapest
 
     def one(label, seconds, error):
         return Cost(label, 1.0, seconds, {"a": 1.0}, {"a": error}, {"a": "1"})

@@ -17,12 +17,14 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from patchfem import closed_forms, simulate_files, simulate_march
+from patchfem import closed_forms
 from patchfem.__main__ import NOT_BUILT
+from patchfem.closed_forms.dynamics import two_stop_amplitude
 from patchfem.core import G_N, Outcome
 from patchfem.effects import EFFECTS, NOT_YET_BUILT
-from patchfem.scene import load, loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import load, loads
 
 STUDIES = Path(__file__).parents[1] / "studies"
 LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143
@@ -243,7 +245,7 @@ def test_exact_linear_response(done):
 def test_exact_rig_at_a_point(done):
     answer = json.loads(done("rig")[1].out)["measures"]
     ratio = 0.3 * LOAD / 0.884 / (5 * G_N)
-    undamped = closed_forms.two_stop_amplitude(ratio) * 5 * G_N / OMEGA**2
+    undamped = two_stop_amplitude(ratio) * 5 * G_N / OMEGA**2
     assert answer["relative_displacement_amplitude"]["value"] == pytest.approx(undamped, rel=0.06)
     assert answer["friction_force_peak"]["value"] == pytest.approx(0.3 * LOAD, rel=1e-12)
     loop = closed_forms.coulomb_loop_area(answer["slip_amplitude"]["value"], 0.3 * LOAD)
@@ -454,10 +456,12 @@ def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
 @pytest.mark.parametrize("raised, code", [(KeyboardInterrupt(), 130), (MemoryError(), 4), (ValueError("odd"), 1),
                                           (PermissionError(13, "Permission denied", "x"), 4)])
 def test_exact_codes_of_interruptions(written, tmp_path, monkeypatch, raised, code):
+    from patchfem.export import folder as results_folder
+
     def stop(*_, **__):
         raise raised
 
-    monkeypatch.setattr(simulate_files, "run", stop)
+    monkeypatch.setattr(results_folder, "run", stop)
     answer = cli("run", written(POINT + COULOMB + SLIDE), "-o", tmp_path / "out")
     assert answer.code == code and len(answer.err.splitlines()) <= 1
     assert not (tmp_path / "out").exists()
@@ -496,8 +500,10 @@ def test_exact_the_installed_command(written, tmp_path):
 
 
 def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_path, monkeypatch):
+    from patchfem.dynamics.march import march as marching
+
     out = tmp_path / "out"
-    monkeypatch.setattr(simulate_march, "GOAL", 1e-60)  # a residual that no step can meet
+    monkeypatch.setattr(marching, "GOAL", 1e-60)  # a residual that no step can meet
     failed = cli("run", written(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5")
     assert failed.code == 3 and "missed the force residual" in failed.err
     summary = json.loads((out / "summary.json").read_text("utf-8"))

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
-from patchfem.lines import key_lines
-from patchfem.materials import MATERIALS
-from patchfem.scene import Scene, SceneError, load, loads
+from patchfem.scene.lines import key_lines
+from patchfem.scene.materials import MATERIALS
+from patchfem.scene.scene import Scene, SceneError, load, loads
 
 
 def test_exact_rig_in_si():
@@ -179,7 +179,7 @@ def test_always_a_scene_or_a_scene_error(text, sets):
 def test_always_loading_imports_neither_numpy_nor_scipy(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(RIG)
-    code = f"import sys; from patchfem.scene import load; load({str(path)!r})\n"
+    code = f"import sys; from patchfem.scene.scene import load; load({str(path)!r})\n"
     code += "print(sorted({'numpy', 'scipy', 'numba', 'pyvista', 'skfem', 'meshio'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
 
-from patchfem.scene import SceneError, load, loads
+from patchfem.scene.scene import SceneError, load, loads
 
 SHEAR = "contact.shear={}"
 COULOMB, PLASTIC = "friction.law=coulomb", "friction.law=elastic-plastic"
@@ -178,7 +178,7 @@ OPTIONS = [
 @pytest.mark.parametrize("text", [RIG, PATCH_BENCH], ids=["rig", "bench"])
 def test_always_a_scene_that_loads_can_be_planned(text):
     """No combination passes the scene's rules and is then turned down by the choice of an engine."""
-    from patchfem.simulate_plan import plan
+    from patchfem.runs.plan import plan
 
     passed = 0
     for sets in product(*OPTIONS):

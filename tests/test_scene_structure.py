@@ -7,9 +7,7 @@ import pytest
 from scene_texts import LINEAR, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
-from patchfem.scene import SceneError, load, loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_structure import (
+from patchfem.model.structure import (
     first_frequency,
     frequencies,
     friction_limit,
@@ -18,8 +16,11 @@ from patchfem.simulate_structure import (
     modes_of,
     motions,
     moving_mass,
-    start_of,
+    start_state,
 )
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, load, loads
 
 MASSES = """\
 [structure]
@@ -137,18 +138,18 @@ def test_exact_starts_of_a_scene():
     begin = '[structure.start]\ndisplacement = ["1 mm", "-2 mm"]\nvelocity = ["0 m/s", "3 mm/s"]\n'
     scene = loads(MASSES + begin)
     found = modes_of(scene)
-    start = start_of(scene, found)
+    start = start_state(scene, found)
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-13)
     np.testing.assert_allclose(found.shapes @ start.v, [0, 3e-3], rtol=1e-13, atol=1e-18)
     free = driven(MASSES, kind="free", displacement=1e-3)
-    np.testing.assert_allclose(found.shapes @ start_of(free, found).z, [0, 1e-3], atol=1e-18)
+    np.testing.assert_allclose(found.shapes @ start_state(free, found).z, [0, 1e-3], atol=1e-18)
     free = driven(MASSES, kind="free", displacement=1e-3, mass=1)
-    np.testing.assert_allclose(found.shapes @ start_of(free, found).z, [1e-3, 0], atol=1e-18)
+    np.testing.assert_allclose(found.shapes @ start_state(free, found).z, [1e-3, 0], atol=1e-18)
     step = driven(MASSES, waveform="step", displacement=1e-3, acceleration=None)
-    np.testing.assert_allclose(found.shapes @ start_of(step, found).z, [-1e-3, -1e-3], rtol=1e-13)
-    assert not start_of(loads(MASSES), found).z.any()
+    np.testing.assert_allclose(found.shapes @ start_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13)
+    assert not start_state(loads(MASSES), found).z.any()
     one = driven(STRUCTURE, kind="free", displacement=1e-3)
-    assert start_of(one, modes_of(one)).z.tolist() == [1e-3]
+    assert start_state(one, modes_of(one)).z.tolist() == [1e-3]
     assert "structure.start" in scene.named() and loads(scene.resolved()).structure.start == scene.structure.start
 
 
@@ -274,7 +275,7 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
         modes_of(write_scene(tmp_path, POINT + FILE))
     late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
     with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values stand for 2 modes or masses"):
-        start_of(late, modes_of(late))
+        start_state(late, modes_of(late))
     with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
     for text, says in ((FILE.replace("rig.npz", "rig.uff"), "structure.moving_mass: missing"),

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scene_texts import mistakes
 
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 TEXT = """\
 [contact]

@@ -1,0 +1,6 @@
+"""Normal contact of two pieces through their condensed compliance.
+
+In: compliance (m, m), gap (m,), load or approach. Out: nodal pressure, gap, approach and rotation that satisfy
+w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0. `unilateral` solves it, `skin` adds asperities, `strips` sets
+patches side by side, `atlas` and `maps` tabulate contact sets. Read `gaps` and `unilateral` first.
+"""

@@ -11,9 +11,9 @@ from types import MappingProxyType
 import numpy as np
 
 from ..core import Compliance, Outcome, PatchfemError, frozen_array
+from ..elasticity.threads import one_thread
 from .active_set import Ask
 from .parts import Operator
-from .threads import one_thread
 from .unilateral import checked, refuse, solve
 
 

@@ -19,8 +19,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, Outcome, PatchfemError, frozen_array
+from ..elasticity.threads import one_thread
 from .skin_laws import ExponentialSkin, LinearSkin
-from .threads import one_thread
 from .unilateral import LIMIT, solve_forces
 
 FLOOR = -300.0  # log pressure below which an approach does not reach the skin

@@ -12,10 +12,10 @@ from types import MappingProxyType
 import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
+from ..elasticity.threads import one_thread
 from .skin import _refuse
 from .skin_laws import ExponentialSkin, LinearSkin
 from .strips_solve import bare_parts, by_strip, loaded, skin_parts, smooth, softer
-from .threads import one_thread
 from .unilateral import LIMIT
 
 NEGLECTED = ("the strips over the width do not feel each other: the shear between them is neglected; fields and "

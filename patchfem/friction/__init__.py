@@ -1,0 +1,6 @@
+"""Laws of friction: traction against slide at given pressure.
+
+In: increments of slide and pressure. Out: path-mean traction, dissipated energy, the state after the step
+(`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named
+*kernels are compiled and have their NumPy form beside them. Read `protocol` first, then `laws/elastic_plastic`.
+"""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .measures import STICK
+from ..core import STICK
 
 STOP, RELEASE_UP, RELEASE_DOWN, REVERSAL_UP, REVERSAL_DOWN, BORDER = range(6)
 MEANINGS = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")

@@ -5,7 +5,7 @@ Everything works on samples: values of an exact run and of a march differ only i
 
 import numpy as np
 
-from ..core import Outcome, Response
+from ..core import STICK, Outcome, Response
 
 UNITS = {
     "relative_displacement_amplitude": "m", "absolute_acceleration_peak": "m s-2", "slip_amplitude": "m",
@@ -27,7 +27,6 @@ FLOORS = {
     "ring_frequency": 1e-3, "ring_damping": 1e-6,
 }
 ROUND = 1e-13  # of the largest coordinate
-STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
 
 
 def of_first(name: str) -> str:

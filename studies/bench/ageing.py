@@ -18,9 +18,10 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem import scene, simulate_bench
-from patchfem.closed_forms import steady_bond_length
+from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.runs.bench import bench as law_bench
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 HOLDS = tuple(10.0 ** np.linspace(-2, 1, 10))
@@ -46,7 +47,7 @@ def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
     sets = [f"slide.hold={float(hold)!r} s", f"slide.distance={(40 + 20 * part) * LENGTH!r} m",
             f"slide.distance_after={20 * LENGTH!r} m", f"friction.slip_growth={part * LENGTH!r} m",
             f"accuracy.steps_per_cycle={steps}", *more]
-    found = simulate_bench.run(scene.loads(SCENE, sets=sets), None, steps)
+    found = law_bench.run(scene.loads(SCENE, sets=sets), None, steps)
     force = found.force / (STATIC * found.load[0])
     rest = np.flatnonzero(np.diff(found.slide) == 0)
     return force[rest[0]], force[rest[-1] + 1], force[rest[-1] + 1:].max()

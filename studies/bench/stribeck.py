@@ -16,9 +16,10 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem import scene, simulate_bench
-from patchfem.closed_forms import growth_factor, steady_bond_length
+from patchfem.closed_forms.friction import growth_factor, steady_bond_length
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.runs.bench import bench as law_bench
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 SHARES = 10.0 ** np.linspace(-2, 2, 9)  # v/v_c
@@ -44,7 +45,7 @@ def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -
     """Friction over load after so many bond lengths at a constant speed [m/s], ten steps each."""
     sets = [f"slide.speed={speed!r} m/s", f"slide.distance={lengths * LENGTH!r} m", f"friction.slip_growth={slip!r} m",
             f"friction.reading={reading}", f"friction.order={order}", "friction.rest_speed=1e-9 m/s"]
-    return simulate_bench.run(scene.loads(SCENE, sets=sets), None, 10 * lengths).values["friction_ratio_end"]
+    return law_bench.run(scene.loads(SCENE, sets=sets), None, 10 * lengths).values["friction_ratio_end"]
 
 
 def promised(speed: float, slip: float) -> float:

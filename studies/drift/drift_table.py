@@ -32,7 +32,8 @@ other orders with them.
 (b = .5, and b = .3 of p = 0.5: 0 in every column, but for p = 0 under a changing load and "away".)
 
 Why. Coulomb, elastic-plastic and Iwan close every loop within the limit. The constant stretch p = 1 is Dahl's law: its
-way up, ln((1 - low)/(1 - high)), is longer than its way down, for ever (`closed_forms.dither_drift`). With an elastic
+way up, ln((1 - low)/(1 - high)), is longer than its way down,
+for ever (`closed_forms.dither_drift`). With an elastic
 range nothing breaks within 2 b mu_s N of swing: 0 from the second cycle on. Growth shortens that range with the bonds
 (eps_k/eps_0 at most): b = .3 then leaves .033 at +- .3. "away": at 143 Hz a force of .8 speeds the block up until less
 than .8 is left of its friction, and no slide of one step holds it. Bouc-Wen (gamma = beta) unloads on a line and goes
@@ -72,9 +73,10 @@ import ladder
 import today
 from force_control import OutOfReach, slides
 
-from patchfem.friction.local import ElasticPlastic, Step
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.protocol import Step
 
 LENGTH, PERIOD, CYCLES, CREEP = ladder.LENGTH, 1 / ladder.HERTZ, 12, 1e-3
 SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway

@@ -16,9 +16,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 import drift_table
 from force_control import OutOfReach, drift
 
-from patchfem.closed_forms import dither_drift, stretch_loop
+from patchfem.closed_forms.friction import dither_drift, stretch_loop
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.friction.recursion import Recursion
+from patchfem.friction.bonds.recursion import Recursion
 
 HERE = Path(__file__).parent
 COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)

@@ -16,7 +16,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from scipy.special import gammaincinv
 
-from patchfem.closed_forms import weight_along
+from patchfem.closed_forms.friction import weight_along
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 
 HERE = Path(__file__).parent

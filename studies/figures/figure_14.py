@@ -16,7 +16,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from scipy.integrate import quad
 
-from patchfem.closed_forms import weight_across
+from patchfem.closed_forms.friction import weight_across
 from patchfem.export.pictures import BLUE, STYLE
 
 HERE = Path(__file__).parent

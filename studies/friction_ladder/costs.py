@@ -23,10 +23,12 @@ import today
 from ladder import HERTZ, LENGTH
 
 from patchfem.compiled import load_kernels
-from patchfem.friction.local import Coulomb, ElasticPlastic, Rate
-from patchfem.friction.quadrature import Quadrature, cutoff
-from patchfem.friction.recursion import Recursion
-from patchfem.simulate_march import growth_numbers, list_model
+from patchfem.dynamics.march.models import growth_numbers, list_model
+from patchfem.friction.bonds.quadrature import Quadrature, cutoff
+from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import Rate
 
 STEPS, AMPLITUDE = 200, 12.5
 BASE = "constant length (Dahl)"

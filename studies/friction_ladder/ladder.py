@@ -66,12 +66,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 import today
 
 from patchfem.compiled import load_kernels
-from patchfem.friction.bond_kernels import list_mean, list_step
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import cutoff
-from patchfem.simulate_march import jenkins_model, list_model, points_model
+from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
+from patchfem.friction.bonds.bond_kernels import list_mean, list_step
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import cutoff
 
-simulate_kernels = load_kernels()
+loop_kernels = load_kernels()
 
 HERTZ, LENGTH, RATIO = 143.0, 2e-6, 0.7
 GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
@@ -105,9 +105,9 @@ def harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.nda
 def followed(model, amplitude: float, steps: int = STEPS) -> Cycle:
     """Last of the cycles of a model of the hub whose lengths are in metres and whose limit is in mu_s N."""
     path = LENGTH * harmonic(amplitude, steps)
-    contact, work = model.build(simulate_kernels)
+    contact, work = model.build(loop_kernels)
     forces, burnt = np.zeros((path.size, 3)), np.zeros((path.size, 2))
-    if simulate_kernels.follow_path(path, 1 / (HERTZ * steps), model.kind, contact, work, 1e-11, burnt, forces):
+    if loop_kernels.follow_path(path, 1 / (HERTZ * steps), model.kind, contact, work, 1e-11, burnt, forces):
         raise ArithmeticError("a step did not converge")
     return Cycle(np.diff(path)[-steps:] / LENGTH, forces[-steps - 1:-1, 1])
 
@@ -131,7 +131,7 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     """The law as printed, every bond of its own length, by the compiled list merged to 0.01 bond lengths (1e-4 of
     the limit); the means of the steps are asked for in the last cycle only."""
     law = bonds(order=order, reading="report", **growth)
-    c, _ = list_model(law, 1.0, cutoff(order, 1e-5), 0.01).build(simulate_kernels)
+    c, _ = list_model(law, 1.0, cutoff(order, 1e-5), 0.01).build(loop_kernels)
     path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
     for i, dq in enumerate(np.diff(path)):
         args = (dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, dq / dt)

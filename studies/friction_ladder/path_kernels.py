@@ -3,16 +3,9 @@
 import numpy as np
 from numba import njit
 
-from patchfem.friction.bond_kernels import list_mean, list_step
-from patchfem.friction.kernels import (
-    bond_mean,
-    bond_step,
-    grow,
-    jenkins_mean,
-    jenkins_step,
-    loose_mean,
-    loose_step,
-)
+from patchfem.friction.bonds.bond_kernels import list_mean, list_step
+from patchfem.friction.bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
+from patchfem.friction.laws.elastic_plastic_kernels import jenkins_mean, jenkins_step
 
 
 @njit(error_model="numpy")

@@ -12,13 +12,20 @@ import problems
 from scipy.integrate import solve_ivp
 from switched import PROBLEMS, follow
 
-from patchfem import scene, simulate_march, simulate_patch, simulate_rig
 from patchfem.compiled import load
 from patchfem.core import ModalBasis, NotConverged, Start
-from patchfem.dynamics import duhamel, euler, newmark, sdof, sdof_kernels
-from patchfem.dynamics.drives import release
-from patchfem.dynamics.point_laws import Coulomb, ElasticPlastic, Tanh
-from patchfem.dynamics.sdof_samples import position
+from patchfem.dynamics.comparison import duhamel, euler, newmark
+from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh
+from patchfem.dynamics.events import sdof, sdof_kernels
+from patchfem.dynamics.events.sdof_samples import position
+from patchfem.dynamics.march import march as marching
+from patchfem.model.accuracy import choose
+from patchfem.model.drive import drive_of
+from patchfem.model.structure import modes_of
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.rig.interface import contact_model
+from patchfem.scene import scene
+from patchfem.structure.drives import release
 
 HERE = Path(__file__).parent
 POINTS = 20  # per cycle at which slides are compared
@@ -72,9 +79,9 @@ def problem(name: str) -> Problem:
                        {"limit": problems.TWO_LIMIT, "omega": 1.14})
         return replace(made, truth=exact(made, 0))
     given = scene.load(HERE / "patch.toml")
-    modes, drive = simulate_rig.modes_of(given), simulate_rig.drive_of(given)
-    contact = simulate_rig.contact_model(given, simulate_rig.choose(given),
-                                         simulate_patch.solve_all(given, False)[0], drive)
+    modes, drive = modes_of(given), drive_of(given)
+    contact = contact_model(given, choose(given),
+                                         solve_all(given, False)[0], drive)
     k, y = contact.fields["stiffness"], contact.fields["limit"]
     numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
                "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}
@@ -91,7 +98,7 @@ def exact(one: Problem, _) -> np.ndarray:
 
 def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
     """The compiled event engine of one mode."""
-    kernels = kernels or load("dynamics.event_kernels")
+    kernels = kernels or load("dynamics.events.event_kernels")
     made = sdof.scene_of(one.modes, one.drive, one.limit, one.limit, one.cycles * one.drive.period)
     rows, state, none = np.zeros((16 * one.cycles, sdof_kernels.ROW)), np.zeros(9), np.empty((0, 2))
     z, v = (0.0, 0.0) if one.start is None else (float(one.start.z[0]), float(one.start.v[0]))
@@ -107,9 +114,9 @@ def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
 
 def march(one: Problem, steps: int) -> np.ndarray:
     """The march at `steps` per cycle."""
-    model = simulate_march.coulomb_model(one.limit, one.limit) if one.elements is None \
-        else simulate_march.jenkins_model(*one.elements)
-    found = simulate_march.march(one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start)
+    model = marching.coulomb_model(one.limit, one.limit) if one.elements is None \
+        else marching.jenkins_model(*one.elements)
+    found = marching.march(one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start)
     return found.window.slide[::steps // POINTS][1:]
 
 

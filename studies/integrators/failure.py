@@ -30,10 +30,11 @@ from matplotlib.figure import Figure
 sys.path.insert(0, str(Path(__file__).parent))
 from problems import SDOF, SDOF_DRIVE, SDOF_LIMIT, TWO, TWO_LIMIT, exact
 
-from patchfem.dynamics import duhamel, newmark
-from patchfem.dynamics.drives import Piecewise, Segment
-from patchfem.dynamics.point_laws import Coulomb, ElasticPlastic
+from patchfem.core import Segment
+from patchfem.dynamics.comparison import duhamel, newmark
+from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.structure.drives import Piecewise
 
 HERE = Path(__file__).parent
 SLIDES = 8.079711463905416  # exact instant at which mass 2 moves first

@@ -4,10 +4,10 @@ import numpy as np
 
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, frozen_array
-from patchfem.dynamics.batches import gather, sample
-from patchfem.dynamics.engine import Engine
+from patchfem.dynamics.events.batches import gather, sample
+from patchfem.dynamics.events.engine import Engine
 
-load("dynamics.comparison_kernels")  # compiled loops come from the hashed cache
+load("dynamics.comparison.comparison_kernels")  # compiled loops come from the hashed cache
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:

@@ -27,11 +27,16 @@ from matplotlib.figure import Figure
 sys.path.insert(0, str(Path(__file__).parents[1] / "steady"))
 from against_march import TEXTS
 
-from patchfem import scene, simulate, simulate_rig
 from patchfem.core import G_N, BaseSine
+from patchfem.dynamics.harmonic.branch import levels as follow
+from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.laws import Spring
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.simulate_harmonic import Group, Spring
-from patchfem.simulate_harmonic import levels as follow
+from patchfem.model.accuracy import choose
+from patchfem.model.structure import modes_of
+from patchfem.runs import run as runner
+from patchfem.runs.rig.interface import contact_model
+from patchfem.scene import scene
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[1]
 MIL, FLOOR = 25.4e-6, 0.01  # FLOOR: least displacement that Table 1 reads [mil]
@@ -89,7 +94,7 @@ def solve(case: str, cycles: int = CYCLES, steps: int = 400) -> Row:
     listed = np.concatenate([up, up[-2::-1]])
     pinned = "" if case == "Coulomb" else f'method = "march"\nsteps_per_cycle = {steps}\n'
     given = scene.loads(scene_text(case, cycles, ", ".join(f'"{g:.6g} g"' for g in listed), pinned))
-    found = simulate.run(simulate.plan(given), estimate=False)
+    found = runner.run(runner.plan(given), estimate=False)
     levels = found.extra["levels"]
     amplitude, slip = (np.array([one.values[f"{name}_amplitude"] for one in levels])
                        for name in ("relative_displacement", "slip"))
@@ -122,8 +127,8 @@ def folds_of(case: str) -> tuple:
     """Folds of the steady motions between the ends of the levels [g]: where the lower branch ends, where the upper."""
     text, frequency, up = CASES[case]
     given = scene.loads(text)
-    modes, drive = simulate_rig.modes_of(given), BaseSine(up[0] * G_N, 2 * np.pi * frequency)
-    joint = simulate_rig.contact_model(given, simulate_rig.choose(given), None, drive)
+    modes, drive = modes_of(given), BaseSine(up[0] * G_N, 2 * np.pi * frequency)
+    joint = contact_model(given, choose(given), None, drive)
     group = Group(modes, [(0, joint), (modes.output, Spring(0.0, given.structure.stiffening.cubic))])
     return tuple(f / G_N for f in follow(modes, drive, group, up[[0, -1]] * G_N, HARMONICS).folds)
 

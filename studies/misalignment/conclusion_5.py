@@ -36,7 +36,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 from scipy.optimize import brentq
 
-from patchfem.simulate_patch import pressed
+from patchfem.runs.patch.press import pressed
 
 PORTIONS = (0.9, 0.5, 0.2, 0.05)
 SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)  # N m/rad

@@ -28,8 +28,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 
 from patchfem.core import Measure
-from patchfem.simulate_measures import values
-from patchfem.simulate_patch import pressed
+from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.values import values
 
 SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)  # N m/rad; None: a rigid fixture
 OFFSETS = (0.05, 0.1, 1 / 6, 0.2, 0.25, 0.3, 1 / 3, 0.4, 0.45, 0.49)  # of the load line of a free piece, in lengths

@@ -16,7 +16,7 @@ import fixtures
 import tilted
 
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.simulate_patch import pressed
+from patchfem.runs.patch.press import pressed
 
 HERE = Path(__file__).parent
 TILTS = 10.0 ** np.linspace(-6, -2, 61)

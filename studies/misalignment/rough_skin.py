@@ -39,7 +39,7 @@ from asperities import MEAN
 from patchfem import closed_forms as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import frozen_array
-from patchfem.simulate_patch import with_linear_skin
+from patchfem.runs.patch.press import with_linear_skin
 
 SCATTERS = (0.0, 10e-9, 50e-9, 0.2e-6, 1e-6, 5e-6)
 SHAPES = ("uniform", "gaussian")

@@ -1,7 +1,7 @@
 """The rig's pieces under any misalignment: condensed once on three graded meshes, pressed as often as wanted.
 
 What the studies beside this file share. Columns grow from 0.3 um at the edge that stays closed by 1.5 % each on the
-finest mesh, so a contact edge is as sharp at 1e-2 rad as at 1e-6; the errors are those of `simulate_measures` from
+finest mesh, so a contact edge is as sharp at 1e-2 rad as at 1e-6; the errors are those of `runs.patch.measures` from
 cells two and four times as long.
 """
 
@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem import scene
 from patchfem.mesh.grading import Layout, columns
 from patchfem.mesh.tensor import TensorGrid, finer, graded_depth
-from patchfem.simulate_bodies import Pair, condensed
-from patchfem.simulate_measures import measures
-from patchfem.simulate_patch import Patch, pressed
+from patchfem.runs.patch.condensed import Pair, condensed
+from patchfem.runs.patch.measures import measures
+from patchfem.runs.patch.press import Patch, pressed
+from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
 TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[0]  # [contact] alone: the patch at rest

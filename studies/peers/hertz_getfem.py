@@ -31,10 +31,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from common import Peer, ratio_text, run, seconds_at, timed
 
 from patchfem import closed_forms as exact
-from patchfem.contact.elasticity import Layers, assemble, interface_compliance
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array
+from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 HALF = 0.1e-3  # half width a of the contact [m]

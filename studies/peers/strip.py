@@ -9,9 +9,9 @@ import numpy as np
 from scipy.sparse import diags
 
 from patchfem import closed_forms as exact
-from patchfem.contact.elasticity import Layers, Piece, assemble, displacement, interface_compliance
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Pressure, frozen_array
+from patchfem.elasticity.elasticity import Layers, Piece, assemble, displacement, interface_compliance
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 EVEN = 0.1  # depth of even rows over the wave

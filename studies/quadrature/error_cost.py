@@ -29,10 +29,10 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from patchfem.compiled import load_kernels
+from patchfem.dynamics.march.models import list_model, place_model
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import cutoff
-from patchfem.simulate_march import list_model, place_model
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import cutoff
 
 HERE = Path(__file__).parent
 AMPLITUDES = (0.1, 1.0, 3.0, 10.0, 50.0)

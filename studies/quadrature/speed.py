@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.compiled import load_kernels
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import Quadrature, cutoff
-from patchfem.friction.recursion import Recursion
-from patchfem.simulate_march import list_model, place_model, points_model
+from patchfem.dynamics.march.models import list_model, place_model, points_model
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature, cutoff
+from patchfem.friction.bonds.recursion import Recursion
 
 STEPS, CYCLES = 2000, 10
 GROWS = {"ratio": 0.7, "rest_growth": 1.5, "slip_growth": 0.05, "rest_speed": 1e-2}

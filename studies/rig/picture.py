@@ -10,17 +10,18 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem import scene, simulate
 from patchfem.core import G_N
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.response.measured import read_table
+from patchfem.inputs.measured import read_table
+from patchfem.runs import run as runner
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 
 
 def main(path: Path = HERE / "rig.svg") -> Path:
     """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
-    found = simulate.run(simulate.plan(scene.load(HERE / "rig.toml")), estimate=False)
+    found = runner.run(runner.plan(scene.load(HERE / "rig.toml")), estimate=False)
     x, fields, window = found.patch.x * 1e3, found.fields, found.window
     rows = [r for r in read_table(HERE / "table1.csv") if abs(r.frequency - 143) < 0.5 and r.acceleration]
     with rc_context(STYLE):

@@ -9,7 +9,8 @@ Run: python studies/rig/readings.py
 
 from pathlib import Path
 
-from patchfem import scene, simulate
+from patchfem.runs import run as runner
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 NAMES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
@@ -19,7 +20,7 @@ def main() -> dict:
     """reading -> {measure: (value, error)} after 20 cycles from rest, rigid slide."""
     out = {}
     for reading in ("report", "stretch"):
-        found = simulate.run(simulate.plan(scene.load(HERE / "report.toml", [f"friction.reading={reading}"])))
+        found = runner.run(runner.plan(scene.load(HERE / "report.toml", [f"friction.reading={reading}"])))
         out[reading] = {name: (found.measures[name].value, found.measures[name].error) for name in NAMES}
         out[reading]["seconds"] = found.seconds["march"]
     for name in NAMES:

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem import scene, simulate
 from patchfem.core import G_N
-from patchfem.response.measured import Row, read_table
+from patchfem.inputs.measured import Row, read_table
+from patchfem.runs import run as runner
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 MIL = 25.4e-6
@@ -69,12 +70,12 @@ def drive(row: Row, cycles: float) -> list:
 
 def coulomb(row: Row, cycles: float) -> Answer:
     """The rigid block with set-valued friction, exact."""
-    return answer(simulate.run(simulate.plan(scene.loads(COULOMB, sets=drive(row, cycles)))))
+    return answer(runner.run(runner.plan(scene.loads(COULOMB, sets=drive(row, cycles)))))
 
 
 def patch(row: Row, cycles: float) -> Answer:
     """rig.toml at the condition of `row`."""
-    return answer(simulate.run(simulate.plan(scene.load(HERE / "rig.toml", drive(row, cycles)))))
+    return answer(runner.run(runner.plan(scene.load(HERE / "rig.toml", drive(row, cycles)))))
 
 
 def compute(rows: list, model, cycles: float) -> dict:

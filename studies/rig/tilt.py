@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem import scene, simulate
-from patchfem.contact.slip import jenkins_set
+from patchfem.runs import run as runner
+from patchfem.scene import scene
+from patchfem.slip.shear_modes import jenkins_set
 
 HERE = Path(__file__).parent
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)
@@ -25,7 +26,7 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
     the amplitude [m] and loop area [J]; pairs are (value, error)."""
     rows = []
     for angle in tilts:
-        found = simulate.run(simulate.plan(scene.load(
+        found = runner.run(runner.plan(scene.load(
             HERE / "rig.toml", [f"contact.tilt.angle={angle} rad", f"drive.cycles={cycles}"])))
         patch = found.patch
         per_node = 0.30 * patch.pressure.sigma_n * patch.pieces.interface.weight

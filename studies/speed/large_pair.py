@@ -56,10 +56,10 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
     from itertools import pairwise
     from time import perf_counter, process_time
 
-    from patchfem.contact.elasticity import Layers
-    from patchfem.contact.substructure import assemble, condense, joined
     from patchfem.contact.unilateral import press
     from patchfem.core import Compliance, Interface
+    from patchfem.elasticity.elasticity import Layers
+    from patchfem.elasticity.substructure import assemble, condense, joined
 
     bodies = [piece(seed, columns, rows) for seed in (1, 2)]
     layers, clock = Layers((250e9, 0.24), (121e9, 0.32), "strain"), [(perf_counter(), process_time())]

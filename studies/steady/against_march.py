@@ -22,8 +22,9 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem import scene, simulate
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.runs import run as runner
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 BLOCK = """
@@ -83,7 +84,7 @@ def solve(contact: str, frequency: float, **accuracy):
     """simulate.Result of a contact at a frequency [Hz]; accuracy: keys of the table, `cycles` of the drive."""
     sets = [f"drive.frequency={frequency} Hz", f"drive.cycles={accuracy.pop('cycles', CYCLES)}"]
     sets += [f"accuracy.{key}={value}" for key, value in accuracy.items()]
-    return simulate.run(simulate.plan(scene.loads(TEXTS[contact], sets=sets)), estimate=False)
+    return runner.run(runner.plan(scene.loads(TEXTS[contact], sets=sets)), estimate=False)
 
 
 def _kept(found) -> dict:

@@ -24,8 +24,15 @@ from matplotlib.figure import Figure
 sys.path.insert(0, str(Path(__file__).parent))
 from against_march import PATCH, TEXTS
 
-from patchfem import scene, simulate, simulate_harmonic, simulate_patch, simulate_rig
+from patchfem.dynamics.harmonic import balance as harmonic_balance
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.model.accuracy import choose
+from patchfem.model.drive import drive_of
+from patchfem.model.structure import modes_of
+from patchfem.runs import run as runner
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.rig.interface import contact_model
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 ONE_MODE = PATCH[:PATCH.rindex("[[structure.mode]]")] + PATCH[PATCH.index("[drive]"):]
@@ -57,7 +64,7 @@ def loop(text: str, amplitude: float, steps: int) -> tuple:
     head = text[:text.index("[structure]")]
     bench = (f'{head}[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\nfrequency = "143 Hz"\ncycles = 8\n'
              f"[accuracy]\nsteps_per_cycle = {steps}\n")
-    found = simulate.run(simulate.plan(scene.loads(bench)), estimate=False).measures
+    found = runner.run(runner.plan(scene.loads(bench)), estimate=False).measures
     return found["equivalent_stiffness"].value, found["loop_area"].value
 
 
@@ -65,10 +72,10 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     """One contact."""
     text, size = CASES[name]
     given = scene.loads(text)
-    modes, drive, chosen = simulate_rig.modes_of(given), simulate_rig.drive_of(given), simulate_rig.choose(given)
-    patch = simulate_patch.solve_all(given, False)[0] if given.contact is not None else None
-    model, amplitude = simulate_rig.contact_model(given, chosen, patch, drive), size * np.asarray(shares)
-    free = [simulate_harmonic.backbone(modes, model, amplitude, harmonics=h) for h in (1, 9)]
+    modes, drive, chosen = modes_of(given), drive_of(given), choose(given)
+    patch = solve_all(given, False)[0] if given.contact is not None else None
+    model, amplitude = contact_model(given, chosen, patch, drive), size * np.asarray(shares)
+    free = [harmonic_balance.backbone(modes, model, amplitude, harmonics=h) for h in (1, 9)]
     w, zeta = modes.omega[0], modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)

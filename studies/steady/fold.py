@@ -19,8 +19,9 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem import scene, simulate
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.runs import run as runner
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
@@ -63,7 +64,7 @@ class Sweep:
 def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> Curve:
     """The scene by its own method."""
     sets = [f"drive.from={low} Hz", f"drive.to={high} Hz", f"accuracy.tolerance={tolerance}"]
-    found = simulate.run(simulate.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).extra["curve"]
+    found = runner.run(runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).extra["curve"]
     return Curve(found["frequency"], found["amplitude"], found["regime"] == "stable", found["multiplier"],
                  tuple(sorted(found["folds"], reverse=True)))
 
@@ -73,7 +74,7 @@ def sweep(steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float =
     first, last = (low, high) if up else (high, low)
     sets = [f"drive.from={first} Hz", f"drive.to={last} Hz", f"drive.rate={rate} Hz/s",
             f"drive.duration={(high - low) / rate} s", "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"]
-    seen = simulate.run(simulate.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).response
+    seen = runner.run(runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).response
     turn = np.abs(seen.output) > 0
     turn[1:-1] &= (np.abs(seen.output[1:-1]) >= np.abs(seen.output[:-2])) & \
         (np.abs(seen.output[1:-1]) >= np.abs(seen.output[2:]))

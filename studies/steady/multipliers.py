@@ -20,11 +20,20 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from against_march import TEXTS
 
-from patchfem import scene, simulate, simulate_march, simulate_patch, simulate_rig
 from patchfem.core import Start
-from patchfem.dynamics.sdof import simulate as simulate_sdof
-from patchfem.simulate_harmonic import Group, Spring, branches, periodic_response
-from patchfem.simulate_interfaces import model_of
+from patchfem.dynamics.events.sdof import simulate as simulate_sdof
+from patchfem.dynamics.harmonic.balance import periodic_response
+from patchfem.dynamics.harmonic.branch import branches
+from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.laws import Spring
+from patchfem.dynamics.march import march as marching
+from patchfem.model.accuracy import choose
+from patchfem.model.drive import drive_of
+from patchfem.model.structure import modes_of
+from patchfem.runs import run as runner
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.rig.interface import contact_model, model_of
+from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 STIFFENED = (HERE / "stiffened.toml").read_text().replace(
@@ -70,10 +79,10 @@ def fitted(states, n: int, size: float, omega: float) -> np.ndarray:
 
 def marched(given, start: Start, steps: int, settle: int, cycles: int, size: float) -> np.ndarray:
     """Multipliers by the march of a scene from a state near its steady motion."""
-    modes, drive, chosen = simulate_rig.modes_of(given), simulate_rig.drive_of(given), simulate_rig.choose(given)
-    patch = simulate_patch.solve_all(given, False)[0] if given.contact is not None else None
+    modes, drive, chosen = modes_of(given), drive_of(given), choose(given)
+    patch = solve_all(given, False)[0] if given.contact is not None else None
     model = model_of(given, chosen, patch, modes, drive, start)
-    run = simulate_march.fresh(modes, drive, model, steps, np.inf, start)
+    run = marching.fresh(modes, drive, model, steps, np.inf, start)
     for _ in range(settle):
         run.cycle(steps, 0, [])
 
@@ -90,7 +99,7 @@ def marched(given, start: Start, steps: int, settle: int, cycles: int, size: flo
 
 def exact(given, start: Start, cycles: int, size: float) -> np.ndarray:
     """The same by the event engine of one mode."""
-    modes, drive = simulate_rig.modes_of(given), simulate_rig.drive_of(given)
+    modes, drive = modes_of(given), drive_of(given)
     limit = given.friction.static * given.normal.load
 
     def states(push):
@@ -111,7 +120,7 @@ def rows_of(case: str, steps: int = STEPS, settle: int = SETTLE, cycles: int = 1
     given = scene.loads(text, sets=[*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"])
     if given.structure.stiffening is not None:
         return _branches(given, case, steps, cycles)
-    steady = simulate.run(simulate.plan(scene.loads(text, sets=[*sets, "accuracy.method=harmonic",
+    steady = runner.run(runner.plan(scene.loads(text, sets=[*sets, "accuracy.method=harmonic",
                                                                 "accuracy.tolerance=1e-5"])), estimate=False)
     seen, size = steady.response, PUSH * steady.measures["relative_displacement_amplitude"].value
     start = Start(np.array(seen.modal[0]), np.array(seen.modal_rate[0]))
@@ -122,8 +131,8 @@ def rows_of(case: str, steps: int = STEPS, settle: int = SETTLE, cycles: int = 1
 
 def _branches(given, case: str, steps: int, cycles: int) -> list:
     """All motions at one frequency; from the one that is not stable the march is pushed before it has left it."""
-    modes, drive = simulate_rig.modes_of(given), simulate_rig.drive_of(given)
-    group = Group(modes, [(0, simulate_rig.contact_model(given, simulate_rig.choose(given), None, drive)),
+    modes, drive = modes_of(given), drive_of(given)
+    group = Group(modes, [(0, contact_model(given, choose(given), None, drive)),
                           (modes.output, Spring(0.0, given.structure.stiffening.cubic))])
     out = []
     for one in branches(modes, drive, group, 1e-5):

@@ -25,14 +25,14 @@ import hertz_getfem as hertz
 import strip
 
 from patchfem import closed_forms as exact
-from patchfem.contact.elasticity import Layers, assemble, interface_compliance
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.halfspace import press_periodic, wave_numbers
 from patchfem.contact.maps import press_map
-from patchfem.contact.slip import jenkins_set
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Outcome, frozen_array
+from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
+from patchfem.slip.shear_modes import jenkins_set
 
 TITANIUM, CARBIDE = (121e9, 0.32), (250e9, 0.24)
 COATED = Layers(CARBIDE, TITANIUM, "strain")

@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from patchfem.contact.elasticity import Layers, assemble, interface_compliance
 from patchfem.core import Compliance, Interface
+from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
 
 TITANIUM = (121e9, 0.32)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from pieces import COATED, COATING
 from scipy.sparse import csr_matrix
 
-from patchfem.contact.condense import mirrored_sweep, sweep
-from patchfem.contact.elasticity import assemble
+from patchfem.elasticity.condense import mirrored_sweep, sweep
+from patchfem.elasticity.elasticity import assemble
 from patchfem.mesh.tensor import graded_grid
 
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare
 from scipy.sparse.linalg import spsolve
 
-from patchfem.closed_forms import layered_compliance
-from patchfem.contact.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance, lame
+from patchfem.closed_forms.contact import layered_compliance
+from patchfem.elasticity.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance, lame
 from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))

@@ -14,11 +14,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
 from test_substructure import of_grid
 
-from patchfem.contact import factor, fronts
-from patchfem.contact.dissect import LEAF, dissection, least_cover
-from patchfem.contact.factor import BACKENDS, factorise
-from patchfem.contact.substructure import assemble, condense
 from patchfem.core import Missing, NotConverged, PatchfemError
+from patchfem.elasticity import factor, fronts
+from patchfem.elasticity.dissect import LEAF, dissection, least_cover
+from patchfem.elasticity.factor import BACKENDS, factorise
+from patchfem.elasticity.substructure import assemble, condense
 from patchfem.mesh.tensor import graded_grid
 
 NEEDS = {"cholmod": "sksparse", "pardiso": "pypardiso"}

@@ -6,11 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem import scene, simulate_bodies, simulate_measures, simulate_patch
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome, PatchfemError
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh
 from patchfem.mesh.tensor import graded_grid
+from patchfem.model.pieces import bodies_of
+from patchfem.runs.patch import measures as patch_measures
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.patch.values import values
+from patchfem.scene import scene
 
 TEXT = """
 [contact]
@@ -30,8 +34,8 @@ LOAD = 'load = "26 lbf"'
 
 def solved(keys=LOAD, tables=""):
     found = scene.loads(TEXT.format(keys, tables))
-    patch = simulate_patch.solve_all(found, False)[0]
-    return patch, simulate_measures.values(patch)
+    patch = solve_all(found, False)[0]
+    return patch, values(patch)
 
 
 def test_exact_a_soft_holder_is_a_free_piece_and_a_stiff_one_a_clamp():
@@ -125,10 +129,10 @@ def test_exact_a_scene_on_triangles_is_within_its_error_of_the_quads(tmp_path):
         'element_size = "0.2 mm"\n', "")
     (tmp_path / "scene.toml").write_text(text, "utf-8")
     found = scene.load(tmp_path / "scene.toml")
-    patch, finer, _ = simulate_patch.solve_all(found)
+    patch, finer, _ = solve_all(found)
     assert finer.pair.grid.x.size == 2 * patch.pair.grid.x.size - 1
-    cut = simulate_measures.measures(patch, finer)
-    whole = simulate_measures.measures(*simulate_patch.solve_all(
+    cut = patch_measures.measures(patch, finer)
+    whole = patch_measures.measures(*solve_all(
         scene.loads(TEXT.format(LOAD, '[contact.tilt]\nangle = "0.1 mrad"\n'))))
     for name, measure in cut.items():
         assert abs(measure.value - whole[name].value) <= measure.error + whole[name].error + measure.floor
@@ -139,7 +143,7 @@ def test_refuses_a_mesh_whose_interfaces_do_not_match(tmp_path):
     triangles(tmp_path / "pieces.msh", 5e-4, shift=1e-4)
     (tmp_path / "scene.toml").write_text(TEXT.format(LOAD + '\nmesh = "pieces.msh"', ""), "utf-8")
     with pytest.raises(PatchfemError, match=r"pieces.msh.*not yet built"):
-        simulate_bodies.bodies_of(scene.load(tmp_path / "scene.toml"))
+        bodies_of(scene.load(tmp_path / "scene.toml"))
 
 
 @pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import COATED, COATING, HEIGHT, LENGTH, LOAD, TITANIUM, WIDTH, bare, bare_pair, coated_pair, rough
 
-from patchfem.contact.elasticity import assemble, interface_compliance
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press, press_by
 from patchfem.core import Compliance, Interface
+from patchfem.elasticity.elasticity import assemble, interface_compliance
 from patchfem.mesh.tensor import graded_grid
 
 CELLS = 60

@@ -12,11 +12,11 @@ from pieces import HEIGHT, LENGTH, TITANIUM, bare, refined_middle
 from skfem import Basis, ElementQuad1, ElementVector, MeshQuad
 from skfem.models.elasticity import linear_elasticity
 
-from patchfem.contact import elasticity, mortar, substructure
 from patchfem.contact.gaps import crown
-from patchfem.contact.mortar import clipped, common_grid, softness, transfer
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, PatchfemError
+from patchfem.elasticity import elasticity, mortar, substructure
+from patchfem.elasticity.mortar import clipped, common_grid, softness, transfer
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.tensor import graded_rows
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchfem.contact import cache
-from patchfem.contact.elasticity import Layers
+from patchfem.elasticity import cache
+from patchfem.elasticity.elasticity import Layers
 from patchfem.mesh.anymesh import PieceMesh
 
 LAYERS = Layers((250e9, 0.24), (121e9, 0.32), "strain")

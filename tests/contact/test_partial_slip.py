@@ -10,7 +10,9 @@ from pieces import LOAD, TILTS, coated_pair, rough
 from scipy.optimize import lsq_linear
 
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.slip import (
+from patchfem.contact.unilateral import press
+from patchfem.core import PatchfemError
+from patchfem.slip.shear_modes import (
     JenkinsSet,
     jenkins_set,
     merged,
@@ -18,8 +20,6 @@ from patchfem.contact.slip import (
     shear_modes,
     tangential_stiffness,
 )
-from patchfem.contact.unilateral import press
-from patchfem.core import PatchfemError
 
 MU = 0.3
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
 from test_substructure import cloud, of_grid
 
-from patchfem.contact import elasticity, substructure
-from patchfem.contact.bond import bond_line
-from patchfem.contact.elasticity import Layers, hooke, lame
 from patchfem.contact.gaps import crown
-from patchfem.contact.recovery import Cells, cells_of, indicator, peak, quadratures, recovery
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface
+from patchfem.elasticity import elasticity, substructure
+from patchfem.elasticity.coating_bond import bond_line
+from patchfem.elasticity.elasticity import Layers, hooke, lame
+from patchfem.elasticity.recovery import Cells, cells_of, indicator, peak, quadratures, recovery
 from patchfem.mesh.anymesh import halved
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
 

@@ -15,9 +15,9 @@ from scipy.stats import norm
 
 from patchfem.contact.skin import residuals, solve, tangent
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin, peak_integral
-from patchfem.contact.slip import normal_stiffness, tangential_stiffness
 from patchfem.contact.unilateral import LIMIT, press
 from patchfem.core import Compliance, NotConverged, Outcome, PatchfemError
+from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA

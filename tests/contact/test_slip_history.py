@@ -26,15 +26,17 @@ from pieces import (
 from test_partial_slip import elements, histories
 from two_bodies import unlike_pair
 
-from patchfem.closed_forms import cattaneo_shear, cattaneo_stick_half_width
-from patchfem.contact import partial_slip, slip_sets, slip_unlike
+from patchfem.closed_forms.contact import cattaneo_shear, cattaneo_stick_half_width
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.partial_slip import Step, advance, operators_of, start
-from patchfem.contact.slip import jenkins_set
-from patchfem.contact.slip_path import load_path
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, NotConverged, PatchfemError
 from patchfem.mesh.tensor import graded_grid
+from patchfem.slip import partial_slip
+from patchfem.slip import sets as slip_sets
+from patchfem.slip import unlike as slip_unlike
+from patchfem.slip.load_path import load_path
+from patchfem.slip.partial_slip import Step, advance, operators_of, start
+from patchfem.slip.shear_modes import jenkins_set
 
 MU = 0.3
 

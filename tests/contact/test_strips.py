@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
-from patchfem.closed_contact import wedge_linear, wedge_opening, wedge_skin
+from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
 from patchfem.contact import skin as skins
 from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
-from patchfem.contact.slip import normal_stiffness, tangential_stiffness
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
+from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA

@@ -13,13 +13,13 @@ from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, bare
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import Delaunay
 
-from patchfem.closed_forms import layered_compliance
-from patchfem.contact import elasticity
-from patchfem.contact.elasticity import Layers, lame
+from patchfem.closed_forms.contact import layered_compliance
 from patchfem.contact.gaps import crown
-from patchfem.contact.substructure import assemble, cell_stress, condense, displacement, joined
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface
+from patchfem.elasticity import elasticity
+from patchfem.elasticity.elasticity import Layers, lame
+from patchfem.elasticity.substructure import assemble, cell_stress, condense, displacement, joined
 from patchfem.mesh.anymesh import PieceMesh, halved
 from patchfem.mesh.tensor import graded_grid
 

@@ -8,12 +8,12 @@ from pieces import COATED, COATING, HEIGHT, LENGTH, LOAD, TILTS, WIDTH, bare, co
 from two_bodies import unlike_pair
 
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.partial_slip import Operators, Step, advance, operators_of, start
-from patchfem.contact.slip import normal_stiffness, tangential_stiffness
-from patchfem.contact.tangent import operating_tangent
 from patchfem.contact.unilateral import press, press_by
 from patchfem.core import PatchfemError
 from patchfem.mesh.tensor import graded_grid
+from patchfem.slip.partial_slip import Operators, Step, advance, operators_of, start
+from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
+from patchfem.slip.tangent import operating_tangent
 
 MU = 0.4
 

@@ -9,10 +9,10 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad
 from skfem.helpers import ddot, sym_grad, trace
 
-from patchfem.contact.elasticity import Layers, assemble, interface_compliance
-from patchfem.contact.partial_slip import Operators, operators_of
 from patchfem.core import Compliance, Interface
+from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
 from patchfem.mesh.tensor import TensorGrid
+from patchfem.slip.partial_slip import Operators, operators_of
 
 
 @BilinearForm

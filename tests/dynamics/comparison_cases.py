@@ -4,8 +4,8 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import root
 
-from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.drives import Piecewise, Segment
+from patchfem.core import BaseSine, ModalBasis, Segment
+from patchfem.structure.drives import Piecewise
 
 
 def basis(omega, zeta, faces, base, damping=None, mass=1.0) -> ModalBasis:

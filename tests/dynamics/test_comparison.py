@@ -20,10 +20,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, PatchfemError, Start
-from patchfem.dynamics import duhamel, euler, newmark
-from patchfem.dynamics.comparison import first_forces
-from patchfem.dynamics.drives import Recorded, release
-from patchfem.dynamics.point_laws import Coulomb, ElasticPlastic, Tanh, rows
+from patchfem.dynamics.comparison import duhamel, euler, newmark
+from patchfem.dynamics.comparison.comparison import first_forces
+from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh, rows
+from patchfem.structure.drives import Recorded, release
 
 DRIVE = BaseSine(1.3, 0.9)
 MIXED = [(Coulomb(0.5, 0.4, 0.02), Tanh(0.3, 0.1)), (ElasticPlastic(0.4, 0.2), Coulomb(0.3, 0.3)),

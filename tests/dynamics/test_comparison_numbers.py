@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from comparison_cases import FREE_FREE, PLAIN, SDOF, UNIT, basis, sine
 
-from patchfem.core import Start
-from patchfem.dynamics import duhamel, euler, newmark
-from patchfem.dynamics.drives import Piecewise, Segment, release
-from patchfem.dynamics.point_laws import Coulomb, ElasticPlastic, Tanh
+from patchfem.core import Segment, Start
+from patchfem.dynamics.comparison import duhamel, euler, newmark
+from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh
+from patchfem.structure.drives import Piecewise, release
 
 STICK_SLIP = 0.28704671337871602595  # exact peak, D = .8, 2 xi = .006
 

@@ -5,10 +5,12 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
-from patchfem.dynamics.drives import Recorded, Sweep, levels, release, step
-from patchfem.scene import SceneError, loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_march import coulomb_model, jenkins_model, march
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, loads
+from patchfem.structure.drives import Recorded, Sweep, levels, release, step
 
 W = 2 * np.pi * 143
 
@@ -198,7 +200,7 @@ def test_refuses_a_broken_signal(tmp_path, text, word):
 def test_exact_a_universal_file_is_read_back(tmp_path):
     import pyuff
 
-    from patchfem.response.signals import read_signal
+    from patchfem.inputs.signals import read_signal
 
     t = np.arange(200) / 1e4
     path = tmp_path / "shake.uff"

@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics import event_list, histories, sdof
-from patchfem.dynamics.drives import Piecewise, levels
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_events import of_log
+from patchfem.dynamics.events import event_list, histories, sdof
+from patchfem.response.run_events import of_log
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+from patchfem.structure.drives import Piecewise, levels
 
 RIG = """\
 [normal]
@@ -69,7 +70,8 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
     """The scene runs level after level; the list is that of one run through all segments."""
     scene = loads(RIG)
     found = run(plan(scene), estimate=False).extra["events"]
-    from patchfem.simulate_rig import drive_of, modes_of
+    from patchfem.model.drive import drive_of
+    from patchfem.model.structure import modes_of
 
     drive = drive_of(scene)
     assert isinstance(drive, Piecewise)

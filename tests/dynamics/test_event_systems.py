@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
-from patchfem.dynamics import drives
-from patchfem.dynamics.engine import Engine
-from patchfem.dynamics.event_list import BORDER, RELEASE, REVERSAL, STOP
-from patchfem.dynamics.events import combine, run
-from patchfem.dynamics.histories import simulate
-from patchfem.dynamics.stick_sets import Entry, System, settle
+from patchfem.dynamics.events.engine import Engine
+from patchfem.dynamics.events.event_list import BORDER, RELEASE, REVERSAL, STOP
+from patchfem.dynamics.events.events import run
+from patchfem.dynamics.events.histories import simulate
+from patchfem.dynamics.events.signals import combine
+from patchfem.dynamics.events.stick_sets import Entry, System, settle
 from patchfem.response.measures import energy_balance
+from patchfem.structure import drives
 
 
 def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
@@ -518,7 +519,7 @@ def test_exact_interface_without_friction_among_others():
 
 
 def test_exact_log_has_a_limit(monkeypatch):
-    monkeypatch.setattr("patchfem.dynamics.event_list.ROOM", 30)
+    monkeypatch.setattr("patchfem.dynamics.events.events.event_list.ROOM", 30)
     log = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 20).log
     assert log.time.size == log.slide.size == 30 and log.count == 80
     assert not log.time.flags.writeable

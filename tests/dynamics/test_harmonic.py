@@ -8,16 +8,16 @@ from harmonic_cases import five, many, march, plain_jenkins, sdof
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.closed_forms import jenkins_loop, stretch_loop
+from patchfem.closed_forms.friction import jenkins_loop, stretch_loop
 from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
-from patchfem.dynamics.harmonic import Balance, newton, pack, unpack
-from patchfem.friction.law import Bonds
-from patchfem.friction.recursion import advance
-from patchfem.simulate_harmonic import cycle_energy, periodic_response, point
-from patchfem.simulate_harmonic_contact import Group
-from patchfem.simulate_harmonic_laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, analysis, synthesis
-from patchfem.simulate_harmonic_point import balance_of, group_of
-from patchfem.simulate_march import coulomb_model, jenkins_model, points_model, rate_model
+from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
+from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
+from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, analysis, synthesis
+from patchfem.dynamics.harmonic.point import balance_of, group_of, point
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.recursion import advance
 
 DRIVE = BaseSine(1.0, 1.0)
 PEAKS = {10: 0.249538145, 100: 0.285786312, 1000: 0.288449682}  # DOP853 at 1e-12, D = 0.8, xi = 0.003

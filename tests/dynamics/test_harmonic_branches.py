@@ -8,17 +8,19 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, PatchfemError
-from patchfem.dynamics.backbone import FreeBalance, stuck_mode, trace
-from patchfem.dynamics.continuation import follow
-from patchfem.dynamics.floquet import exponentials, is_stable, kind_of_loss, multipliers, product
-from patchfem.dynamics.harmonic import Balance
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_harmonic import periodic_response, point
-from patchfem.simulate_harmonic_branch import backbone, branches, levels, response
-from patchfem.simulate_harmonic_contact import Group
-from patchfem.simulate_harmonic_laws import Jenkins, Spring, Stretch, Tanh, synthesis
-from patchfem.simulate_harmonic_stability import monodromy_of, with_stability
+from patchfem.dynamics.harmonic.backbone import FreeBalance, stuck_mode, trace
+from patchfem.dynamics.harmonic.balance import periodic_response
+from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
+from patchfem.dynamics.harmonic.continuation import follow
+from patchfem.dynamics.harmonic.floquet import exponentials, is_stable, kind_of_loss, multipliers, product
+from patchfem.dynamics.harmonic.forces import Group
+from patchfem.dynamics.harmonic.harmonic import Balance
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring, Stretch, Tanh, synthesis
+from patchfem.dynamics.harmonic.point import point
+from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 W = 2 * np.pi * 143
 MASS = 0.884

@@ -6,14 +6,16 @@ from harmonic_cases import five, many, march, plain_jenkins, sdof
 from scene_texts import STRUCTURE
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged
+from patchfem.dynamics.harmonic.balance import periodic_response, regime
+from patchfem.dynamics.harmonic.branch import response
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring, Stretch, synthesis
+from patchfem.dynamics.harmonic.point import group_of, point
+from patchfem.model.drive import drive_of
+from patchfem.model.structure import modes_of
 from patchfem.response.measures import acceleration_peak, harmonic, interface_loop, slip_measures
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_harmonic import periodic_response, point, regime
-from patchfem.simulate_harmonic_branch import response
-from patchfem.simulate_harmonic_laws import Jenkins, Spring, Stretch, synthesis
-from patchfem.simulate_harmonic_point import group_of
-from patchfem.simulate_rig import drive_of, modes_of
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 SCENE = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "20 um"\n' + STRUCTURE + \
     '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'

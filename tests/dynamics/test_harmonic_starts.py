@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from patchfem.core import G_N, BaseSine, ModalBasis
-from patchfem.simulate_harmonic import Jenkins, Spring, branches
-from patchfem.simulate_harmonic_starts import _brackets
+from patchfem.dynamics.harmonic.branch import branches
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring
+from patchfem.dynamics.harmonic.starts import _brackets
 
 
 @pytest.mark.parametrize("middle", [0.31, 0.35, 0.4, -0.55])

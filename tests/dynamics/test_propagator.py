@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from patchfem.core import G_N, BaseSine, ModalBasis
-from patchfem.dynamics.drives import Recorded, Sweep, levels
 from patchfem.dynamics.propagator import propagator
+from patchfem.structure.drives import Recorded, Sweep, levels
 
 W = 2 * pi * 143
 MODES = {"damped": (W, 0.003), "critical": (0.4 * W, 1.0), "overdamped": (W, 3.0), "rigid": (0.0, 0.0),

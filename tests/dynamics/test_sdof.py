@@ -12,14 +12,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from patchfem import closed_forms
+from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
 from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
-from patchfem.dynamics import histories, orbit_kernels, sdof_kernels, slip_kernels
-from patchfem.dynamics.drives import Piecewise, Recorded, levels, release
-from patchfem.dynamics.sdof import events as event_list
-from patchfem.dynamics.sdof import simulate
-from patchfem.dynamics.sdof_samples import Scene, states
+from patchfem.dynamics.events import histories, orbit_kernels, sdof_kernels, slip_kernels
+from patchfem.dynamics.events.sdof import events as event_list
+from patchfem.dynamics.events.sdof import simulate
+from patchfem.dynamics.events.sdof_samples import Scene, states
 from patchfem.response.measures import energy_balance
+from patchfem.structure.drives import Piecewise, Recorded, levels, release
 
 W = 2 * pi * 143
 PEAK = 0.28704671337871602595  # amplitude over a/omega^2 at resonance, damping 0.003, friction 0.8 of the drive
@@ -27,7 +28,7 @@ PEAK = 0.28704671337871602595  # amplitude over a/omega^2 at resonance, damping 
 
 @lru_cache(maxsize=1)
 def events():
-    return load("dynamics.event_kernels")
+    return load("dynamics.events.event_kernels")
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):
@@ -96,7 +97,7 @@ def test_exact_beside_the_bounding_ratio(above):
     """Above pi/4 the motion settles on the closed form of two stops, below it grows by pi - 4 D a cycle."""
     ratio = pi / 4 + above
     assert swing(driven(ratio, 0.0, cycles=1500, compiled=True)) == pytest.approx(
-        closed_forms.two_stop_amplitude(ratio), rel=1e-6)
+        two_stop_amplitude(ratio), rel=1e-6)
     top = np.abs(driven(pi / 4 - above, 0.0, cycles=20_000, compiled=True).amplitudes).max(axis=1)
     assert (top[-1] - top[-5001]) / 5000 == pytest.approx(4 * above, rel=2e-3)
 
@@ -320,7 +321,7 @@ def test_exact_slight_friction(zeta):
     alone = swing(driven(0.0, zeta, 0.9, 120))
     assert alone == pytest.approx(1 / abs(1 - 0.81 + 1.8j * zeta), rel=1e-13)
     found = swing(driven(1e-9, zeta, 0.9, 120))
-    assert found == pytest.approx(closed_forms.sliding_amplitude(0.9, 1e-9, zeta), rel=1e-13)
+    assert found == pytest.approx(sliding_amplitude(0.9, 1e-9, zeta), rel=1e-13)
     assert 0.5e-9 < 1 - found / alone < 2e-9
 
 

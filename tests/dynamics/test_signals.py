@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from patchfem.dynamics.signals import BERNSTEIN, TERMS, Signal, combine, derivative, first_root
+from patchfem.dynamics.events.signals import BERNSTEIN, TERMS, Signal, combine, derivative, first_root
 
 
 def series(*coefs):

@@ -9,11 +9,12 @@ from scipy.special import ellipk
 
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics.drives import release
-from patchfem.dynamics.histories import simulate
-from patchfem.friction.law import Bonds
-from patchfem.simulate_march import coulomb_model, jenkins_model, march, points_model, rate_model
-from patchfem.simulate_slots import SlotsModel, bonds, coulomb, cubic, elastic_plastic, interlock, rate
+from patchfem.dynamics.events.histories import simulate
+from patchfem.dynamics.march.joints import SlotsModel, bonds, coulomb, cubic, elastic_plastic, interlock, rate
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.structure.drives import release
 
 OMEGA = 2 * np.pi * 143
 DRIVE = BaseSine(49.0, OMEGA)
@@ -186,7 +187,7 @@ def test_exact_strips_that_yaw_are_those_of_the_event_engine():
 def test_exact_iwan_elements_wipe_out_a_minor_loop():
     """A hundred parallel elements, limits spread evenly, along 0 .8 .2 .6 .2 .8 -.8 .8: forces, loss of a cycle."""
     stiffness, limit, now = np.full(100, 0.01), (np.arange(100) + 0.5) / 100, np.zeros(3)
-    kernels, stretch, forces, lost = load("friction.kernels"), np.zeros(100), [], 0.0
+    kernels, stretch, forces, lost = load("friction.bonds.point_kernels"), np.zeros(100), [], 0.0
     for dq in np.diff([0, 0.8, 0.2, 0.6, 0.2, 0.8, -0.8, 0.8]):
         burnt = kernels.jenkins_step(dq, stretch, stiffness, limit, now)
         forces.append(now[0])

@@ -9,22 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from patchfem import closed_forms
+from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
-from patchfem.dynamics import orbit_kernels, sdof_kernels, slip_kernels
-from patchfem.dynamics.drives import levels
-from patchfem.dynamics.steady import Regime, jenkins_point, point, response
+from patchfem.dynamics.events import orbit_kernels, sdof_kernels, slip_kernels
+from patchfem.dynamics.events.steady import Regime, jenkins_point, point, response
+from patchfem.structure.drives import levels
 
 
 @lru_cache(maxsize=1)
 def events():
-    return load("dynamics.event_kernels")
+    return load("dynamics.events.event_kernels")
 
 
 @lru_cache(maxsize=1)
 def kernels():
-    return load("dynamics.steady_kernels")
+    return load("dynamics.events.steady_kernels")
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):
@@ -101,14 +101,14 @@ def test_table_check_8_knees(frequency, level):
 def test_exact_sliding_is_den_hartogs(friction, zeta, ratio):
     found = steady(friction, zeta, ratio)
     assert found.regime == Regime.SLIDING
-    assert found.amplitude == pytest.approx(closed_forms.sliding_amplitude(ratio, friction, zeta), rel=1e-12)
+    assert found.amplitude == pytest.approx(sliding_amplitude(ratio, friction, zeta), rel=1e-12)
 
 
 @pytest.mark.parametrize("above", [1e-3, 1e-4])
 def test_exact_beside_the_bounding_ratio(above):
     found = steady(pi / 4 + above, 0.0)
     assert found.regime == Regime.STOPS
-    assert found.amplitude == pytest.approx(closed_forms.two_stop_amplitude(pi / 4 + above), rel=1e-8)
+    assert found.amplitude == pytest.approx(two_stop_amplitude(pi / 4 + above), rel=1e-8)
     below = steady(pi / 4 - above, 0.0)
     assert below.regime == Regime.UNBOUNDED and below.amplitude == inf
     assert steady(pi / 4 - above, 1e-6).amplitude == pytest.approx(4 * above / (2 * pi * 1e-6), rel=3e-2)

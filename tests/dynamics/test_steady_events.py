@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from test_event_systems import basis_of, random_basis
 
-from patchfem import closed_forms
+from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.core import BaseSine, PatchfemError, Start
-from patchfem.dynamics import drives
-from patchfem.dynamics.histories import simulate
-from patchfem.dynamics.steady_events import period_map, steady
+from patchfem.dynamics.events.histories import simulate
+from patchfem.dynamics.events.steady_events import period_map, steady
+from patchfem.structure import drives
 
 
 def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
@@ -38,7 +38,7 @@ def test_table_checks_2_and_5_without_damping(d, q):
     found = steady(basis_of(1.0), BaseSine(1.0, 1.0), d, d)
     assert found.amplitude == pytest.approx(q, abs=2e-5)
     # the amplitude's condition near pi/4 is that of a square root
-    assert found.amplitude == pytest.approx(closed_forms.two_stop_amplitude(d), rel=1e-12 / (d - pi / 4))
+    assert found.amplitude == pytest.approx(two_stop_amplitude(d), rel=1e-12 / (d - pi / 4))
     assert found.regime == "2 stops"
 
 
@@ -61,7 +61,7 @@ def test_exact_both_sides_of_pi_over_four(side):
     over, under = pi / 4 + side, pi / 4 - side
     found = steady(basis_of(1.0), BaseSine(1.0, 1.0), over, over)
     assert found.regime == "2 stops"
-    assert found.amplitude == pytest.approx(closed_forms.two_stop_amplitude(over), rel=1e-14 / side)
+    assert found.amplitude == pytest.approx(two_stop_amplitude(over), rel=1e-14 / side)
     assert steady(basis_of(1.0), BaseSine(1.0, 1.0), under, under).regime == "unbounded"
 
 
@@ -110,7 +110,7 @@ def test_exact_two_motions_at_one_level():
     rest = steady(modes, drive, 1.0, 0.3)
     moving = steady(modes, drive, 1.0, 0.3, Start(np.zeros(1), np.array([8.0])))
     assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
-    wanted = 0.9 * closed_forms.sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
+    wanted = 0.9 * sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
     assert moving.amplitude == pytest.approx(wanted, rel=1e-11)
     assert np.abs(moving.multipliers).max() < 1
 

@@ -8,16 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from patchfem import simulate_wrench as wrench
 from patchfem.compiled import load
 from patchfem.contact.atlas import Atlas
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
-from patchfem.friction.law import Bonds
-from patchfem.friction.local import ElasticPlastic
-from patchfem.friction.recursion import Recursion, pressed
+from patchfem.dynamics.march import varying_load as wrench
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.recursion import Recursion, pressed
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.model.interfaces import strip_rows
 from patchfem.response.measures import energy_balance
-from patchfem.simulate_interfaces import strip_rows
 
 MASS, LOAD, STILL = 0.884, 116.0, BaseSine(0.0, 2 * np.pi * 143)
 LAWS = {"coulomb": wrench.coulomb(0.3), "weaker": wrench.coulomb(0.3, 0.2), "tanh": wrench.rate(0.3, 1e-3),
@@ -202,7 +202,7 @@ def test_always_nothing_creates_energy(name, seed, steps):
 
 def test_exact_twins_of_the_points():
     """Compiled points under a changing load against the laws of a bench."""
-    kernels, rng = load("simulate_rub_kernels"), np.random.default_rng(3)
+    kernels, rng = load("dynamics.march.varying_friction_kernels"), np.random.default_rng(3)
     law, other = Bonds(0.3, 1e-6, initial=0.4), ElasticPlastic(0.3, 1e-6)
     bonds, springs = Recursion(law), other.start(np.array([2.0]))
     state = bonds.start(np.array([2.0]))

@@ -5,10 +5,11 @@ import pytest
 from scene_texts import BENCH, RIG, STRUCTURE, only
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_files import _histories
-from patchfem.simulate_wrench import atlas_of
+from patchfem.dynamics.march.varying_load import atlas_of
+from patchfem.export.folder import _histories
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 PITCH = RIG.replace("slide = 0.1", "slide = 0.1\npitch = \"40 rad/m\"").replace("cycles = 200", "cycles = 12")
 FEW = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200"]

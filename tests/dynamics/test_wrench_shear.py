@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 from scipy.optimize import root
 from test_wrench import LAWS, LOAD, MASS, balance, crowned, modes
 
-from patchfem import simulate_march as plain
-from patchfem import simulate_wrench as wrench
-from patchfem.contact.slip import jenkins_set, shear_modes
 from patchfem.core import BaseSine, PatchfemError, Start
+from patchfem.dynamics.march import march as plain
+from patchfem.dynamics.march import varying_load as wrench
 from patchfem.dynamics.propagator import propagator
-from patchfem.friction.law import Bonds
-from patchfem.friction.local import ElasticPlastic
-from patchfem.friction.recursion import Recursion, advance
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.recursion import Recursion, advance
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.slip.shear_modes import jenkins_set, shear_modes
 
 SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": Recursion(Bonds(0.3, 1e-6))}
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scene_texts import RIG
 
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 MOVING = RIG.replace("slide = 0.8", 'slide = 0.8\nnormal = 0.02\npitch = "5 rad/m"')
 MOVING = MOVING.replace("cycles = 200", "cycles = 12")

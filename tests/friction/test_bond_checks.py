@@ -11,10 +11,10 @@ from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.closed_forms import report_loop, reversal_force, stretch_loop, virgin_force
-from patchfem.friction.law import Bonds, grow, growth_exponents
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import BondState, Recursion
+from patchfem.closed_forms.friction import report_loop, reversal_force, stretch_loop, virgin_force
+from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import BondState, Recursion
 
 ONE = upper_pressure([1.0])
 UNEVEN = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])

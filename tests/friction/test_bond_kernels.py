@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from list_paths import energy_by_hand, follow_list
 from scipy.special import gammainc
 
-from patchfem.friction import bond_kernels, bond_math_kernels
-from patchfem.friction.bond_list import law_numbers, room, share_table
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion
-from patchfem.simulate_march import growth_numbers
+from patchfem.dynamics.march.models import growth_numbers
+from patchfem.friction.bonds import bond_kernels, bond_math_kernels
+from patchfem.friction.bonds.bond_list import law_numbers, room, share_table
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion
 
 ONE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

@@ -6,13 +6,14 @@ from friction_paths import random_walk, slides, triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem import closed_forms, simulate_kernels, simulate_step_kernels
-from patchfem.friction.kernels import loose_mean, loose_step
-from patchfem.friction.law import Bonds, elastic_part
-from patchfem.friction.local import ElasticPlastic
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion
-from patchfem.simulate_march import points_model
+from patchfem import closed_forms
+from patchfem.dynamics.march import loop_kernels, step_kernels
+from patchfem.dynamics.march.models import points_model
+from patchfem.friction.bonds.parameters import Bonds, elastic_part
+from patchfem.friction.bonds.point_kernels import loose_mean, loose_step
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 ONE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 0.01}
@@ -59,9 +60,9 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     law = bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
     model = points_model(law, [1.0], [1.0])
-    contact, work = model.build(simulate_kernels)
+    contact, work = model.build(loop_kernels)
     burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    assert simulate_kernels.follow_path(path, 1.0, model.kind, contact, work, 1e-12, burnt, forces) == 0
+    assert loop_kernels.follow_path(path, 1.0, model.kind, contact, work, 1e-12, burnt, forces) == 0
     run = walk(Recursion(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
@@ -144,4 +145,4 @@ def test_always_breakaway_and_a_changing_load_are_passive_on_20000_paths():
 
 def test_exact_the_kind_of_points_stays_small_without_breakaway():
     assert points_model(bonds(0.0), [1.0], [1.0]).fields["bonds"].shape[0] == 4
-    assert simulate_step_kernels.Contact._fields.index("growth") > 0
+    assert step_kernels.Contact._fields.index("growth") > 0

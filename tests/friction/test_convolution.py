@@ -12,16 +12,17 @@ from scipy.special import gamma, gammainc
 from test_run import PATCH, POINT, SHEAR, SLIDE
 from test_temperature import RIG
 
-from patchfem import simulate_bench
 from patchfem.core import PatchfemError
-from patchfem.friction.convolution import Convolution, average, limits
-from patchfem.friction.law import Bonds
-from patchfem.friction.local import Coulomb
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion
-from patchfem.scene import SceneError, loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_patch import solve_all
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.convolution import Convolution, average, limits
+from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.runs.bench import bench
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
 COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
@@ -192,7 +193,7 @@ def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edge
 def bench_of(text, *sets, steps=64):
     scene = loads(text, sets=sets)
     patch = solve_all(scene, False)[0] if scene.contact is not None else None
-    return patch, simulate_bench.run(scene, patch, steps, 4)
+    return patch, bench.run(scene, patch, steps, 4)
 
 
 def test_exact_one_point_is_coulomb():

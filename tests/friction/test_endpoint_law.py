@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from patchfem.friction.kernels import bond_mean, bond_step
+from patchfem.friction.bonds.point_kernels import bond_mean, bond_step
 
 OMEGA, LIMIT, EPS = 2 * np.pi * 143.0, 39.24, 2e-6  # rad/s, m/s2 (4 g), m
 K_T = LIMIT / EPS

@@ -7,16 +7,20 @@ import pytest
 from friction_paths import random_walk, triangle, upper_pressure, walk
 from test_friction_hub import OMEGA, follow, one_mode
 
-from patchfem import scene
 from patchfem.core import BaseSine
-from patchfem.friction.engines import ENGINES, choose, impossible
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import Quadrature
-from patchfem.scene_tables import Accuracy
-from patchfem.simulate_march import list_model, march, points_model
-from patchfem.simulate_plan import plan
-from patchfem.simulate_rig import choose as settings_of
-from patchfem.simulate_rig import contact_model, created_warning, drive_of, quadrature_of
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import list_model, points_model
+from patchfem.friction.bonds.engines import ENGINES, choose, impossible
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.model.accuracy import choose as settings_of
+from patchfem.model.accuracy import quadrature_of
+from patchfem.model.drive import drive_of
+from patchfem.runs.plan import plan
+from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.march import created_warning
+from patchfem.scene import scene
+from patchfem.scene.tables import Accuracy
 
 TEXT = """title = "one mass"
 [normal]

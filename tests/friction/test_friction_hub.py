@@ -6,13 +6,14 @@ from friction_paths import random_walk, upper_pressure, walk
 from scipy.integrate import solve_ivp
 
 from patchfem.compiled import load_kernels
-from patchfem.contact.slip import jenkins_set, shear_modes
 from patchfem.core import BaseSine, ModalBasis, Outcome
+from patchfem.dynamics.march.march import GOAL, march, modes_arrays, steps_arrays
+from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
 from patchfem.dynamics.propagator import propagator
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion, advance
-from patchfem.simulate_march import GOAL, jenkins_model, list_model, march, modes_arrays, points_model, steps_arrays
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion, advance
+from patchfem.slip.shear_modes import jenkins_set, shear_modes
 
 OMEGA = 2 * np.pi * 143
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

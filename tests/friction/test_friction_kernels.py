@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from patchfem.friction import bond_sum_kernels, kernels, recursion
-from patchfem.friction.law import Bonds, grow, growth_exponents
-from patchfem.friction.recursion import advance, shape_functions
-from patchfem.simulate_march import growth_numbers
+from patchfem.dynamics.march.models import growth_numbers
+from patchfem.friction.bonds import bond_sum_kernels, point_kernels, recursion
+from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
+from patchfem.friction.bonds.recursion import advance, shape_functions
+from patchfem.friction.laws.elastic_plastic_kernels import jenkins_mean, jenkins_step
 
 # ---- bond points
 
@@ -20,7 +21,7 @@ def random_bonds(seed, count):
 
 def test_exact_shape_is_its_numpy_form():
     for x in (0.0, 1e-9, 0.01, 0.0299, 0.0301, 1.0, 40.0, 800.0):
-        assert kernels.shape(x) == pytest.approx([float(f) for f in shape_functions(x)], rel=1e-13, abs=1e-300)
+        assert point_kernels.shape(x) == pytest.approx([float(f) for f in shape_functions(x)], rel=1e-13, abs=1e-300)
 
 
 @pytest.mark.parametrize("eps", [1.0, 0.37])
@@ -30,17 +31,17 @@ def test_exact_bond_mean_and_step_are_advance(eps):
     for dq in (-1e3, -2.0, -0.3, -1e-3, 1e-6, 0.02, 0.7, 30.0):
         out, mean, slope, burnt = advance(bonds, dq, sigma, eps)
         for j in range(40):
-            got = kernels.bond_mean(bonds[0, j], bonds[1, j], dq, sigma[j], eps)
+            got = point_kernels.bond_mean(bonds[0, j], bonds[1, j], dq, sigma[j], eps)
             assert got == pytest.approx((mean[j], slope[j]), rel=1e-11, abs=1e-13)
-            moved = kernels.bond_step(bonds[0, j], bonds[1, j], bonds[2, j], dq, sigma[j], eps)
+            moved = point_kernels.bond_step(bonds[0, j], bonds[1, j], bonds[2, j], dq, sigma[j], eps)
             assert moved[:3] == pytest.approx(out[:, j], rel=1e-12, abs=1e-14)
             assert moved[3] == pytest.approx(burnt[j], rel=1e-11, abs=1e-14)
 
 
 def test_exact_bond_step_of_no_length():
     m, z, s2 = 0.8, -0.3, 0.4
-    assert kernels.bond_mean(m, z, 0.0, 1.0, 1.0)[0] == z
-    assert kernels.bond_step(m, z, s2, 0.0, 1.0, 1.0) == pytest.approx((m, z, s2, 0.0), abs=1e-15)
+    assert point_kernels.bond_mean(m, z, 0.0, 1.0, 1.0)[0] == z
+    assert point_kernels.bond_step(m, z, s2, 0.0, 1.0, 1.0) == pytest.approx((m, z, s2, 0.0), abs=1e-15)
 
 
 # ---- growth
@@ -52,13 +53,13 @@ def test_exact_grow_is_its_numpy_form(ratio, rest, slip, floor):
     numbers = growth_numbers(law)
     for v0, v1, path, dt in ((0, 0, 0, 1), (0, 0, 0, 0), (1, 1, 0.5, 0.5), (-0.3, 0.7, 0.2, 1), (5e-3, -5e-3, 0, 2),
                              (1, 1 + 1e-9, 1, 1), (-2, -1, 3, 2), (0.3, 0.3, 0.3, 0), (1e6, 1e6, 1e6, 1)):
-        eps, total = kernels.grow(1.3, float(v0), float(v1), float(path), float(dt), numbers)
+        eps, total = point_kernels.grow(1.3, float(v0), float(v1), float(path), float(dt), numbers)
         assert eps == pytest.approx(grow(law, 1.3, v0, v1, path, dt), rel=1e-14)
         assert total == pytest.approx(sum(growth_exponents(law, v0, v1, path, dt)), rel=1e-14)
 
 
 def test_exact_grow_without_growth_keeps_the_length():
-    assert kernels.grow(1.3, 0.1, 0.2, 5.0, 1.0, growth_numbers(Bonds(1.0, 1.3))) == (1.3, 0.0)
+    assert point_kernels.grow(1.3, 0.1, 0.2, 5.0, 1.0, growth_numbers(Bonds(1.0, 1.3))) == (1.3, 0.0)
 
 
 # ---- parallel elements
@@ -83,12 +84,12 @@ def test_exact_jenkins_is_a_clip(seed):
     stretch, now = np.zeros(30), np.zeros(3)
     for dq in rng.normal(0, 1, 60) * 10.0**rng.uniform(-3, 1, 60):
         want, new, loss = jenkins_numpy(dq, stretch, stiffness, limit)
-        force, slope = kernels.jenkins_mean(dq, stretch, stiffness, limit)
+        force, slope = jenkins_mean(dq, stretch, stiffness, limit)
         h = 1e-6 * abs(dq)
         ahead, behind = (jenkins_numpy(dq + s * h, stretch, stiffness, limit)[0] for s in (1, -1))
         assert force == pytest.approx(want, abs=1e-12)
         assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
-        burnt = kernels.jenkins_step(dq, stretch, stiffness, limit, now)
+        burnt = jenkins_step(dq, stretch, stiffness, limit, now)
         share = stiffness * limit
         assert now == pytest.approx([stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12)
         assert stretch == pytest.approx(new, abs=1e-15) and burnt == pytest.approx(loss, abs=1e-11)
@@ -99,7 +100,7 @@ def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
     """No difference of large numbers: a step of 1e-12 of the stretch, elastic, has its force to 1e-15 of itself."""
     stiffness, limit, stretch = np.full(4, 3.0), np.full(4, 1.0), np.array([0.3, -0.7, 0.9, 0.1])
     for dq in (1e-12, -1e-13, 1e-300, 0.0):
-        force, slope = kernels.jenkins_mean(dq, stretch, stiffness, limit)
+        force, slope = jenkins_mean(dq, stretch, stiffness, limit)
         assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(6.0, rel=1e-6)
 
 
@@ -109,12 +110,13 @@ def test_exact_rigid_points_are_single_points_together(eps):
     weight, sigma = rng.uniform(0.1, 2, 7), rng.uniform(0, 3, 7)
     bonds = np.concatenate([np.stack([0.6 * sigma, 0.2 * sigma, 0.3 * sigma]), np.zeros((1, 7))])
     for dq in (0.3, -0.01, -2.0, 0.0):
-        single = [kernels.bond_mean(*bonds[:2, j], dq, sigma[j], eps) for j in range(7)]
+        single = [point_kernels.bond_mean(*bonds[:2, j], dq, sigma[j], eps) for j in range(7)]
         want = weight @ np.array(single)
-        assert kernels.rigid_mean(dq, weight, bonds, sigma, eps) == pytest.approx(want, rel=1e-13, abs=1e-15)
-        moved = np.array([kernels.bond_step(*bonds[:3, j], dq, sigma[j], eps) for j in range(7)])
+        assert point_kernels.rigid_mean(dq, weight, bonds, sigma, eps) == pytest.approx(want, rel=1e-13, abs=1e-15)
+        moved = np.array([point_kernels.bond_step(*bonds[:3, j], dq, sigma[j], eps) for j in range(7)])
         slide = bonds[3] + dq
-        assert kernels.rigid_step(dq, weight, bonds, sigma, eps) == pytest.approx(weight @ moved[:, 3] / 2, abs=1e-14)
+        assert point_kernels.rigid_step(dq, weight, bonds, sigma, eps) == pytest.approx(weight @ moved[:, 3] / 2,
+                                                                                        abs=1e-14)
         assert bonds[:3].T == pytest.approx(moved[:, :3], rel=1e-13, abs=1e-15)
         assert bonds[3] == pytest.approx(slide)
 
@@ -132,5 +134,5 @@ def test_exact_moments_have_no_cancellation(x):
         e = mp.exp(-mp.mpf(x))
         truth = [1 - e * (1 + mp.mpf(x)), 2 - e * (mp.mpf(x)**2 + 2 * mp.mpf(x) + 2),
                  2 * mp.mpf(x) - 6 + e * (mp.mpf(x)**2 + 4 * mp.mpf(x) + 6)]
-    for mine in (kernels.moments(x, np.exp(-x)), recursion.moments(np.array(x), np.exp(-x))):
+    for mine in (point_kernels.moments(x, np.exp(-x)), recursion.moments(np.array(x), np.exp(-x))):
         assert [float(v) for v in mine] == pytest.approx([float(t) for t in truth], rel=2e-12)

@@ -6,8 +6,10 @@ from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.closed_forms import coulomb_loop_area, jenkins_loop
-from patchfem.friction.local import Coulomb, ElasticPlastic, Rate
+from patchfem.closed_forms.friction import coulomb_loop_area, jenkins_loop
+from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import Rate
 
 ONE = upper_pressure([1.0, 0.5])
 PRESSURE = st.just(0.0) | st.floats(1e-6, 4)

@@ -15,24 +15,20 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
 
-from patchfem import closed_forms, scene, simulate_bench
+from patchfem import closed_forms
+from patchfem.closed_forms.dynamics import sliding_amplitude
 from patchfem.compiled import load_kernels
 from patchfem.core import BaseSine, ModalBasis
+from patchfem.dynamics.march.march import GOAL, march, modes_arrays, steps_arrays
+from patchfem.dynamics.march.models import growth_numbers, jenkins_model, points_model
 from patchfem.dynamics.propagator import propagator
-from patchfem.friction import kernels
-from patchfem.friction.law import Bonds, grow
-from patchfem.friction.local import ElasticPlastic
-from patchfem.friction.quadrature import Quadrature, cutoff
-from patchfem.friction.recursion import BondState, Recursion
-from patchfem.simulate_march import (
-    GOAL,
-    growth_numbers,
-    jenkins_model,
-    march,
-    modes_arrays,
-    points_model,
-    steps_arrays,
-)
+from patchfem.friction.bonds import point_kernels
+from patchfem.friction.bonds.parameters import Bonds, grow
+from patchfem.friction.bonds.quadrature import Quadrature, cutoff
+from patchfem.friction.bonds.recursion import BondState, Recursion
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.runs.bench import bench as law_bench
+from patchfem.scene import scene
 
 ONE = upper_pressure([1.0])
 OMEGA = 2 * np.pi * 143
@@ -271,7 +267,7 @@ def unsettled(share):
     for free in -eps * np.linspace(1e-3, 2e-2, 40):
         answer, dq = free, 0.0  # dq from the balance shifted by the force at rest: free - beta (F(dq) - F(0))
         for _ in range(2000):
-            mean, _ = kernels.bond_mean(1.0, eps, dq, 1.0, eps)
+            mean, _ = point_kernels.bond_mean(1.0, eps, dq, 1.0, eps)
             answer, dq = dq, free - beta * limit * (mean / eps - 1)
             if abs(dq - answer) <= 1e-9 * eps:
                 break
@@ -283,7 +279,7 @@ def unsettled(share):
 def test_exact_c17_plain_iteration_fails_beyond_the_contraction_limit_and_newton_does_not():
     """dt_c = sqrt(2 eps_0/a_f) = 319.3 us: beta = dt^2/2 and the slope k_t of the step mean just after a reversal."""
     assert np.sqrt(2 * 2e-6 / 39.24) == pytest.approx(319.3e-6, abs=5e-8)
-    assert kernels.bond_mean(1.0, 2e-6, -1e-16, 1.0, 2e-6)[1] == pytest.approx(1.0, rel=1e-9)
+    assert point_kernels.bond_mean(1.0, 2e-6, -1e-16, 1.0, 2e-6)[1] == pytest.approx(1.0, rel=1e-9)
     assert unsettled(0.95) == 0 and unsettled(1.05) > 20
     for share in (0.95, 1.05, 1.4, 3.0):
         dt = share * np.sqrt(2 * 2e-6 / 39.24)
@@ -333,7 +329,7 @@ bond_length = "2 um"
 [slide]
 {slide}
 """
-    return simulate_bench.run(scene.loads(text, "bench.toml"), None, steps).values
+    return law_bench.run(scene.loads(text, "bench.toml"), None, steps).values
 
 
 @pytest.mark.parametrize("keys, steps, area", [
@@ -432,11 +428,11 @@ def worst_of_kernel(seed, paths, count=60):
         m, z, s2 = law.initial * sigma[0, 0, 0], 0.0, 0.0
         for dq, dt, s in zip(steps.tolist(), times.tolist(), sigma[:, :, 0].mean(axis=1).tolist()):
             v = dq / dt if dt > 0 else 0.0
-            middle = kernels.grow(eps, v, v, abs(dq) / 2, dt / 2, numbers)[0]
-            work = kernels.bond_mean(m, z, dq, s, middle)[0] * dq
+            middle = point_kernels.grow(eps, v, v, abs(dq) / 2, dt / 2, numbers)[0]
+            work = point_kernels.bond_mean(m, z, dq, s, middle)[0] * dq
             before, formed = s2 / 2, m
-            m, z, s2, burnt = kernels.bond_step(m, z, s2, dq, s, middle)
-            eps = kernels.grow(eps, v, v, abs(dq), dt, numbers)[0]
+            m, z, s2, burnt = point_kernels.bond_step(m, z, s2, dq, s, middle)
+            eps = point_kernels.grow(eps, v, v, abs(dq), dt, numbers)[0]
             size = abs(work) + before + 1e-300
             worst[0], worst[1] = min(worst[0], burnt / 2 / size), min(worst[1], s2 / size)
             worst[2] = max(worst[2], abs(work + before - s2 / 2 - burnt / 2) / (size + (s + formed) * abs(dq)))
@@ -521,11 +517,11 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
         law = Bonds(0.4, 1.0, **growth)
         healed = 1 - 0.5 * np.exp(-0.4 / 1e-2)
         assert grow(law, 0.5, speed, speed, speed, 1.0) == pytest.approx(healed, rel=1e-14)
-        grown, _ = kernels.grow(0.5, speed, speed, abs(speed), 1.0, growth_numbers(law))
+        grown, _ = point_kernels.grow(0.5, speed, speed, abs(speed), 1.0, growth_numbers(law))
         assert grown == pytest.approx(healed, rel=1e-14)
-    out = kernels.bond_step(0.8, 0.3, 0.4, speed, 1.0, 1.0)
+    out = point_kernels.bond_step(0.8, 0.3, 0.4, speed, 1.0, 1.0)
     assert out == pytest.approx((0.8, 0.3, 0.4, 0.0), abs=1e-15)
-    assert kernels.bond_mean(0.8, 0.3, speed, 1.0, 1.0)[0] == pytest.approx(0.3, abs=1e-15)
+    assert point_kernels.bond_mean(0.8, 0.3, speed, 1.0, 1.0)[0] == pytest.approx(0.3, abs=1e-15)
 
 
 @pytest.mark.parametrize("reading, order", [("stretch", 1.0), ("stretch", 0.0), ("stretch", 2.0)])
@@ -547,7 +543,7 @@ def test_order_of_the_march_with_bonds_of_a_nanometre_is_half_towards_coulomb():
     A step spans thousands of bond lengths; every one converges and the ledger closes.
     """
     drive, w = 6 * 9.80665, 2 * np.pi * 135
-    coulomb = closed_forms.sliding_amplitude(135 / 143, 4 / 6, 0.05) * drive / OMEGA**2
+    coulomb = sliding_amplitude(135 / 143, 4 / 6, 0.05) * drive / OMEGA**2
     short = []
     for length in (1e-7, 1e-8, 1e-9):
         model = points_model(Bonds(0.4, length), [1e-4], [98.0665e4])

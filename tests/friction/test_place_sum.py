@@ -8,13 +8,14 @@ from list_paths import follow_list
 from test_friction_hub import OMEGA, one_mode
 
 from patchfem.core import BaseSine
-from patchfem.friction import place_sum_kernels as kernels
-from patchfem.friction.engines import choose, impossible
-from patchfem.friction.law import Bonds
-from patchfem.friction.place_step_kernels import place_step
-from patchfem.friction.place_sum import CELLS, node_error, nodes_for, place_sum, width_for
-from patchfem.friction.quadrature import Quadrature, cutoff
-from patchfem.simulate_march import list_model, march, place_model
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import list_model, place_model
+from patchfem.friction.bonds import place_sum_kernels as kernels
+from patchfem.friction.bonds.engines import choose, impossible
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.place_step_kernels import place_step
+from patchfem.friction.bonds.place_sum import CELLS, node_error, nodes_for, place_sum, width_for
+from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 
 GROWS = {"ratio": 0.5, "rest_growth": 0.3, "slip_growth": 0.05, "rest_speed": 1e-2}
 AHEAD, COUNT = 41, 7  # force after a step in the numbers; cells in use in row 0

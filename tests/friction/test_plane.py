@@ -14,11 +14,11 @@ from scipy.integrate import quad
 from scipy.special import gamma
 
 from patchfem.core import PatchfemError
-from patchfem.friction.law import Bonds
-from patchfem.friction.plane import PlaneRecursion
-from patchfem.friction.plane_quadrature import PlaneQuadrature
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.plane import PlaneRecursion
+from patchfem.friction.bonds.plane_quadrature import PlaneQuadrature
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion
 
 ONE = np.ones(1)
 GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)

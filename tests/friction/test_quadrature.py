@@ -6,9 +6,9 @@ import pytest
 from friction_paths import lower_pressure, sum_by_hand, triangle, upper_pressure, walk
 from scipy.special import gammaincc
 
-from patchfem.closed_forms import virgin_force
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import Quadrature, cutoff
+from patchfem.closed_forms.friction import virgin_force
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 
 ONE = upper_pressure([1.0, 0.25])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

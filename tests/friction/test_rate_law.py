@@ -5,9 +5,10 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.core import Outcome
-from patchfem.friction.local import Rate
-from patchfem.scene import SceneError, loads
-from patchfem.simulate import plan, run
+from patchfem.friction.laws.tanh import Rate
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, loads
 
 LOAD, LIMIT, MASS, OMEGA = 115.653761996773, 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
 LAW = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'
@@ -104,7 +105,7 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
 
 def test_exact_the_compiled_step_is_the_plain_one():
     from patchfem.compiled import load_kernels
-    from patchfem.simulate_march import rate_model
+    from patchfem.dynamics.march.models import rate_model
 
     hub, model = load_kernels(None), rate_model(2.5, 1e-3)
     contact, work = model.build(hub)

@@ -6,9 +6,9 @@ from friction_paths import lower_pressure, sum_by_hand, upper_pressure, walk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.friction.law import Bonds
-from patchfem.friction.quadrature import Quadrature
-from patchfem.friction.recursion import Recursion, advance, shape_functions
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion, advance, shape_functions
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
 X = np.linspace(-3, 3, 7)

@@ -8,11 +8,12 @@ from scipy.integrate import dblquad
 from test_run import PATCH, POINT, SHEAR
 from test_temperature import GROWING, RIG, TRIANGLE
 
-from patchfem import simulate_bench
-from patchfem.friction.spread import pad_factor
-from patchfem.scene import SceneError, loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_acting import acting
+from patchfem.friction.bonds.spread import pad_factor
+from patchfem.model.law import acting, bonds_of
+from patchfem.runs.bench import bench
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, loads
 
 NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n'
 SPREAD = ["friction.spread=4 mm"]
@@ -44,7 +45,7 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
     share = pad_factor(12.7e-3, 4e-3)
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
     for text in (point, PATCH):
-        whole, less = (simulate_bench.run(loads(text + NONLOCAL + law + TRIANGLE, sets=sets), patch_of(text), 80)
+        whole, less = (bench.run(loads(text + NONLOCAL + law + TRIANGLE, sets=sets), patch_of(text), 80)
                        for sets in ([], SPREAD))
         assert less.force == pytest.approx(share * whole.force, rel=1e-12, abs=1e-12 * np.abs(whole.force).max())
         assert less.values["loop_area"] == pytest.approx(share * whole.values["loop_area"], rel=1e-12)
@@ -54,14 +55,14 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
 def patch_of(text):
     if text != PATCH:
         return None
-    from patchfem.simulate_patch import solve_all
+    from patchfem.runs.patch.ladder import solve_all
 
     return solve_all(loads(PATCH + NONLOCAL + TRIANGLE), False)[0]
 
 
 def test_exact_a_growing_law_keeps_its_ratio_of_lengths():
     scene = loads(PATCH + GROWING + TRIANGLE, sets=SPREAD)
-    before, after = simulate_bench.bonds_of(loads(PATCH + GROWING + TRIANGLE)), simulate_bench.bonds_of(scene)
+    before, after = bonds_of(loads(PATCH + GROWING + TRIANGLE)), bonds_of(scene)
     assert after.ratio == pytest.approx(before.ratio, rel=1e-15) and after.length == before.length
     assert after.static == pytest.approx(pad_factor(12.7e-3, 4e-3) * before.static, rel=1e-15)
     assert acting(acting(scene)).friction == acting(scene).friction

@@ -9,15 +9,16 @@ from scipy.special import erfc
 from test_imports import BENCH, FROM_PYTHON, absent, loaded
 from test_run import PATCH, POINT
 
-from patchfem import closed_forms, simulate_bench
+from patchfem import closed_forms
 from patchfem.core import PatchfemError
-from patchfem.friction.law import Bonds, grow
-from patchfem.friction.recursion import Recursion
-from patchfem.friction.temperature import WarmRecursion, critical_speed, grow_each, growth_at, surface_rise
-from patchfem.scene import SceneError, loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_acting import acting
-from patchfem.simulate_rig import law_of
+from patchfem.friction.bonds.parameters import Bonds, grow
+from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.temperature import WarmRecursion, critical_speed, grow_each, growth_at, surface_rise
+from patchfem.model.law import acting, law_of
+from patchfem.runs.bench import bench
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import SceneError, loads
 
 GROWING = """[friction]
 law = "nonlocal"
@@ -114,7 +115,7 @@ def test_always_the_growth_per_point_is_that_of_one_point(dq, dt, eps):
 def test_exact_a_surface_at_its_reference_is_the_scene_without_the_table():
     text, cold = POINT + GROWING, ["friction.temperature.surface=293.15 K"]
     plain, warm = loads(text + TRIANGLE), loads(text + WARM + TRIANGLE, sets=cold)
-    one, two = (simulate_bench.run(scene, None, 200) for scene in (plain, warm))
+    one, two = (bench.run(scene, None, 200) for scene in (plain, warm))
     assert (one.force == two.force).all() and one.values == two.values
     assert plan(plain).groups == plan(warm).groups
 
@@ -123,7 +124,7 @@ def test_exact_steady_friction_of_a_warm_bench():
     """mu(v) of 2.18 with the rates of 2.13; the warm surface is the stronger one at this speed."""
     rest, slip = 10 * np.exp(2500 * (1 / 293.15 - 1 / 393.15)), 2e-7 * np.exp(1500 * (1 / 393.15 - 1 / 293.15))
     scene = loads(POINT + GROWING + WARM + SLIDE)
-    found = simulate_bench.run(scene, None, 2000).values["friction_ratio_end"]
+    found = bench.run(scene, None, 2000).values["friction_ratio_end"]
     truth = 0.6 * closed_forms.steady_bond_length(5e-3, 2e-6, 0.7, rest, slip) / 2e-6
     assert found == pytest.approx(truth, rel=1e-6)
     cold = 0.6 * closed_forms.steady_bond_length(5e-3, 2e-6, 0.7, 10.0, 2e-7) / 2e-6
@@ -209,6 +210,7 @@ def test_exact_the_rise_is_reported_beside_the_table_only():
 def test_exact_a_scene_without_these_effects_imports_none_of_them(tmp_path):
     (tmp_path / "scene.toml").write_text(BENCH.replace("coulomb", "nonlocal").replace(
         "static", 'bond_length = "2 um"\nstatic'), "utf-8")
-    absent(loaded(FROM_PYTHON, tmp_path / "scene.toml"), "friction.temperature", "friction.spread",
-           "friction.convolution", "friction.plane", "friction.plane_quadrature", "simulate_plane", "simulate_heat",
-           "simulate_convolution")
+    absent(loaded(FROM_PYTHON, tmp_path / "scene.toml"), "friction.bonds.temperature", "friction.bonds.spread",
+           "friction.laws.convolution", "friction.bonds.plane", "friction.bonds.plane_quadrature",
+           "runs.bench.two_directions", "runs.heat",
+           "runs.bench.averaged")

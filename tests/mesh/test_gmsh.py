@@ -7,11 +7,11 @@ import builtins
 import numpy as np
 import pytest
 
-from patchfem.closed_contact import rounded_punch_half_width, rounded_punch_pressure
-from patchfem.contact.elasticity import Layers
-from patchfem.contact.substructure import assemble, condense, joined
+from patchfem.closed_forms.contact import rounded_punch_half_width, rounded_punch_pressure
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Missing, PatchfemError
+from patchfem.elasticity.elasticity import Layers
+from patchfem.elasticity.substructure import assemble, condense, joined
 from patchfem.mesh.files import read_pieces, write_mesh
 from patchfem.mesh.rounded import rounded_pair
 

@@ -5,8 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchfem import scene, simulate_rig
+from patchfem.model.accuracy import choose
+from patchfem.model.drive import drive_of
+from patchfem.model.structure import modes_of
 from patchfem.response.errors import change, step_error, with_errors
+from patchfem.runs.rig import march as rig_march
+from patchfem.scene import scene
 
 TEXT = """
 [normal]
@@ -50,9 +54,9 @@ def coverage(count, seed):
     rng, held = np.random.default_rng(seed), []
     for _ in range(count):
         found = random_scene(rng)
-        settings, modes = simulate_rig.choose(found), simulate_rig.modes_of(found)
-        drive = simulate_rig.drive_of(found)
-        runs = {n: simulate_rig.run_march(found, replace(settings, steps=n), modes, drive, None).values
+        settings, modes = choose(found), modes_of(found)
+        drive = drive_of(found)
+        runs = {n: rig_march.run_march(found, replace(settings, steps=n), modes, drive, None).values
                 for n in (400, 200, 100, 12800)}
         errors = step_error(runs[400], runs[200], runs[100], 400)
         truth = change(runs[400], runs[12800])

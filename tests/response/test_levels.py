@@ -5,8 +5,9 @@ import pytest
 
 from patchfem.core import G_N
 from patchfem.response.levels import Level, bracket, hysteresis, jump
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 NAME = "relative_displacement_amplitude"
 RIG = """\

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from patchfem import closed_forms
 from patchfem.core import G_N, BaseSine, Outcome, PatchfemError, Response
+from patchfem.dynamics.march.march import hermite_extremes
+from patchfem.inputs.measured import FLAGS, read_table
 from patchfem.response import measures
-from patchfem.response.measured import FLAGS, read_table
-from patchfem.simulate_march import hermite_extremes
 
 TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
 OMEGA = 2 * pi * 143

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from patchfem.model.structure import modes_of
 from patchfem.response.ringing import ring, ringing
-from patchfem.scene import loads
-from patchfem.simulate import plan, run
-from patchfem.simulate_rig import modes_of
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 RELEASE = """\
 [normal]

@@ -5,7 +5,7 @@ import pytest
 from test_studies import study
 
 from patchfem import closed_forms as exact
-from patchfem.friction.recursion import Recursion
+from patchfem.friction.bonds.recursion import Recursion
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 from test_studies import study
 
 from patchfem import closed_forms as exact
-from patchfem.friction.recursion import Recursion
-from patchfem.simulate_march import growth_numbers
+from patchfem.dynamics.march.models import growth_numbers
+from patchfem.friction.bonds.recursion import Recursion
 
 
 @pytest.fixture(scope="module")

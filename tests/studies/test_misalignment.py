@@ -7,8 +7,8 @@ import pytest
 from test_studies import study
 
 from patchfem import closed_forms as exact
-from patchfem.simulate_measures import values
-from patchfem.simulate_patch import pressed
+from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.values import values
 
 LOAD, LENGTH = 26 * 4.4482216152605, 12.7e-3
 
@@ -59,7 +59,7 @@ def test_always_the_table_of_the_rigid_fixture(tilted, fixtures):
 
 
 def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
-    from patchfem.simulate_measures import measures
+    from patchfem.runs.patch.measures import measures
 
     found = fixtures.held(1e-3, None)
     two = measures(pressed(found, tilted.pair(1)), pressed(found, tilted.pair(0)))
@@ -71,8 +71,8 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
 @pytest.mark.slow
 @pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
 def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
-    from patchfem.simulate_grading import solve_graded
-    from patchfem.simulate_measures import measures
+    from patchfem.runs.patch.grading import solve_graded
+    from patchfem.runs.patch.measures import measures
 
     found = tilted.case(angle, skin)
     ours, other = tilted.measured(found), measures(*solve_graded(found))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from patchfem.friction.engines import MERGING
+from patchfem.friction.bonds.engines import MERGING
 
 
 def study(name: str):

@@ -1,0 +1,4 @@
+"""Many runs of one scene: fits, error against cost.
+
+Read `cost` first.
+"""

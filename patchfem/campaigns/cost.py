@@ -1,0 +1,155 @@
+"""What accuracy costs in time: a scene run again and again with one knob turned, each run timed against its error."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+from ..core import NotConverged, PatchfemError
+from ..model.pieces import AUTOMATIC_CELLS
+from ..runs.plan import plan
+from ..runs.run import run
+
+KNOBS = ("element_size", "steps_per_cycle", "shear_modes")
+LEVELS = 5  # values of a knob, each twice as fine as the one before
+MOST_CELLS = 1600  # columns of the finest mesh
+MOST_STEPS = 12800
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cost:
+    """One run of a curve. value: of the knob in SI, None where the tolerance chose; seconds of the whole run; values:
+    measure -> value; errors: measure -> distance to the best run, of the best run its own estimate."""
+
+    label: str
+    value: float | None
+    seconds: float
+    values: dict
+    errors: dict
+    units: dict
+
+
+def knobs_of(scene) -> list:
+    """Knobs that change what a scene computes."""
+    out = ["element_size"] if scene.contact is not None else []
+    if scene.kind in ("bench", "rig") or (scene.kind == "linear" and scene.accuracy.method == "march"):
+        engine = plan(scene).engine
+        if engine in ("march", "bench"):
+            out.append("steps_per_cycle")
+            if scene.contact is not None and scene.contact.gives_way and scene.friction.law == "nonlocal":
+                out.append("shear_modes")
+    return out
+
+
+def curve(scene, knob: str, say=None) -> list:
+    """Cost of every value of a knob, coarse to fine; a static patch ends with the mesh that its tolerance chooses.
+
+    PatchfemError for a knob that this scene does not have.
+    """
+    mine = knobs_of(scene)
+    if knob not in mine:
+        raise PatchfemError(f"{scene.path}: cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}")
+    wanted = list(_turned(scene, knob))
+    _timed(wanted[0][2], "first run, not counted", wanted[0][1], None)  # imports and compiling stay out of the times
+    runs = [_timed(turned, label, value, say) for label, value, turned in wanted]
+    runs = [one for one in runs if one is not None]
+    if len(runs) < 3:
+        raise PatchfemError(f"{scene.path}: cost --over {knob}: fewer than three values could be run")
+    if knob == "element_size" and scene.kind == "patch" and scene.contact.mesh is None:
+        chosen = _timed(_sized(scene, None), "by tolerance", None, say, True)
+        if chosen is not None:
+            return [*(_beside(one, chosen) for one in runs), chosen]
+    from ..runs.patch.measures import remainder
+
+    fine, coarse, coarsest = runs[:-4:-1]
+    left = {name: remainder(abs(value - coarse.values[name]), abs(coarse.values[name] - coarsest.values[name]))
+            for name, value in fine.values.items() if name in coarse.values and name in coarsest.values}
+    return [*(_beside(one, fine) for one in runs[:-1]), replace(fine, errors=left)]
+
+
+def _beside(one: Cost, best: Cost) -> Cost:
+    return replace(one, errors={name: abs(value - best.values[name]) for name, value in one.values.items()
+                                if name in best.values})
+
+
+def _turned(scene, knob: str):
+    """(label, value, scene) for every value of a knob, coarse to fine."""
+    if knob == "element_size" and scene.contact.mesh is not None:
+        for level in range(3):
+            yield f"file split {2**level} x", float(2**-level), (scene, level)
+        return
+    if knob == "element_size":
+        length = scene.contact.length
+        middle = round(length / (scene.contact.element_size or length / AUTOMATIC_CELLS))
+        for power in range(-3, LEVELS - 3):
+            cells = round(middle * 2.0**power)
+            if 8 <= cells <= MOST_CELLS:
+                yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(scene, length / cells), 0)
+        return
+    from ..model.accuracy import choose
+
+    now = getattr(scene.accuracy, knob) or (choose(scene).steps if knob == "steps_per_cycle" and scene.kind == "rig"
+                                            else {"steps_per_cycle": 400, "shear_modes": 8}[knob])
+    for power in range(-2, LEVELS - 2):
+        value = max(1, round(now * 2.0**power))
+        if knob == "shear_modes" or 4 <= value <= MOST_STEPS:
+            accuracy = scene.accuracy.model_copy(update={knob: value})
+            yield str(value), float(value), (replace(scene, accuracy=accuracy), 0)
+
+
+def _sized(scene, size):
+    return replace(scene, contact=scene.contact.model_copy(update={"element_size": size}))
+
+
+def _timed(turned, label: str, value, say, estimate: bool = False):
+    scene, level = turned if isinstance(turned, tuple) else (turned, 0)
+    begin = perf_counter()
+    try:
+        if level or (scene.kind == "patch" and scene.contact.mesh is not None):
+            (values, units), errors = _split_file(scene, level), {}
+        else:
+            found = run(plan(scene), estimate=estimate, fresh=True).measures
+            values = {name: m.value for name, m in found.items() if m.value is not None}
+            errors = {name: m.error for name, m in found.items() if m.error is not None} if estimate else {}
+            units = {name: m.unit for name, m in found.items()}
+    except (NotConverged, MemoryError) as error:
+        if say is not None:
+            say(f"{label}: left out ({error or 'out of memory'})")
+        return None
+    seconds = perf_counter() - begin
+    if say is not None:
+        say(f"{label}: {seconds:.2f} s")
+    return Cost(label, value, seconds, values, errors, units)
+
+
+def _split_file(scene, level: int) -> tuple:
+    """Static measures on the mesh of a file with every edge halved `level` times."""
+    from ..mesh.anymesh import halved
+    from ..mesh.tensor import TensorGrid, finer
+    from ..model.pieces import bodies_of
+    from ..runs.patch.press import solve
+    from ..runs.patch.values import UNITS, values
+
+    low, high = bodies_of(scene)
+    for _ in range(level):
+        low, high = (None if body is None else finer(body) if isinstance(body, TensorGrid) else halved(body)
+                     for body in (low, high))
+    return values(solve(scene, low, high, True)), UNITS
+
+
+def turned_by(runs: list) -> list:
+    """Measures that the knob changes at all, in the order of the runs."""
+    return [name for name, value in runs[0].values.items()
+            if any(one.errors.get(name, 0.0) > 1e-11 * abs(one.values[name]) for one in runs[:-1])]
+
+
+def cheapest(runs: list, tolerance: float) -> dict:
+    """measure -> label of the quickest run within the tolerance that no finer one leaves again, None where no run is:
+    a coarse run that is right by chance does not count."""
+    out = {}
+    for name in turned_by(runs):
+        good = []
+        for one in reversed(runs):
+            if name not in one.errors or one.errors[name] > tolerance * abs(one.values[name]):
+                break
+            good.append(one)
+        out[name] = min(good, key=lambda one: one.seconds).label if good else None
+    return out

@@ -1,0 +1,150 @@
+"""A measured friction loop identified: scene values whose bench force, along the measured motion, fits the measured."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from ..core import NotConverged, Outcome, PatchfemError
+from ..identify.least_squares import Fit, fit
+from ..identify.words import remarks
+from ..inputs.loops import Loop, read_loop
+from ..scene.quantities import KINDS
+from ..scene.ranges import ranges
+from ..scene.scene import Scene, SceneError
+from .fit_model import Model
+
+MOST_PIECES = 64  # steps between two rows
+LOAD_UNITS = {"time": KINDS["time"], "displacement": KINDS["length"],
+              "force": KINDS["force"], "friction_ratio": {"": 1.0, "1": 1.0}}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fitted:
+    """free: the ranges; found: the fit in their order; model (k,): fitted reading at the rows of `loop`; held (k,);
+    rms and held_rms (None where no row is held) in the unit of the reading; step_error: largest change of the model
+    when its steps are halved; sets: the --set strings that make the scene fitted; warnings: sentences."""
+
+    scene: Scene
+    loop: Loop
+    free: list
+    found: Fit
+    model: np.ndarray
+    held: np.ndarray
+    rms: float
+    held_rms: float | None
+    step_error: float
+    pieces: int
+    sets: list
+    warnings: list
+    seconds: float
+
+    @property
+    def outcome(self) -> Outcome:
+        """done, or not_converged where the descent ran out of evaluations."""
+        return self.found.outcome
+
+
+def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
+    """Fit the keys `free` ("table.key=low..high" texts) of a bench scene to the loop in the file `to`.
+
+    The model starts unstressed in the first row and follows the measured rows, straight between them; rows named by
+    hold ("column=value,value") are driven through but only predicted. SceneError and PatchfemError name bad input.
+    """
+    begin = perf_counter()
+    if scene.kind != "bench":
+        raise SceneError([f"{scene.path}: fit: a {scene.kind} scene; only loops of [slide] scenes are fitted, fits of "
+                          "other kinds are not yet built"])
+    wanted, wrong = ranges(free)
+    if wrong:
+        raise SceneError(wrong)
+    loop = read_loop(to, LOAD_UNITS)
+    held = np.zeros(loop.reading.size, bool)
+    for one in hold:
+        held |= loop.rows_of(one)
+    used = np.count_nonzero(~held)
+    if used <= len(wanted):
+        raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(wanted)} values and their "
+                            "intervals")
+    bench = Model(scene, loop, wanted, say)
+    scale = float(np.abs(loop.reading[~held]).max())
+
+    def residual(values):
+        return (bench(values) - loop.reading)[~held] / scale
+
+    try:
+        found, step_error = _refined(bench, residual, wanted, scene, say)
+    except NotConverged:
+        if bench.made == 0:
+            raise bench.refused from None
+        raise
+    model = bench(found.values)
+    miss = model - loop.reading
+    rms = [float(np.sqrt(np.mean(miss[rows]**2))) if rows.any() else None for rows in (~held, held)]
+    sets = [*bench.sets, *(one.assigned(value) for one, value in zip(wanted, found.values))]
+    warnings = [*scene.remarks, *bench.notes, *remarks(found, [one.key for one in wanted]),
+                *_doubts(loop, miss, held, rms[0], step_error, scene)]
+    return Fitted(scene, loop, wanted, found, model, held, rms[0], rms[1], step_error, bench.pieces, sets, warnings,
+                  perf_counter() - begin)
+
+
+def _refined(bench, residual, wanted, scene, say) -> tuple:
+    """(fit, change of the model when its steps are halved); steps are halved until they change the fit too little."""
+    low, high = [one.low for one in wanted], [one.high for one in wanted]
+    start, starts, before, agreed = _own_values(scene, wanted), 3, (0, 0, ""), 0
+    while True:
+        found = fit(residual, low, high, start=start, starts=starts, bars=bench.exact)
+        agreed = found.agreed if starts > 1 else agreed
+        found = _counted(found, before)
+        before = (found.evaluations, found.failures, found.reason)
+        if bench.exact:
+            return found, 0.0
+        coarse = bench(found.values)
+        bench.pieces *= 2
+        fine = bench(found.values)
+        change, peak = float(np.abs(fine - coarse).max()), float(np.abs(fine).max())
+        if bench.pinned or change <= 0.1 * scene.accuracy.tolerance * peak or bench.pieces >= MOST_PIECES:
+            bench.pieces //= 2
+            last = _counted(fit(residual, low, high, start=found.values, starts=1), before)
+            return replace(last, agreed=agreed), change
+        if say:
+            say(f"{bench.pieces} steps between two rows")
+        start, starts = found.values, 1
+
+
+def _counted(found: Fit, before: tuple) -> Fit:
+    """The fit with the evaluations, failures and first reason of the fits before it."""
+    return replace(found, evaluations=found.evaluations + before[0], failures=found.failures + before[1],
+                   reason=before[2] or found.reason)
+
+
+def _own_values(scene: Scene, wanted: list) -> list:
+    """What the scene itself says, or the middle of the range; held inside the range."""
+    out = []
+    for one in wanted:
+        value = scene
+        for part in one.key.split("."):
+            value = getattr(value, part, None)
+        if not isinstance(value, float):
+            wide = one.low > 0 and one.high > 10 * one.low
+            value = np.sqrt(one.low * one.high) if wide else (one.low + one.high) / 2
+        out.append(float(np.clip(value, one.low, one.high)))
+    return out
+
+
+def _doubts(loop: Loop, miss, held, rms: float, step_error: float, scene: Scene) -> list:
+    """Sentences where the rows are no sample of the model with independent noise."""
+    out, peak = [], float(np.abs(loop.reading).max())
+    inside = miss[~held] - miss[~held].mean()
+    if rms > 1e-6 * peak and inside.size > 20:
+        tied = float(inside[1:] @ inside[:-1] / (inside @ inside))
+        if tied > 0.3:
+            out.append(f"the residual is correlated from row to row ({tied:.2f}): the law misses something, and the "
+                       "intervals, which take rows as independent, are too narrow")
+    if abs(loop.reading[0]) > 0.2 * peak and scene.friction.law not in ("coulomb", "tanh") and not held[0]:
+        out.append(f"the first row carries {abs(loop.reading[0]) / peak:.0%} of the peak, where the model starts "
+                   "unstressed: hold the first cycle out or begin the record at rest")
+    if step_error > scene.accuracy.tolerance * peak:
+        out.append(f"half the steps change the model by {step_error / peak:.1g} of the peak, more than the tolerance")
+    return out

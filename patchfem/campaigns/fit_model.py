@@ -1,0 +1,101 @@
+"""The bench along a measured motion as a function of some values of its scene."""
+
+import numpy as np
+
+from ..core import Outcome, PatchfemError
+from ..inputs.loops import Loop
+from ..scene.scene import Scene, SceneError, loads
+
+
+class Model:
+    """The bench of a scene along the measured rows, as a function of the free values."""
+
+    def __init__(self, scene: Scene, loop: Loop, wanted: list, say):
+        self.scene, self.loop, self.wanted, self.say = scene, loop, wanted, say
+        self.notes, self.sets, law = [], [], scene.friction
+        self.time = self._paced()
+        named = {one.key for one in wanted}
+        if law.law == "nonlocal" and law.rest_growth is not None and law.rest_speed is None \
+                and "friction.rest_speed" not in named:
+            speed = 1e-3 * float(np.abs(np.diff(loop.displacement) / np.diff(self.time)).max())
+            self.sets.append(f"friction.rest_speed={speed!r} m/s")
+        self._note_amplitude()
+        self.instant = law.law in ("coulomb", "tanh")
+        soft = scene.contact is not None and scene.contact.gives_way
+        steady = law.law != "nonlocal" or (law.rest_growth is None and (law.reading == "report" or law.order == 1))
+        self.exact = steady and not (soft and law.law == "nonlocal") and not self._on_lower()
+        steps, legs = scene.accuracy.steps_per_cycle, loop.reading.size - 1
+        self.pinned = steps is not None
+        self.pieces = max(1, -(-steps // legs)) if self.pinned and not self.exact else 1
+        self.refused, self.made = None, 0
+        self.patch, self.moving = None, any(key.startswith("contact.") for key in named)
+
+    def __call__(self, values) -> np.ndarray:
+        """(k,) reading at the rows; PatchfemError where the values make no scene."""
+        from ..runs.bench import bench as law_bench
+
+        scene = self.scene_at(values)
+        self.made += 1
+        patch = self._patch(scene)
+        corner = np.arange(self.time.size) * self.pieces
+        number = np.arange(corner[-1] + 1)
+        path = np.interp(number, corner, self.time), np.interp(number, corner, self.loop.displacement), 0, 0.0
+        run = law_bench.run(scene, patch, 4, 0, self.say, path)
+        if not run.load[0] > 0:
+            raise PatchfemError(f"{scene.path}: no load presses the pieces")
+        out = run.force[corner]
+        if self.instant:  # a row stands between two straight legs: the mean of both sides
+            after = run.force[np.minimum(corner + 1, number[-1])]
+            out = np.where(corner == 0, after, (out + after) / 2)
+        return out / run.load[0] if self.loop.quantity == "friction_ratio" else out
+
+    def scene_at(self, values) -> Scene:
+        """The scene with these free values."""
+        sets = [*self.sets, *(one.assigned(value) for one, value in zip(self.wanted, values))]
+        try:
+            return loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
+        except SceneError as error:
+            self.refused = self.refused or error
+            raise PatchfemError(error.mistakes[0]) from None
+
+    def _patch(self, scene):
+        if scene.contact is None:
+            return None
+        if self.patch is None or self.moving:
+            from ..runs.patch.ladder import solve_all
+
+            self.patch = solve_all(scene, False)[0]
+            if self.patch.pressure.outcome is Outcome.NO_CONTACT:
+                raise PatchfemError(f"{scene.path}: {self.patch.pressure.outcome.sentence}")
+        return self.patch
+
+    def _on_lower(self) -> bool:
+        if self.scene.contact is None:
+            return False
+        from ..model.gap import shape_side
+
+        return shape_side(self.scene.contact) == "lower"
+
+    def _paced(self) -> np.ndarray:
+        """Time of the rows: measured, or from the speed of the slide, or even where time does not matter."""
+        loop, scene = self.loop, self.scene
+        if loop.time is not None:
+            return loop.time
+        law, slide = scene.friction, scene.slide
+        aged = law.law == "tanh" or (law.law == "nonlocal" and law.rest_growth is not None)
+        if not aged and not (scene.normal is not None and scene.normal.amplitude):
+            self.notes.append(f"{loop.path} has no time: its rows are taken as even in time, which law '{law.law}' "
+                              "does not feel")
+            return np.arange(float(loop.reading.size))
+        move = np.abs(np.diff(loop.displacement))
+        if slide.kind in ("constant", "triangle") and move.all():
+            self.notes.append(f"{loop.path} has no time: its rows follow each other at slide.speed")
+            return np.concatenate([[0.0], np.cumsum(move / slide.speed)])
+        raise PatchfemError(f"{loop.path}:1: no column time [s], which law '{law.law}' needs here (only a constant or "
+                            "triangle slide that never rests has its pace in the scene)")
+
+    def _note_amplitude(self) -> None:
+        slide, half = self.scene.slide, float(np.ptp(self.loop.displacement)) / 2
+        if slide.kind in ("sine", "triangle") and abs(slide.amplitude - half) > 0.02 * half:
+            self.notes.append(f"slide.amplitude is {slide.amplitude:.4g} m, but the measured displacement runs over "
+                              f"+-{half:.4g} m; the model follows the measured one")

@@ -1,0 +1,125 @@
+"""Exact answers for one mode with Coulomb friction: bounds, sliding and two-stop motions, free decay.
+
+Vibration is written for one mode under a base acceleration a sin: r = drive over natural frequency, friction force f
+and input a in the same unit (an acceleration, or a force over the same mass), motions as a multiple of a/omega_n^2.
+"""
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .contact import positive
+
+COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven at its own frequency
+
+
+def decay_half_cycles(start, friction) -> int:
+    """Half cycles N_0 until a released Coulomb oscillator rests: max(0, ceil((|x_0|/friction - 1)/2)).
+
+    start x_0 [m], friction F/k [m]. The report leaves N_0 in 3.11 unrounded, but (-1)^N_0 needs an integer.
+    ValueError unless friction is positive.
+    """
+    positive(friction=friction)
+    return max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
+
+
+def decay_rest(start, friction, omega) -> tuple:
+    """(time [s], place [m]) at which a Coulomb oscillator released at `start` comes to rest; arguments of `decay`."""
+    positive(omega=omega)
+    count = decay_half_cycles(start, friction)
+    sign = 1.0 if start >= 0 else -1.0
+    return np.pi * count / omega, sign * (-1.0)**count * (abs(start) - 2 * count * friction)
+
+
+def decay(time, start, friction, omega):
+    """Displacement [m] of an undamped Coulomb oscillator released at rest (eq. 3.11 with N_0 rounded up).
+
+    time (k,) [s] >= 0, start x_0 [m], friction F/k [m], omega [rad/s]. ValueError for a negative time, and unless
+    friction and omega are positive.
+    """
+    time = np.asarray(time, float)
+    if np.any(time < 0):
+        raise ValueError("time must not be negative")
+    stop, place = decay_rest(start, friction, omega)
+    count = np.floor(omega * time / np.pi)
+    turn = np.where(count % 2 == 0, 1.0, -1.0)
+    moving = (abs(start) - (2 * count + 1) * friction) * np.cos(omega * time) + turn * friction
+    return np.where(time < stop, (1.0 if start >= 0 else -1.0) * moving, place)
+
+
+def bounded_input(friction):
+    """Largest base acceleration that friction alone keeps bounded at resonance: a = (4/pi) f (same unit as f)."""
+    return friction / COULOMB_RESONANCE
+
+
+def sliding_amplitude(r, friction, damping=0.0) -> float:
+    """Amplitude over a/omega_n^2 of steady motion that slides without a stop (Den Hartog 1931; damping added).
+
+    r = drive/natural frequency > 0, friction f/a >= 0, damping ratio 0 <= xi < 1. Without damping it is
+    sqrt(V^2 - (U f/a)^2), V = 1/(1 - r^2), U = sin(pi/r)/(r (1 + cos(pi/r))).
+    ValueError where no such motion exists (the block stops on the way: below the knee), and without damping at r = 1.
+
+    Between two turns the motion is f + e^(-xi T)(A cos w T + B sin w T) + particular, T = omega_n t; it is
+    antisymmetric over half a drive period, which gives A and B; the rest follows from the particular
+    amplitude 1/|1 - r^2 + 2 i xi r|.
+    """
+    positive(r=r)
+    if friction < 0 or not 0 <= damping < 1:
+        raise ValueError(f"friction must be >= 0 and damping in [0, 1), got {friction}, {damping}")
+    if damping == 0 and r == 1:
+        raise ValueError("no steady sliding motion at resonance without damping; see bounded_input")
+    half, w = np.pi / r, np.sqrt(1 - damping**2)
+
+    def basis(t):
+        e, c, s = np.exp(-damping * t), np.cos(w * t), np.sin(w * t)
+        return e * np.array([c, s]), e * np.array([-damping * c - w * s, -damping * s + w * c])
+
+    (x0, v0), (x1, v1) = basis(0.0), basis(half)
+    try:
+        free = np.linalg.solve(np.stack([x0 + x1, v0 + v1]), [-2 * friction, 0.0])
+    except np.linalg.LinAlgError:
+        raise ValueError(f"no isolated sliding motion at r = {r} without damping") from None
+    size2 = 1 / ((1 - r * r)**2 + (2 * damping * r)**2)
+    sine = v0 @ free / r
+    if size2 < sine**2:
+        raise ValueError(f"no motion without stops at r = {r}, f/a = {friction}")
+    cosine = np.sqrt(size2 - sine**2)
+    t = half * (np.arange(2000) + 0.5) / 2000
+    speed = np.array([basis(at)[1] @ free for at in t]) - r * (cosine * np.sin(r * t) + sine * np.cos(r * t))
+    if speed.max() > 0:
+        raise ValueError(f"the block stops on the way at r = {r}, f/a = {friction}")
+    return float(friction + x0 @ free + cosine)
+
+
+def two_stop_relation(slip):
+    """(f/a, amplitude over a/omega_n^2) of the steady motion with two stops per cycle: undamped, at resonance.
+
+    slip in (0, pi): drive phase [rad] during which the block slides in each half cycle; release at the phase t_0,
+    tan t_0 = s sin s/(sin s - s cos s); f/a runs from 1 (s = 0) to pi/4 (s = pi), the amplitude from 0 to pi/4.
+    ValueError for a slip outside (0, pi).
+    """
+    s = np.asarray(slip, float)
+    if np.any(s <= 0) or np.any(s >= np.pi):
+        raise ValueError("slip must lie between 0 and pi")
+    start = np.arctan2(s * np.sin(s), np.sin(s) - s * np.cos(s))
+    ratio = 0.5 * (np.sin(start) * (1 + np.cos(s)) + 0.5 * np.cos(start) * np.sin(s) - s / 2 * np.cos(start + s))
+    return ratio, ratio - np.sin(start)
+
+
+def two_stop_amplitude(friction) -> float:
+    """Amplitude over a/omega_n^2 at resonance, undamped, for f/a: inverse of `two_stop_relation`, to 1e-7.
+
+    0 for f/a >= 1 (the block never slips), inf below pi/4 (friction cannot bound the motion). Within 1e-4 of the onset
+    the two terms of the relation cancel; the series 9/4 d^2 (1 + 2.9 d), d = 1 - f/a, stands in.
+    """
+    if friction >= 1:
+        return 0.0
+    if friction < COULOMB_RESONANCE:
+        return float("inf")
+    miss = 1 - friction
+    if miss < 1e-4:
+        return 2.25 * miss**2 * (1 + 2.9 * miss)
+    low, high = 0.04, np.pi * (1 - 1e-9)
+    if two_stop_relation(high)[0] >= friction:
+        return float(COULOMB_RESONANCE)
+    slip = brentq(lambda s: float(two_stop_relation(s)[0]) - friction, low, high, xtol=1e-15, rtol=1e-14)
+    return float(two_stop_relation(slip)[1])

@@ -1,0 +1,178 @@
+"""Exact answers of friction laws along given slides: bonds of eqs. 2.10 to 2.17, Jenkins elements, Coulomb.
+
+Signs of the project: compression > 0; friction positive against positive slip; slide = upper - lower. Lengths called
+`length` are bond lengths eps_0 [m]; `limit` = mu_s N [N] (or mu_s sigma [Pa], the result then has that unit).
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.special import gamma, gammainc, gammaincc, gammaln, hyp1f1, xlogy
+
+from .contact import positive
+
+
+def _reading(reading):
+    if reading not in ("stretch", "report"):
+        raise ValueError(f"reading must be 'stretch' or 'report', got {reading!r}")
+
+
+def weight_along(relative_path, order=1.0):
+    """Weight of a bond along the path (eq. 2.14, Fig. 13): x^p e^-x/p!, x = R/eps >= 0; unit area, largest at x = p.
+
+    For -1 < p < 0 it is infinite at x = 0. ValueError for p <= -1 or a path < 0.
+    """
+    x = np.asarray(relative_path, float)
+    if order <= -1:
+        raise ValueError(f"order must exceed -1, got {order}")
+    if np.any(x < 0):
+        raise ValueError("a path is never negative (2.9)")
+    with np.errstate(divide="ignore"):
+        return np.exp(xlogy(order, x) - x - gammaln(order + 1))
+
+
+def weight_across(relative_distance):
+    """Weight of a bond perpendicular to the path (eq. 2.15, Fig. 14): e^(-y^2/2)/sqrt(2 pi), y = eta/rho; unit area
+    over y, so 2.16 divides by rho."""
+    return np.exp(-np.asarray(relative_distance, float)**2 / 2) / np.sqrt(2 * np.pi)
+
+
+def growth_factor(share, order=1.0) -> float:
+    """Steady friction of bonds that grow from zero (2.10 as printed) over that of full-grown ones (2.18).
+
+    G(a; p) = int_0^inf phi_p(s/(1 - e^(-s/a))) ds, a = share = ell/eps with 1/ell = a_s/v^2 + 1/l_k: the path on which
+    a bond ripens, in bond lengths. G(0; p) = 1 and G(p; p) = 1; it falls like e^-a for bonds that break unripe.
+    ValueError for a < 0 or p <= -1. To 1e-12, by adaptive quadrature between the scales of the integrand.
+    """
+    if share < 0:
+        raise ValueError(f"share must not be negative, got {share}")
+    weight_along(1.0, order)  # refuses the order
+    if share == 0:
+        return 1.0
+    ends = [share * 4.0**k for k in range(-2, 30)] + [1.0, *(order + 4.0 * 3.0**k for k in range(4))]
+    last = order + 40 + 12 * np.sqrt(order + 40)
+    cuts = np.unique([0.0, last, *(end for end in ends if 0 < end < last)])
+    parts = [quad(lambda s: float(weight_along(s / -np.expm1(-s / share) if s > 0 else share, order)), a, b,
+                  epsabs=0.0, epsrel=1e-13, limit=200)[0] for a, b in pairwise(cuts)]
+    return float(np.sum(parts))
+
+
+def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
+    """Bond length [m] in steady sliding (eq. 2.11): (eps_0 + eps_k w)/(1 + w), w = v^2/(a_s l_k).
+
+    speed [m/s] of either sign, ratio = eps_k/eps_0, rest_growth a_s [m s-2], slip_growth l_k [m]; ValueError unless
+    the last four are positive.
+    """
+    positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
+    slow = 1 / np.hypot(1.0, np.asarray(speed, float) / np.sqrt(rest_growth * slip_growth))
+    return length * (ratio + (1 - ratio) * slow * slow)
+
+
+def steady_shear(direction, pressure, static, ratio=1.0):
+    """Shear [Pa] in steady rigid sliding (eq. 2.18), direction * mu_s (eps/eps_0) sigma, stretch reading.
+
+    pressure (m,) [Pa]; static mu_s; ratio = eps/eps_0 with eps of `steady_bond_length`. ValueError unless direction is
+    +1 or -1. In the report reading a bond grows from zero and 2.18 holds only where it ripens within its own length.
+    """
+    if direction not in (1, -1):
+        raise ValueError(f"direction must be +1 or -1, got {direction}")
+    return direction * static * ratio * np.asarray(pressure, float)
+
+
+def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
+    """Friction after a first slide >= 0 [m] of one direction (eq. 2.17 at constant bond length), either reading.
+
+    limit*(P(p + 1, x) + m_0 phi_p(x)), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
+    Stretch p = 1, m_0 = 1 and report p = 0, m_0 = 0 are both 1 - e^-x. ValueError for p <= -1 or a slide < 0.
+    """
+    positive(length=length)
+    x = np.asarray(slide, float) / length
+    if order <= -1:
+        raise ValueError(f"order must exceed -1, got {order}")
+    if np.any(x < 0):
+        raise ValueError("slide must not be negative; the virgin curve is odd")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
+    return limit * (gammainc(order + 1, x) + first)
+
+
+def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
+    """Friction after a long slide and a way back [m] (constant bond length), positive in the first direction.
+
+    x = back/length; report: limit*(2 Q(p + 1, 2x) - 1), so 2 e^-2x - 1 for p = 0; stretch: 2 e^-x - 1 for p = 1, else
+    e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
+    ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
+    """
+    positive(length=length)
+    _reading(reading)
+    x = np.asarray(back, float) / length
+    if np.any(x < 0):
+        raise ValueError("back must not be negative")
+    if reading == "report":
+        if order <= -1:
+            raise ValueError(f"order must exceed -1, got {order}")
+        return limit * (2 * gammaincc(order + 1, 2 * x) - 1)
+    if order < 0:
+        raise ValueError(f"order must not be negative in the stretch reading, got {order}")
+    if order == 1:
+        return limit * (2 * np.exp(-x) - 1)
+    old = x**(order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)
+    return limit * (np.exp(-2 * x) - gammainc(order + 1, x) - old)
+
+
+def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
+    """(area, force at the end of a stroke) of a steady loop of the stretch reading, p = 1, constant bond length.
+
+    amplitude, length [m]; limit = mu_s N [N]; breakaway: share b of the length that stretches without damage. With
+    x = amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E): force limit z, area
+    4 limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2); b = 0: 4 limit (amplitude - length tanh x), Dahl's
+    loop. Up to x = b the loop is a line: no area, force limit x of a slide from rest. Returns ([J], [N]).
+    ValueError unless amplitude and length are positive and 0 <= breakaway < 1.
+    """
+    positive(amplitude=amplitude, length=length)
+    if not 0 <= breakaway < 1:
+        raise ValueError(f"breakaway must be in [0, 1), got {breakaway}")
+    x, b = np.asarray(amplitude, float) / length, breakaway
+    e = np.exp(-2 * np.maximum(x - b, 0.0))
+    z = (1 - (1 - 2 * b) * e) / (1 + e)
+    area = 4 * limit * length * (x - b + b * b - b * z - (1 + z - 2 * b) * (1 - e) / 2)
+    return np.where(x > b, area, 0.0)[()], limit * np.where(x > b, z, x)[()]
+
+
+def dither_drift(low, high, breakaway=0.0):
+    """Slide per cycle in bond lengths that a force between low and high (shares of mu_s N, -1 < low < high < 1) leaves
+    behind in the stretch reading, p = 1, constant bond length and load; 0 where high - low <= 2 breakaway.
+
+    Up: the elastic range, then ln((1 - low - 2 b)/(1 - high)); down: the range, then ln((1 + high - 2 b)/(1 + low)).
+    """
+    if high - low <= 2 * breakaway * (1 + 1e-12):
+        return 0.0
+    return float(np.log((1 - low - 2 * breakaway) / (1 - high)) - np.log((1 + high - 2 * breakaway) / (1 + low)))
+
+
+def report_loop(amplitude, length, limit=1.0):
+    """(area, force at the end of a stroke) of the steady loop of the printed law, p = 0, constant bond length.
+
+    4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
+    ValueError unless amplitude and length are positive.
+    """
+    positive(amplitude=amplitude, length=length)
+    amplitude = np.asarray(amplitude, float)
+    return 4 * limit * (amplitude / np.tanh(2 * amplitude / length) - length / 2), limit * np.ones_like(amplitude)
+
+
+def jenkins_loop(amplitude, length, limit=1.0):
+    """(area, force at the end of a stroke) of the elastic-plastic law 3.12 with its reversal: 4 limit (A - eps), limit.
+
+    Below the yield slide (amplitude <= length) the loop is a line: (0, limit A/eps).
+    ValueError unless amplitude and length are positive.
+    """
+    positive(amplitude=amplitude, length=length)
+    amplitude = np.asarray(amplitude, float)
+    return 4 * limit * np.maximum(amplitude - length, 0), limit * np.minimum(amplitude / length, 1)
+
+
+def coulomb_loop_area(amplitude, limit=1.0):
+    """Area [J] of the loop of rigid Coulomb friction, 4 limit A."""
+    return 4 * limit * np.asarray(amplitude, float)

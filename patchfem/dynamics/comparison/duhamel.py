@@ -1,0 +1,87 @@
+"""The report's implicit procedure: Duhamel's integral of each mode (3.10) with forces that run straight in the step.
+
+The friction at the end of a step is found by relaxed fixed-point iteration and accepted when the displacement, the
+speed or the force stops changing. A change of the displacement by d between two iterates leaves the force wrong by up
+to 6 m d/(relax h^2), one of the speed by 2 m d/(relax h): the first two say little about the force.
+"""
+
+import numpy as np
+from scipy.linalg import expm
+
+from ...core import ModalBasis, PatchfemError, Start
+from .comparison import Comparison, finish, grid
+from .point_laws import ElasticPlastic, rows, sticking_warnings
+
+CRITERIA = ("displacement", "velocity", "force")
+
+
+def kernels(modes: ModalBasis, h: float) -> np.ndarray:
+    """(n, 2, 4) maps of (z, z', f at the start, f at the end) to (z, z') after h [s] under f [m s-2] linear in time.
+
+    The damping on the diagonal of D is inside, exact for rigid, undamped and overdamped modes alike.
+    """
+    out = np.empty((modes.omega.size, 2, 4))
+    for i, (w, d) in enumerate(zip(modes.omega, np.diag(modes.dampers))):
+        a = np.zeros((4, 4))
+        a[0, 1], a[1, :3], a[2, 3] = 1.0, (-w * w, -d, 1.0), 1.0 / h
+        out[i] = expm(a * h)[:2]
+        out[i, :, 2] -= out[i, :, 3]
+    return out
+
+
+def admitted(modes: ModalBasis, h: float, convergence: str, tolerance: float, relax: float) -> np.ndarray:
+    """(i,) [N]: wrong by how much the friction of an accepted step can be."""
+    if convergence == "force":
+        return np.full(len(modes.interfaces), tolerance)
+    at = CRITERIA.index(convergence)
+    return tolerance * modes.mass / (relax * (modes.interfaces**2 @ kernels(modes, h)[:, at, 3]))
+
+
+def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, convergence: str = "force",
+        tolerance: float = 1e-6, relax: float = 0.5, start: Start | None = None, most: int = 200) -> Comparison:
+    """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface.
+
+    convergence: what must not change between two iterates of a step, "displacement" (tolerance in m), "velocity" (m/s)
+    or "force" (N); relax in (0, 1]; most: iterations per step. PatchfemError for values that cannot be.
+    """
+    if convergence not in CRITERIA:
+        raise PatchfemError(f"accuracy.convergence: '{convergence}' is none of {', '.join(CRITERIA)}")
+    if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
+        raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: wanted "
+                            "are a finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations")
+    from .comparison_kernels import duhamel_loop  # after compiled.load, which says where it is kept
+
+    law = rows(laws, len(modes.interfaces))
+    found = grid(modes, drive, law, duration, steps_per_cycle, start)
+    dampers = np.ascontiguousarray(modes.dampers, float)
+    maps, coupling = kernels(modes, found.h), dampers - np.diag(np.diag(dampers))
+    solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
+    failures = duhamel_loop(
+        maps, coupling, solve, np.array(modes.omega), dampers,
+        np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
+        CRITERIA.index(convergence), float(tolerance), float(relax), int(most), found.z, found.v, found.force,
+        found.residual, found.iterations)
+    said = _warnings(modes, laws, law, found, convergence, tolerance, relax, failures)
+    return finish(modes, found, failures, said)
+
+
+def _warnings(modes, laws, law, found, convergence, tolerance, relax, failures) -> list:
+    out = sticking_warnings(laws)
+    share = admitted(modes, found.h, convergence, tolerance, relax) / law[:, 1]
+    if share.max(initial=0.0) > 1e-2:
+        out.append(f"a {convergence} that changes by less than {tolerance:g} lets the friction be wrong by "
+                   f"{share.max():.3g} of its limit; lower accuracy.convergence_tolerance below "
+                   f"{1e-2 * tolerance / share.max():.1g} or use convergence = \"force\"")
+    left = np.abs(found.residual) / law[:, 1:2]
+    if left.max(initial=0.0) > 1e-2:
+        out.append(f"the steps accepted left up to {left.max():.3g} and on the average {left[:, 1:].mean():.3g} of the "
+                   "friction limit between the law and the force used")
+    if failures:
+        out.append(f"{failures} of {found.time.size - 1} steps ended without convergence after the last iteration")
+    for one, face in zip(laws, modes.interfaces):
+        if isinstance(one, ElasticPlastic):
+            turn = found.h * np.sqrt(one.limit / one.length * np.sum(face**2) / modes.mass)
+            if turn > 0.5:
+                out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step; it needs "
+                           f"{np.ceil(turn / 0.5):.0f} times the steps per cycle")
+    return out

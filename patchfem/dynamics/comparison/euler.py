@@ -1,0 +1,55 @@
+"""The report's explicit Euler steps, meant for friction that follows the speed (2.4-2.7).
+
+Explicit Euler multiplies a free vibration by |1 + i w h| per step: it takes w h/2 off the damping ratio of every mode,
+and friction limit tanh(v/v_0) shakes at rest for h > 2 v_0 m/limit.
+"""
+
+import numpy as np
+
+from ...core import ModalBasis, Start
+from .comparison import Comparison, finish, grid
+from .point_laws import ElasticPlastic, Tanh, rows, sticking_warnings
+
+
+def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400,
+        start: Start | None = None) -> Comparison:
+    """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface."""
+    from .comparison_kernels import euler_loop  # after compiled.load, which says where it is kept
+
+    law = rows(laws, len(modes.interfaces))
+    found = grid(modes, drive, law, duration, steps_per_cycle, start)
+    with np.errstate(over="ignore", invalid="ignore"):
+        euler_loop(
+            np.array(modes.omega), np.ascontiguousarray(modes.dampers, float),
+            np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
+            found.h, found.z, found.v, found.force)
+        return finish(modes, found, 0, _warnings(modes, laws, found.h))
+
+
+def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
+    """(n,) damping ratios that a step of h [s] leaves: the modes' own less omega h/2; nan for a rigid mode."""
+    w = modes.omega
+    own = np.divide(np.diag(modes.dampers), 2 * w, out=np.full(w.size, np.nan), where=w > 0)
+    return own - w * h / 2
+
+
+def _warnings(modes, laws, h) -> list:
+    out = sticking_warnings(laws)
+    left = damping_left(modes, h)
+    if np.any(np.isfinite(left)):
+        i = int(np.nanargmin(left))
+        own = left[i] + modes.omega[i] * h / 2
+        grows = ": its free vibration grows, divide the step by at least " \
+            f"{modes.omega[i] * h / 2 / max(own, 1e-12):.2g}" if left[i] < 0 else ""
+        out.append(f"explicit Euler takes {modes.omega[i] * h / 2:.3g} off the damping ratio of mode "
+                   f"'{modes.names[i]}' and leaves {left[i]:.3g} of {own:.3g}{grows}")
+    for one, face in zip(laws, modes.interfaces):
+        share = np.sum(face**2) / modes.mass
+        if isinstance(one, Tanh) and h * one.limit * share / one.speed > 2:
+            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 * one.speed / (one.limit * share):.3g} s: the "
+                       "friction changes its sign from step to step while the interface hardly moves")
+        if isinstance(one, ElasticPlastic):
+            turn = h * np.sqrt(one.limit / one.length * share)
+            out.append(f"explicit Euler takes {turn / 2:.3g} off the damping ratio of the elastic contact, which has "
+                       "none of its own")
+    return out

@@ -1,0 +1,58 @@
+"""The report's first method: Newmark's average acceleration with a speed below which the block is called stuck.
+
+A stuck interface is released when it needs more than its static friction. If it has not passed the stick speed v_th
+one step later it is stuck again: release takes 2 m v_th/h more than the kinetic friction, so that below a certain step
+nothing ever moves (by_force: a stop also asks whether the static friction suffices, which cures that; v_th of limit h/m
+then makes stick-slip of second order). Every stop takes away a speed of up to v_th at once. The sign of the sliding
+friction is that of the speed at the start of the step, so a reversal without stick is of first order.
+"""
+
+import numpy as np
+
+from ...core import ModalBasis, PatchfemError, Start
+from .comparison import Comparison, finish, grid
+from .point_laws import Coulomb, rows, sticking_warnings
+
+
+def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, stick_speed: float | None = None,
+        by_force: bool = False, start: Start | None = None) -> Comparison:
+    """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface.
+
+    stick_speed [m/s] of every Coulomb interface, None: each law's own. by_force: stop only where the static force
+    suffices. Other laws are solved at the end of the step. PatchfemError for values that cannot be.
+    """
+    if stick_speed is not None and not (np.isfinite(stick_speed) and stick_speed >= 0):
+        raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: a finite speed >= 0 is wanted")
+    from .comparison_kernels import newmark_loop  # after compiled.load, which says where it is kept
+
+    law = rows(laws, len(modes.interfaces), stick_speed)
+    found = grid(modes, drive, law, duration, steps_per_cycle, start)
+    h, dampers = found.h, np.ascontiguousarray(modes.dampers, float)
+    inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * dampers + h * h / 4 * np.diag(modes.omega**2))
+    stops = newmark_loop(
+        inverse, np.array(modes.omega), dampers, np.ascontiguousarray(modes.interfaces, float), np.array(modes.base),
+        float(modes.mass), found.drive, law, h, bool(by_force), found.z, found.v, found.force, found.residual,
+        found.iterations)
+    return finish(modes, found, stops, _warnings(modes, laws, law, found, stick_speed, by_force, stops))
+
+
+def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:
+    """Force [N] over the kinetic friction that gives a released interface the stick speed within a step of h [s]: with
+    less it is caught again, so it acts as static friction that grows as the step falls."""
+    return 2 * modes.mass * stick_speed / (h * float(np.sum(np.asarray(face)**2)))
+
+
+def _warnings(modes, laws, law, found, stick_speed, by_force, stops) -> list:
+    out = sticking_warnings(laws, stick_speed)
+    for one, row, face in zip(laws, law, modes.interfaces):
+        if not isinstance(one, Coulomb) or not row[3]:
+            continue
+        static = row[2] + added_static(modes, face, row[3], found.h)
+        if not by_force and static > 1.01 * row[1]:
+            out.append(f"the stick speed {row[3]:g} m/s at a step of {found.h:.3g} s holds the interface up to "
+                       f"{static:.3g} N instead of {row[1]:.3g} N, and the more the smaller the step: lower "
+                       "accuracy.stick_speed with the square of the step, or stop by force as well")
+        drop = 0.5 * stops * modes.mass * row[3]**2 / np.sum(face**2)
+        out.append(f"below {row[3]:g} m/s the interface is stopped at once ({stops} times, up to {drop:.3g} J in all): "
+                   "the speed drops from a finite value, which no rigid friction does")
+    return out

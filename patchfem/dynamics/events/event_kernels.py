@@ -1,0 +1,59 @@
+"""Compiled events of one mode with one Coulomb interface: the arithmetic of `slip_kernels` and
+`sdof_kernels`, and runs in batches."""
+
+from types import FunctionType
+
+import numpy as np
+from numba import njit
+
+from ..modal_kernels import LEAN
+from . import sdof_kernels, slip_kernels
+
+SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_parts",
+        "stop")
+INNER = ("need_slopes", "release", "crossing", "_turn", "closed_books", "add", "book_slip", "note", "note_stick",
+         "note_slip", "_keep", "begin")
+
+
+def compiled_copy(module, inner, outer, known=None):
+    """Names of a module with its functions `inner` and `outer` compiled in that order, which call each other and those
+    that are `known` by name; the module stays as it is."""
+    scope = dict(vars(module)) | (known or {})
+    for name in (*inner, *outer):
+        source = vars(module)[name]
+        copy = FunctionType(source.__code__, scope, name, source.__defaults__)
+        copy.__module__ = module.__name__
+        options = {"cache": True} if name in outer else LEAN
+        scope[name] = njit(error_model="numpy", **options)(copy)
+    return scope
+
+
+_SLIP = compiled_copy(slip_kernels, SLIP, ())
+_EVENTS = compiled_copy(sdof_kernels, INNER, ("enter", "march"), {name: _SLIP[name] for name in SLIP})
+COMPILED = {name: _SLIP[name] for name in SLIP} | {name: _EVENTS[name] for name in INNER}
+march, enter = _EVENTS["march"], _EVENTS["enter"]
+
+
+@njit(error_model="numpy", cache=True)
+def batch(table, cycles, last, amplitude, books, ends):
+    """Runs under one sine each, from rest or not. table (n, 9): w, decay, static, kinetic (over the mass), B, om, push,
+    and z, v at t = 0. amplitude (n, 2): least and largest z of the `last` cycles; books (n, 10) as in `march`; ends
+    (n, 2): z and v at the end. Returns the worst code of `march`."""
+    worst, none = 1, np.empty((0, 10))
+    state, segments = np.empty(9), np.empty((1, 6))
+    extremes = np.empty((int(cycles), 2))
+    for n in range(table.shape[0]):
+        w, decay, static, kinetic, b, om, push, z, v = table[n]
+        per = 2 * np.pi / om
+        segments[0, 0], segments[0, 1], segments[0, 2] = 0.0, cycles * per, push
+        segments[0, 3], segments[0, 4], segments[0, 5] = b, om, 0.0
+        extremes[:, 0], extremes[:, 1] = np.inf, -np.inf
+        books[n] = 0.0
+        enter(state, segments, 0, 0.0, 0.0, z, v, 1.0, static, kinetic, w * w)
+        code, _ = march((w, decay), (static, kinetic), segments, (per, np.inf, 1.0, 1.0), state, none, extremes,
+                        books[n])
+        amplitude[n, 0] = np.min(extremes[-last:, 0])
+        amplitude[n, 1] = np.max(extremes[-last:, 1])
+        ends[n, 0], ends[n, 1] = state[3], state[4]
+        worst = max(worst, code)
+    return worst

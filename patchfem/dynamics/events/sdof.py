@@ -1,0 +1,243 @@
+"""One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in
+segments. Short scenes run as plain Python (no compiled code is loaded), long ones compiled.
+"""
+
+from itertools import pairwise
+from math import ceil, inf, pi
+
+import numpy as np
+
+from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
+from . import sdof_kernels
+from .event_list import BORDER, ROOM, EventLog
+from .histories import LEAST, SAMPLES, EventRun
+from .sdof_samples import Scene, force, panels, peak_acceleration, peak_force, position, response, states
+
+COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
+CHUNK = 4096  # events held at once beside those of the window
+CORNERS = 400_000  # corners kept from before the window
+
+
+def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: float) -> Scene:
+    """The mode, friction [N] and drive over the mass. PatchfemError where they are not one mode with one interface, the
+    drive has no closed form, or kinetic friction exceeds static."""
+    if modes.omega.size != 1 or modes.interfaces.shape[0] != 1:
+        raise PatchfemError("structure: the fast event engine is of one mode and one interface; use the general one")
+    if not drive.segments:
+        raise PatchfemError("drive.type: the event engine needs a drive in closed form (sine, step, levels, release); "
+                            "use method = \"march\"")
+    if static < 0 or kinetic < 0 or (static > 0 and kinetic > static):
+        raise PatchfemError("friction.kinetic: friction must be >= 0 and kinetic friction at most static friction; "
+                            "lower friction.kinetic or raise friction.static")
+    slide, w = float(modes.interfaces[0, 0]), float(modes.omega[0])
+    if slide == 0 and static > 0:
+        raise PatchfemError("structure.mode.slide: no mode moves the interface, so friction cannot act")
+    base, share = float(modes.base[0]), abs(slide) / modes.mass
+    table, clock = [], 2 * pi / drive.period
+    for part, after in pairwise([*drive.segments, None]):
+        end = duration if after is None else min(after.start, duration)
+        if end <= part.start:
+            continue
+        if part.amplitude == 0 or part.omega == 0:
+            held = part.constant + part.amplitude * np.sin(part.phase)
+            table.append((part.start, end, -base * held, 0.0, clock, 0.0))
+        else:
+            table.append((part.start, end, -base * part.constant, -base * part.amplitude, part.omega,
+                          part.phase % (2 * pi)))
+    return Scene(modes, w, float(modes.dampers[0, 0]) / 2, (static * share, kinetic * share if static > 0 else 0.0),
+                 np.array(table, float), slide, float(modes.output[0]), drive)
+
+
+def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, window: int = 10,
+             travel: float = inf, progress=None, start: Start | None = None, compiled: bool = False) -> EventRun:
+    """Run `cycles` drive periods with friction forces [N] from rest or `start`; keeps the last `window` cycles whole.
+    The ledger's `stored` is what has been added since the start.
+
+    compiled: by `event_kernels`, which must have been loaded through `patchfem.compiled`. The outcome is set only where
+    the output passes `travel` [m]; the run ends there. PatchfemError as `scene_of`; NotConverged where an event could
+    not be located or events pile up.
+    """
+    scene = scene_of(modes, drive, static, kinetic, cycles * drive.period)
+    engine = sdof_kernels
+    if compiled:
+        from . import event_kernels as engine
+    z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
+    far = travel / abs(scene.output) if scene.output else inf
+    if abs(z) > far:
+        raise PatchfemError("initial: the motion starts beyond structure.travel; start inside it")
+    run = _Run(scene, drive.period, cycles, window)
+    run.go(engine, z, v, far, progress)
+    return run.collect()
+
+
+def events(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, start: Start | None = None,
+           compiled: bool = False, most: int = 100_000) -> np.ndarray:
+    """The first `most` events of a run: (k, 5) time [s], drive phase [rad], z [m], z' [m/s] and what begins there,
+    +-1 a slip, 0 a stick; the first row is the start. Errors as `simulate`."""
+    scene = scene_of(modes, drive, static, kinetic, cycles * drive.period)
+    engine = sdof_kernels
+    if compiled:
+        from . import event_kernels as engine
+    z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
+    rows, state, book = np.zeros((most, sdof_kernels.ROW)), np.zeros(9), np.zeros(10)
+    engine.enter(state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
+    code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, (drive.period, inf, 0.0, 0.0),
+                              state, rows, np.empty((0, 2)), book)
+    _check(code, rows[max(used - 1, 0), 0])
+    rows = rows[:used]
+    return np.column_stack([rows[:, :2], rows[:, 4], rows[:, 3] * rows[:, 5], rows[:, 3]])
+
+
+def _check(code: int, time: float) -> None:
+    if code == sdof_kernels.LOST:
+        raise NotConverged(f"dynamics: an event could not be located near t = {time:.9g} s")
+    if code == sdof_kernels.PILED:
+        raise NotConverged(f"dynamics: events pile up at t = {time:.9g} s")
+
+
+class _Run:
+    """Events as they come, a chunk at a time: what is summed is summed, the rest is forgotten before the window."""
+
+    def __init__(self, scene: Scene, period: float, cycles: float, window: int):
+        self.scene, self.period, self.duration, self.window = scene, period, cycles * period, window
+        number = int(np.ceil(cycles - 1e-9))
+        self.extremes = np.tile([inf, -inf], (number, 1))
+        self.phasors = np.zeros(number, complex)
+        self.book, self.peak, self.begun, self.end = np.zeros(10), 0.0, 0.0, self.duration
+        self.recent, self.corners, self.outcome, self.kept = np.empty((0, sdof_kernels.ROW)), [], None, 0
+        self.listed, self.noted, self.before = [], 0, None
+
+    def go(self, engine, z: float, v: float, far: float, progress) -> None:
+        """All events from state (z, v)."""
+        scene, rows, code = self.scene, np.zeros((CHUNK, sdof_kernels.ROW)), sdof_kernels.FULL
+        self.state, clock = np.zeros(9), (self.period, far, 0.0, 1.0)
+        self.begun = 0.5 * scene.modes.mass * (v * v + scene.w**2 * z * z)
+        engine.enter(self.state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
+        self.before = (np.sign(v), 0.0)
+        while code == sdof_kernels.FULL:
+            code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, clock, self.state, rows,
+                                      self.extremes, self.book)
+            _check(code, rows[max(used - 1, 0), 0])
+            if used:
+                self.take(rows[:used].copy())
+                if progress is not None and code == sdof_kernels.FULL:
+                    progress(min(self.recent[-1, 0] / self.duration, 1.0))
+        if code == sdof_kernels.TRAVEL:
+            self.outcome = Outcome.EXCEEDS_TRAVEL
+            self.end = self.recent[-1, 0] + self.recent[-1, 2]
+
+    def take(self, rows) -> None:
+        """Sum what a chunk of phases adds."""
+        scene, beta = self.scene, self.scene.w**2
+        z, v, _ = states(0.5 * rows[:, 2], rows, np.arange(len(rows)), scene)
+        self.peak = max(self.peak, float((v * v + beta * z * z).max()),
+                        float((rows[:, 5]**2 + beta * rows[:, 4]**2).max()))
+        self._add_phasors(rows)
+        self._note(rows)
+        if self.kept < CORNERS:
+            self.corners.append(rows)
+            self.kept += len(rows)
+        self.recent = np.concatenate([self.recent, rows])
+        old = np.searchsorted(self.recent[:, 0], self.recent[-1, 0] - (self.window + 1) * self.period)
+        self.recent = self.recent[max(old - 1, 0):]
+
+    def _note(self, rows) -> None:
+        """Keep the changes of direction and of segment as rows (time, phase, interface, what, slide)."""
+        rows, slide = rows[rows[:, 2] > 0], self.scene.slide
+        if not len(rows):
+            return
+        way, segment = (np.concatenate([[first], rows[:, k]]) for first, k in zip(self.before, (3, 9)))
+        self.before = way[-1], segment[-1]
+        old, new = np.sign(slide) * way[:-1], np.sign(slide) * way[1:]
+        what = np.where(new == 0, 0, np.where(old == 0, 1, 2)) * new
+        turned = (old != new) & (self.scene.friction[0] > 0)
+        crossed = segment[1:] != segment[:-1]
+        zero = np.zeros(len(rows))
+        found = np.stack([rows[:, 0], rows[:, 1], zero, what, slide * rows[:, 4]], axis=1)
+        border = np.stack([rows[:, 0], rows[:, 1], zero - 1, zero + BORDER, zero], axis=1)
+        both = np.stack([border, found], axis=1)[np.stack([crossed, turned], axis=1)]
+        self.noted += len(both)
+        self.listed.append(both)
+        while len(self.listed) > 1 and sum(map(len, self.listed[1:])) > ROOM:
+            self.listed.pop(0)
+
+    def log(self) -> EventLog:
+        """The last events."""
+        rows = np.concatenate([np.empty((0, 5)), *self.listed])[-ROOM:]
+        time, phase, interface, what, slide = rows.T
+        return EventLog(frozen_array(time), frozen_array(phase), frozen_array(interface, np.int64),
+                        frozen_array(what, np.int64), frozen_array(slide), self.noted).until(self.end)
+
+    def _add_phasors(self, rows) -> None:
+        per = self.period / 64
+        first = ceil(rows[0, 0] / per - 1e-9)
+        number = np.arange(first, ceil((rows[-1, 0] + rows[-1, 2]) / per - 1e-9))
+        if not number.size:
+            return
+        time = number * per
+        owner = np.maximum(np.searchsorted(rows[:, 0], time + 1e-9 * per, side="right") - 1, 0)
+        z = position(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.scene)
+        turn = np.exp(-2j * pi * np.arange(64) / 64)[number % 64] * (self.scene.output / 32)
+        np.add.at(self.phasors, np.minimum(number // 64, len(self.phasors) - 1), z * turn)
+
+    def collect(self) -> EventRun:
+        """Everything that is kept."""
+        scene, mass, end = self.scene, self.scene.modes.mass, self.end
+        first = max(0.0, end - self.window * self.period)
+        wide = self.sample(first, end)
+        full = self._with_corners(self._with_cycle(wide, first), max(0.0, end - max(2, self.window) * self.period))
+        rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > first)]
+        low, high = np.maximum(rows[:, 0], first) - rows[:, 0], np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0]
+        owner, tau, weight = panels(low, high, scene.fastest)
+        z, v, _ = states(tau, rows, owner, scene)
+        loop = (rows[owner, 0] + tau, weight, scene.slide * z, scene.slide * v, force(tau, rows, owner, scene))
+        stored = 0.5 * mass * (self.state[4]**2 + scene.w**2 * self.state[3]**2)
+        book = dict(zip(("work_in", "viscous", "power", "friction"), (mass * self.book[:4]).tolist()))
+        book |= {"stored": float(stored) - self.begun, "peak_stored": max(0.5 * mass * self.peak, float(stored))}
+        seen = np.isfinite(self.extremes[:, 0])
+        amplitudes = np.sort(scene.output * self.extremes[seen], axis=1)
+        count = 1 if scene.friction[0] == 0 else int(self.book[4])
+        stuck = float((high - low)[rows[:, 3] == 0].sum())
+        return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
+                        self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period, self.log(),
+                        force_peaks=np.array([peak_force(low, high, rows, scene)]))
+
+    def _starts(self, first: float):
+        rows = self.recent
+        let_go = (rows[1:, 3] != 0) & (rows[:-1, 3] == 0) & (rows[:-1, 2] > 0) & (rows[1:, 0] > first)
+        return rows[1:][let_go & (rows[1:, 0] < self.end), 1] % pi
+
+    def sample(self, first: float, end: float) -> Response:
+        """Uniform samples on [first, end] and both sides of every event."""
+        rows, scene = self.recent, self.scene
+        grid = np.linspace(first, end, max(LEAST, round((end - first) / self.period * SAMPLES) + 1))
+        events = rows[(rows[:, 0] > first) & (rows[:, 0] < end), 0] if scene.friction[0] > 0 else np.empty(0)
+        time = np.sort(np.concatenate([grid, events, np.nextafter(events, -np.inf)]))
+        time = time[np.concatenate([[True], np.diff(time) > 0])]
+        owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)
+        tau = np.clip(time - rows[owner, 0], 0.0, rows[owner, 2])
+        return response(time, *states(tau, rows, owner, scene), force(tau, rows, owner, scene), scene)
+
+    def _with_cycle(self, wide: Response, first: float) -> Response:
+        """The cycle before a window of one, so that two are kept whole."""
+        if self.window > 1 or first <= 0:
+            return wide
+        return _chained(self.sample(max(0.0, first - self.period), first), wide)
+
+    def _with_corners(self, wide: Response, first: float) -> Response:
+        rows = np.concatenate(self.corners)[:CORNERS]
+        rows = rows[rows[:, 0] < first]
+        if not len(rows):
+            return wide
+        tau, owner = np.zeros(len(rows)), np.arange(len(rows))
+        early = response(rows[:, 0].copy(), *states(tau, rows, owner, self.scene),
+                         force(tau, rows, owner, self.scene), self.scene)
+        return _chained(early, wide)
+
+
+def _chained(early: Response, late: Response) -> Response:
+    """Two parts of a run, the samples of the first that the second begins with left out."""
+    names = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
+             "base_acceleration", "force", "slip")
+    kept = early.time < late.time[0]
+    return Response(*(np.concatenate([getattr(early, k)[kept], getattr(late, k)]) for k in names))

@@ -1,0 +1,235 @@
+"""Samples, extremes and quadratures of many slips and sticks of one mode at once, from the rows of its events."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core import ModalBasis, Response
+from .slip_kernels import REACH, TERMS, oscillator
+
+PANEL, WEIGHT = np.polynomial.legendre.leggauss(12)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scene:
+    """One mode as the event engine has it: w, decay, friction (static, kinetic) over the mass, segments (s, 6), drive
+    force over the mass; slide and output per coordinate, mass, and what the drive's acceleration is."""
+
+    modes: ModalBasis
+    w: float
+    decay: float
+    friction: tuple
+    segments: np.ndarray
+    slide: float
+    output: float
+    drive: object
+
+    @property
+    def fastest(self) -> float:
+        """Largest angular frequency [rad/s]."""
+        return max(self.w, float(self.segments[:, 4].max()))
+
+
+def _turn(angle):
+    out = np.empty(angle.shape, complex)
+    out.real, out.imag = np.cos(angle), np.sin(angle)
+    return out
+
+
+def _growth(x):
+    """(exp(x) - 1)/x for complex |x| < 0.3."""
+    reach, last, size = float(np.abs(x).max(initial=0.0)), 1, 1.0
+    while size > 1e-17:
+        last += 1
+        size *= reach / last
+    out = np.ones(x.shape, complex)
+    for k in range(last, 1, -1):
+        out *= x / k
+        out += 1
+    return out
+
+
+def basis(u, mode, om) -> tuple:
+    """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `slip_kernels.motion` in arrays."""
+    beta, _, decay, own, kind, _, _ = mode
+    wave = _turn(om * u)
+    if kind == 0:
+        own_wave = np.exp(-decay * u) * _turn(own * u)
+        h = own_wave.imag / own
+        h1 = own_wave.real - decay * h
+        second = (wave - own_wave.conj()) / complex(decay, om + own)
+        gap = complex(decay, om - own)
+        if abs(gap) < own:
+            near = abs(gap) * u < REACH
+            if near.all():
+                first = u * own_wave * _growth(gap * u)
+            else:
+                first = (wave - own_wave) / gap
+                first[near] = u[near] * own_wave[near] * _growth(gap * u[near])
+            e = (first - second) / (2j * own)
+        else:
+            e = -(h - second) / gap
+    else:
+        fast = -(decay + own)
+        slow = beta / fast if kind == 1 and fast else fast
+        q = np.exp(fast * u)
+        h = -np.exp(slow * u) * np.expm1(-2 * own * u) / (2 * own) if kind == 1 else u * q
+        h1 = (0.5 * (np.exp(slow * u) + q) - decay * h if 2 * own < decay else
+              (slow * np.exp(slow * u) - fast * q) / (2 * own)) if kind == 1 else q - decay * h
+        e = (h - (wave - q) / complex(-fast, om)) / complex(slow, -om)
+    return h, h1, _step(u, mode, h, h1), e.real, e.imag
+
+
+def _step(u, mode, h, h1):
+    beta, alpha, decay, own, kind, _, _ = mode
+    fast = decay + own if kind else np.sqrt(beta)
+    short = fast * u < REACH
+    low = np.zeros_like(u)
+    high = out = u * u / 2
+    for k in range(1, TERMS if short.any() else 0):
+        low, high = high, -(alpha * u * (k + 1) * high + beta * u * u * low) / ((k + 1) * (k + 2))
+        out = out + high
+    if kind == 0:
+        return np.where(short, out, (1 - h1 - alpha * h) / beta)
+    if fast == 0:
+        return out
+    slow = -beta / fast
+    return np.where(short, out, ((np.expm1(slow * u) / slow if slow else u) - h) / fast)
+
+
+def _series(u, v0, g0, bc, bs, mode, om) -> tuple:
+    beta, alpha = mode[0], mode[1]
+    low, high = np.zeros_like(u), v0 * u
+    shift, speed = high, v0.copy()
+    drive, power, push, sine, cosine = g0, np.ones_like(u), g0, bc, -bs
+    for k in range(TERMS):
+        new = (push * u * u - alpha * u * (k + 1) * high - beta * u * u * low) / ((k + 1) * (k + 2))
+        low, high = high, new
+        shift = shift + new
+        speed = speed + (k + 2) * np.divide(new, u, out=np.zeros_like(u), where=u > 0)
+        power = power * om * u / (k + 1)
+        push = power * sine
+        drive = drive + push
+        sine, cosine = cosine, -sine
+    return shift, speed, drive - alpha * speed - beta * shift
+
+
+def _one(u, rows, owner, scene, om, parts) -> np.ndarray:
+    mode = oscillator(scene.w, scene.decay, om)
+    out, short = np.empty((parts, u.size)), u * mode[6] < REACH
+    if short.any():
+        out[:, short] = _series(u[short], *(rows[owner[short], k] for k in (5, 6, 7, 8)), mode, om)[:parts]
+    far = ~short
+    if far.any():
+        v0, g0, bc, bs = (rows[owner[far], k] for k in (5, 6, 7, 8))
+        h, h1, one, c, s = basis(u[far], mode, om)
+        out[0, far] = v0 * h + g0 * one + bc * s - bs * (one - c)
+        if parts == 1:
+            return out
+        out[1, far] = v0 * h1 + g0 * h + om * (bc * c - bs * s)
+        out[2, far] = g0 * h1 - v0 * (mode[1] * h1 + mode[0] * h) + om * (bc * (h - om * s) - bs * om * c)
+    return out
+
+
+def position(u, rows, owner, scene: Scene):
+    """z alone, as `states`."""
+    return _states(u, rows, owner, scene, 1)[0]
+
+
+def states(u, rows, owner, scene: Scene) -> tuple:
+    """(z, v, z'') at times u (k,) after the starts of the phases rows[owner], rows (p, 10), owner (k,)."""
+    return _states(u, rows, owner, scene, 3)
+
+
+def _states(u, rows, owner, scene, parts):
+    out = np.zeros((parts, u.size))
+    out[0] = rows[owner, 4]
+    way, segment = rows[owner, 3], rows[owner, 9]
+    for om in {float(om) for om in scene.segments[:, 4]}:
+        mine = np.flatnonzero((way != 0) & (scene.segments[:, 4] == om)[segment.astype(int)])
+        if mine.size:
+            out[:, mine] += way[mine] * _one(u[mine], rows, owner[mine], scene, om, parts)
+    return out
+
+
+def pull(u, rows, owner, scene: Scene) -> tuple:
+    """(drive force over the mass, its first and second derivative) at times u (k,) after the starts of phases."""
+    _, _, push, b, om, _ = scene.segments[rows[owner, 9].astype(int)].T
+    angle = rows[owner, 1] + om * u
+    wave = b * np.sin(angle)
+    return push + wave, b * om * np.cos(angle), -om * om * wave
+
+
+def force(u, rows, owner, scene: Scene):
+    """Friction force [N]: kinetic in slip, what holds the interface in stick."""
+    if scene.slide == 0 or scene.friction[0] == 0:
+        return np.zeros(u.size)
+    held, way = pull(u, rows, owner, scene)[0] - scene.w**2 * rows[owner, 4], rows[owner, 3]
+    return np.where(way == 0, held, way * scene.friction[1]) * (scene.modes.mass / scene.slide)
+
+
+def response(time, z, v, gain, pushed, scene: Scene) -> Response:
+    """The histories of a run from z, v, z'' (k,) and the friction force `pushed` [N]."""
+    base = scene.drive.values(time)
+    moving = base if getattr(scene.drive, "moving", True) else 0.0
+    slide = scene.slide * z
+    return Response(time, z[:, None], v[:, None], slide, scene.slide * v, scene.output * z, scene.output * v,
+                    scene.output * gain + moving, base, pushed, slide)
+
+
+def panels(low, high, fastest: float) -> tuple:
+    """(number of the interval, time, weight) of 12 Gauss points per panel of 1.5 rad, intervals [low, high] (k,)."""
+    count = np.maximum(1, np.ceil((high - low) * fastest / 1.5).astype(int))
+    owner = np.repeat(np.arange(count.size), count)
+    inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
+    half = 0.5 * ((high - low) / count)[owner]
+    at = low[owner] + 2 * half * inside
+    tau = at[:, None] + half[:, None] * (1 + PANEL)
+    return np.repeat(owner, PANEL.size), tau.ravel(), (half[:, None] * WEIGHT).ravel()
+
+
+def peak_acceleration(low, high, rows, scene: Scene) -> float:
+    """Largest |absolute acceleration| of the output over intervals [low, high] (k,) of phases, both ends included."""
+    return _peak(_output_acceleration, low, high, rows, scene)
+
+
+def peak_force(low, high, rows, scene: Scene) -> float:
+    """Largest |friction force| [N] over intervals [low, high] (k,) of phases, both ends included."""
+    return _peak(_force_rates, low, high, rows, scene)
+
+
+def _peak(curve, low, high, rows, scene: Scene) -> float:
+    """Largest size of a curve that gives its value, rate and second rate at tau in the phases `owner`."""
+    count = np.maximum(5, np.ceil((high - low) * scene.fastest * 8).astype(int) + 1)
+    owner = np.repeat(np.arange(count.size), count)
+    inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
+    tau = low[owner] + (high - low)[owner] * inside / (count[owner] - 1)
+    value, rate, _ = curve(tau, rows, owner, scene)
+    top = float(np.abs(value).max())
+    turn = np.flatnonzero((owner[:-1] == owner[1:]) & (rate[:-1] * rate[1:] < 0)
+                          & (np.maximum(np.abs(value[:-1]), np.abs(value[1:])) >= 0.9 * top))
+    if not turn.size:
+        return top
+    a, b = tau[turn], tau[turn + 1]
+    t, mine = a - rate[turn] * (b - a) / (rate[turn + 1] - rate[turn]), owner[turn]
+    for _ in range(6):
+        _, slope, bend = curve(t, rows, mine, scene)
+        t = np.clip(t - np.divide(slope, bend, out=np.zeros_like(t), where=bend != 0), a, b)
+    return max(top, float(np.abs(curve(t, rows, mine, scene)[0]).max()))
+
+
+def _force_rates(u, rows, owner, scene: Scene) -> tuple:
+    stuck = (rows[owner, 3] == 0) * (scene.modes.mass / scene.slide if scene.slide else 0.0)
+    _, rate, second = pull(u, rows, owner, scene)
+    return force(u, rows, owner, scene), stuck * rate, stuck * second
+
+
+def _output_acceleration(u, rows, owner, scene: Scene) -> tuple:
+    _, v, gain = states(u, rows, owner, scene)
+    drive, rate, second = pull(u, rows, owner, scene)
+    alpha, beta, slips = 2 * scene.decay, scene.w**2, rows[owner, 3] != 0
+    jerk = np.where(slips, rate - alpha * gain - beta * v, 0.0)
+    snap = np.where(slips, second - alpha * jerk - beta * gain, 0.0)
+    share = -1 / scene.modes.base[0] if getattr(scene.drive, "moving", True) and scene.modes.base[0] else 0.0
+    return (scene.output * gain + share * drive, scene.output * jerk + share * rate,
+            scene.output * snap + share * second)

@@ -1,0 +1,87 @@
+"""The page where modes, drive and laws meet in harmonic balance: what to call, and a steady motion as histories.
+
+`point` one steady motion, `branches` all of them at a drive, `response` and `levels` over frequency and drive through
+folds, `with_stability` the multipliers, `backbone` frequency and damping over amplitude. Laws and rows: `Group`.
+"""
+
+import numpy as np
+
+from ...core import Response
+from .branch import Backbone, Branch, backbone, branches, levels, response
+from .forces import Group
+from .laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, law_of_model, synthesis
+from .point import Periodic, point
+from .stability import with_stability
+
+__all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "Periodic", "Spring", "Stretch", "Tanh", "backbone",
+           "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime", "response",
+           "with_stability"]
+
+
+STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
+
+
+def regime(periodic: Periodic) -> tuple:
+    """(name, share of the friction limit that slips within a cycle): "stuck", "partial slip", "slides", "no friction".
+
+    An elastic-plastic element slips where the slide's swing exceeds twice its limit slide, bonds where their slip does
+    STUCK bond lengths; a law of the speed always slides.
+    """
+    slips = whole = 0.0
+    for track, laws in zip(periodic.group.tracks(periodic.coefficients, periodic.omega), periodic.group.laws):
+        places = track.turning[1]
+        swing = float(np.ptp(places)) if places.size else 0.0
+        for law in laws:
+            found = law.sample(track)
+            whole += found.limit
+            if isinstance(law, Jenkins):
+                slips += float(law.stiffness @ (law.limit_slide * (2 * law.limit_slide < swing)))
+            elif found.limit:
+                held = isinstance(law, Stretch) and np.ptp(track.q - found.stretch / found.limit) < STUCK * law.length
+                slips += 0.0 if held else found.limit
+    share = slips / whole if whole else 0.0
+    return ("no friction" if not whole else "stuck" if not slips else "slides" if share > 1 - 1e-12 else
+            "partial slip"), share
+
+
+def cycle_energy(periodic: Periodic, modes) -> dict:
+    """Work of the drive, viscous loss and work of the rows' laws in a cycle [J], by Parseval; `balance` [1]: what is
+    missing, over the work of the drive. A spring among the laws adds nothing."""
+    k = np.arange(periodic.modal.shape[0])
+    speed = 1j * (k * periodic.omega)[:, None] * periodic.modal
+    half = np.pi / periodic.omega
+    work = -modes.mass * half * float((1j * periodic.level * (speed[1] @ modes.base)).real)
+    viscous = modes.mass * half * float(np.einsum("ka,ab,kb->", speed.conj(), modes.dampers, speed).real)
+    friction = np.pi * float(np.sum(k * (periodic.coefficients.conj() * periodic.forces).imag))
+    return {"work_in": work, "viscous": viscous, "friction": friction,
+            "balance": abs(work - viscous - friction) / max(abs(work), 1e-300)}
+
+
+def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
+    """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, force and slip of row 0.
+
+    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics.
+    """
+    omega, group = periodic.omega, periodic.group
+    inner = samples * max(1, -(-2 * periodic.samples // samples))
+    every = inner // samples
+
+    def cycle(values):
+        kept = values[..., ::every]
+        return np.concatenate([kept, kept[..., :1]], axis=-1).T
+
+    k = np.arange(periodic.modal.shape[0])[:, None]
+    z, rate = (synthesis((periodic.modal * f).T, inner) for f in (1.0, 1j * k * omega))
+    forces = group.forces(periodic.coefficients, omega, inner)
+    base = periodic.level * np.sin(2 * np.pi * np.arange(inner) / inner)
+    accel = -modes.base[:, None] * base - modes.dampers @ rate - modes.omega[:, None]**2 * z \
+        - group.rows.T @ forces / modes.mass
+    track = Track(periodic.coefficients[0], omega, inner)
+    found = [law.sample(track) for law in group.laws[0]]
+    limit = sum(s.limit for s in found)
+    stretch = sum(s.stretch for s in found if s.stretch is not None)
+    slip = track.q - stretch / limit if limit > 0 else np.zeros(inner)
+    floor = base if drive.moving else 0 * base
+    return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
+                    cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
+                    cycle(modes.output @ accel + floor), cycle(base), cycle(forces[0]), cycle(slip))

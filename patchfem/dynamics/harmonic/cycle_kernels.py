@@ -1,0 +1,216 @@
+"""Compiled laws along one cycle of a periodic slide: turning points, parallel Jenkins elements, the bond recursion.
+
+A rate-free law is followed from turning point to turning point, which are found where the harmonics have them and not
+at the samples, so the memory is that of the continuous motion; the cost of a sample is a few ns whatever the number of
+elements. Plain twins are in the tests.
+"""
+
+import numpy as np
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+
+
+@njit(error_model="numpy", **LEAN)
+def slide_at(re, im, angle):
+    """(value, first and second derivative) of Re sum X_k exp(i k angle)."""
+    c, s = np.cos(angle), np.sin(angle)
+    value, rate, bend = re[0], 0.0, 0.0
+    a, b = 1.0, 0.0
+    for k in range(1, re.size):
+        a, b = a * c - b * s, a * s + b * c
+        even, odd = re[k] * a - im[k] * b, re[k] * b + im[k] * a
+        value += even
+        rate -= k * odd
+        bend -= k * k * even
+    return value, rate, bend
+
+
+@njit(error_model="numpy", cache=True)
+def turning_points(re, im, rate, angle, place, cell):
+    """Turning points of the slide with harmonics re + i im (H + 1,) whose rate at N uniform angles is known.
+
+    Fills angle, place (N,) and cell (N,), the sample before each, in order; returns their number and the direction at
+    the first sample. A rate within rounding of zero has no direction of its own.
+    """
+    n, count = rate.size, 0
+    floor = 1e-13 * np.max(np.abs(rate))
+    width = 2 * np.pi / n
+    first = 0.0
+    for i in range(n - 1, -1, -1):
+        if abs(rate[i]) > floor:
+            first = 1.0 if rate[i] > 0 else -1.0
+            break
+    if first == 0.0:
+        return 0, 1.0
+    start = first
+    if abs(rate[0]) > floor:
+        start = 1.0 if rate[0] > 0 else -1.0
+    sign = start
+    for i in range(n):
+        b = rate[(i + 1) % n]
+        if abs(b) <= floor:
+            continue
+        after = 1.0 if b > 0 else -1.0
+        if after == sign:
+            continue
+        low, high = i * width, (i + 1) * width
+        a = rate[i]
+        at = low + width * (a / (a - b) if a * b < 0 else 0.0)
+        for _ in range(60):
+            _, v, bend = slide_at(re, im, at)
+            if v * sign > 0:
+                low = at
+            else:
+                high = at
+            new = at - v / bend if bend != 0 else low - 1.0
+            if not low <= new <= high:
+                new = 0.5 * (low + high)
+            if abs(new - at) <= 1e-15 * n * width:
+                at = new
+                break
+            at = new
+        angle[count], place[count], cell[count] = at, slide_at(re, im, at)[0], i
+        count += 1
+        sign = after
+    return count, start
+
+
+@njit(error_model="numpy", cache=True)
+def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, force, slope, hold, stretch):
+    """Steady loop of t parallel Jenkins elements, limit (t,) rising, along samples q (N,) of one cycle.
+
+    turns, cells (R,): places of the turning points and the sample before each; stiff, full, square (t + 1,): running
+    sums of k, k limit, k limit^2. Out: force (N,), slope (N,) of the elements that stick, hold (R, N): minus the
+    stiffness that hangs on each turning point, stretch (N,): sum of k limit stretch. Two turns from the virgin state:
+    the second is periodic.
+    """
+    t, n, r = limit.size, q.size, turns.size
+    depth = 1
+    end = np.empty(2 * r + 3, np.int64)
+    mark = np.empty(2 * r + 3, np.int64)
+    sign, base = np.empty(2 * r + 3), np.empty(2 * r + 3)
+    end[0], mark[0], sign[0], base[0] = t, -1, 0.0, 0.0
+    p = 0
+    g = 1.0 if q[0] > 0 else -1.0
+    depth, p = _slide(q[0], g, p, depth, end, sign, base, limit)
+    if g != start:
+        depth, p = _turn(q[0], g, p, depth, end, sign, base, mark, -1)
+    g = start
+    for turn in range(2):
+        at = 0
+        for i in range(n):
+            depth, p = _slide(q[i], g, p, depth, end, sign, base, limit)
+            if turn:
+                f, s = g * full[p], g * square[p]
+                low = p
+                for d in range(depth - 1, -1, -1):
+                    k = stiff[end[d]] - stiff[low]
+                    w = full[end[d]] - full[low]
+                    f += sign[d] * w + k * (q[i] - base[d])
+                    s += sign[d] * (square[end[d]] - square[low]) + w * (q[i] - base[d])
+                    if mark[d] >= 0:
+                        hold[mark[d], i] -= k
+                    low = end[d]
+                force[i], stretch[i], slope[i] = f, s, stiff[t] - stiff[p]
+            while at < r and cells[at] == i:
+                depth, p = _slide(turns[at], g, p, depth, end, sign, base, limit)
+                depth, p = _turn(turns[at], g, p, depth, end, sign, base, mark, at)
+                g = -g
+                at += 1
+
+
+@njit(error_model="numpy", **LEAN)
+def _slide(q, g, p, depth, end, sign, base, limit):
+    """Let the elements slip that must at slide q in direction g: (depth of the memory, number that slip)."""
+    while depth > 0:
+        d = depth - 1
+        while p < end[d] and g * (sign[d] * limit[p] + q - base[d]) >= limit[p]:
+            p += 1
+        if p < end[d]:
+            break
+        depth -= 1
+    return depth, p
+
+
+@njit(error_model="numpy", **LEAN)
+def _turn(q, g, p, depth, end, sign, base, mark, number):
+    """Hang the slipping elements on a turning point."""
+    if p > 0:
+        end[depth], sign[depth], base[depth], mark[depth] = p, g, q, number
+        depth += 1
+    return depth, 0
+
+
+@njit(error_model="numpy", cache=True)
+def bond_cycle(q, start, cells, turns, limit, length, force, slope, hold):
+    """Steady loop of the bond recursion, u' = sgn - u per length [m], F = limit u, along samples q (N,) of a cycle.
+
+    Between turning points the stretch is exact, u = g + (u_r - g) exp(-|q - q_r|/length), so its value at the turning
+    points obeys an affine condition, solved exactly. Out: force (N,), slope (N,) at fixed turning points, hold (R, N):
+    derivative of the force to each turning place.
+    """
+    n, r = q.size, turns.size
+    if r == 0:
+        e = np.exp(-abs(q[0]) / length)
+        for i in range(n):
+            force[i] = limit * (1 - e) * (1.0 if q[0] > 0 else -1.0)
+            slope[i] = limit / length * e
+        return
+    u = np.zeros(r)  # stretch at the turning points
+    jac = np.zeros((r, r))
+    for passed in range(2):
+        g = -start  # direction after the first turning point
+        for k in range(r):
+            j = (k + 1) % r
+            x = abs(turns[j] - turns[k]) / length
+            e = np.exp(-x)
+            new = u[k] * e - g * np.expm1(-x)
+            pull = (u[k] - g) * e * g / length
+            if j == 0:
+                total = 0.0
+                for m in range(r):
+                    total += abs(turns[(m + 1) % r] - turns[m]) / length
+                if passed == 0:
+                    u[0] = new / -np.expm1(-total)
+                else:
+                    for m in range(r):
+                        jac[0, m] = (jac[k, m] * e + pull * ((1.0 if m == k else 0.0) - (1.0 if m == j else 0.0))) \
+                            / -np.expm1(-total)
+            elif passed == 0:
+                u[j] = new
+            else:
+                for m in range(r):
+                    jac[j, m] = jac[k, m] * e + pull * ((1.0 if m == k else 0.0) - (1.0 if m == j else 0.0))
+            g = -g
+        _relax(u, jac, turns, length, start, passed)
+    k, at, g = r - 1, 0, start
+    for i in range(n):
+        e = np.exp(-abs(q[i] - turns[k]) / length)
+        here = g + (u[k] - g) * e
+        force[i] = limit * here
+        slope[i] = limit / length * (1 - g * here)
+        for m in range(r):
+            hold[m, i] += limit * e * jac[k, m]
+        hold[k, i] -= slope[i]
+        while at < r and cells[at] == i:
+            k = at
+            at += 1
+            g = -g
+
+
+@njit(error_model="numpy", **LEAN)
+def _relax(u, jac, turns, length, start, passed):
+    """Carry the value (or slope) found for the first turning point around the cycle."""
+    g, r = -start, turns.size
+    for k in range(r - 1):
+        j = k + 1
+        x = abs(turns[j] - turns[k]) / length
+        e = np.exp(-x)
+        if passed == 0:
+            u[j] = u[k] * e - g * np.expm1(-x)
+        else:
+            pull = (u[k] - g) * e * g / length
+            for m in range(r):
+                jac[j, m] = jac[k, m] * e + pull * ((1.0 if m == k else 0.0) - (1.0 if m == j else 0.0))
+        g = -g

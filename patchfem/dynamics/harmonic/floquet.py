@@ -1,0 +1,108 @@
+"""Floquet multipliers of a steady motion: what one cycle makes of a small disturbance.
+
+The state is the motion of the modes and what the contacts remember. A law without memory gives a slope over the slide
+and over its rate. A set of elastic-plastic elements remembers, for each turning point of the slide, where it was: the
+disturbance of the slide there is kept as a state and hangs on the stiffness that sticks since then. The force is
+continuous in time, so nothing jumps; a turning point may shift, but the slide is at rest there, so its shift does not
+count. Every element that slips forgets, so the memory of t elements has t - R multipliers that are zero, which are left
+out, and those of the R turning points, most of them zero too. An element that never slips within the cycle is a spring:
+its own memory, an offset that no cycle changes (multiplier 1), is left out as well. Bonds remember one number per row.
+
+Cells of constant coefficients, each by its matrix exponential: order 2 in the width of the cells for corners in time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core import ModalBasis
+
+ROUNDING = 1e-5  # of a multiplier on the unit circle
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mark:
+    """Memory of a turning point: row, cell in which it lies and its place [0, 1] there, hold (N,) [N/m] per cell: the
+    force per disturbance of the slide at that turning."""
+
+    row: int
+    cell: int
+    share: float
+    hold: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fading:
+    """Memory u [1] of bonds: u' = gain q' - loss u per cell (N,), per slide [1/m] and per angle [1]; force limit u."""
+
+    row: int
+    gain: np.ndarray
+    loss: np.ndarray
+    limit: float
+
+
+def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()) -> np.ndarray:
+    """Map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
+
+    rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row.
+    """
+    n, cells = modes.omega.size, slope.shape[1]
+    size = 2 * n + len(marks) + len(fading)
+    a = np.zeros((cells, size, size))
+    grip = rows.T / (modes.mass * omega**2)
+    a[:, :n, n:2 * n] = np.eye(n)
+    a[:, n:2 * n, :n] = -np.diag(modes.omega**2) / omega**2 - np.einsum("ai,in,ib->nab", grip, slope, rows)
+    a[:, n:2 * n, n:2 * n] = -modes.dampers / omega - omega * np.einsum("ai,in,ib->nab", grip, by_rate, rows)
+    for k, mark in enumerate(marks):
+        a[:, n:2 * n, 2 * n + k] = -mark.hold[:, None] * grip[:, mark.row]
+    for k, one in enumerate(fading, 2 * n + len(marks)):
+        a[:, n:2 * n, k] = -one.limit * grip[:, one.row]
+        a[:, k, n:2 * n] = one.gain[:, None] * rows[one.row]
+        a[:, k, k] = -one.loss
+    steps = exponentials(a * (2 * np.pi / cells))
+    for k, mark in enumerate(marks, 2 * n):
+        across = np.zeros(size)
+        across[:n] = rows[mark.row]
+        steps[mark.cell, k] = (1 - mark.share) * across + mark.share * (across @ steps[mark.cell])
+    return product(steps)
+
+
+def exponentials(a) -> np.ndarray:
+    """Matrix exponentials of a (N, s, s), by Taylor's series to order 10 after halving to a norm below 1/4."""
+    norm = float(np.abs(a).sum(axis=2).max()) if a.size else 0.0
+    halvings = max(0, int(np.ceil(np.log2(max(4 * norm, 1e-300)))))
+    a = a / 2.0**halvings
+    out = term = np.broadcast_to(np.eye(a.shape[1]), a.shape)
+    for k in range(1, 11):
+        term = term @ a / k
+        out = out + term
+    for _ in range(halvings):
+        out = out @ out
+    return out
+
+
+def product(steps) -> np.ndarray:
+    """steps[N - 1] ... steps[1] steps[0] by pairs."""
+    while len(steps) > 1:
+        rest = steps[-1:] if len(steps) % 2 else steps[:0]
+        steps = np.concatenate([steps[1::2] @ steps[0:len(steps) - len(rest):2], rest])
+    return steps[0]
+
+
+def multipliers(matrix) -> np.ndarray:
+    """Eigenvalues of a monodromy matrix, largest first."""
+    found = np.linalg.eigvals(matrix)
+    return found[np.argsort(-np.abs(found))]
+
+
+def is_stable(found) -> bool:
+    """Whether no disturbance grows from cycle to cycle."""
+    return bool(np.abs(found).max() <= 1 + ROUNDING)
+
+
+def kind_of_loss(found) -> str:
+    """How a motion that is not stable leaves: "fold" or "branch" (through +1), "doubling" (through -1), "torus"."""
+    worst = found[0]
+    if abs(worst.imag) > 1e-6 * abs(worst):
+        return "torus"
+    return "doubling" if worst.real < 0 else "fold"

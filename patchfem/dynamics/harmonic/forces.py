@@ -1,0 +1,137 @@
+"""From the harmonics of the slides to those of the forces and back: alternating frequency and time over all rows."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from .harmonic import Fold
+from .laws import Track, analysis, law_of_model, synthesis
+
+FEWEST, MOST = 256, 65536  # samples of a cycle
+
+
+class Group:
+    """Laws on rows: a law, a pair (row, law) or a list of them.
+
+    A row is a number of an interface of `modes` or participations (n,) of its own; a law alone sits on interface 0; a
+    dynamics.march.march.ContactModel becomes its law.
+    rows (i, n), laws: a tuple of laws per row. Calling it with the harmonics (i, H + 1) of the slides and omega gives a
+    dynamics.harmonic.Fold.
+    """
+
+    def __init__(self, modes, parts, samples: int = 0):
+        rows, laws = {}, {}
+        for part in parts if isinstance(parts, list) else [parts]:
+            row, law = part if isinstance(part, tuple) else (0, part)
+            law = law_of_model(law) if hasattr(law, "fields") else law
+            faces = modes.interfaces
+            if np.ndim(row) == 0 and not 0 <= row < len(faces):
+                raise PatchfemError(f"interface {row}: there are {len(faces)}, counted from 0")
+            vector = faces[row] if np.ndim(row) == 0 else np.asarray(row, float)
+            key = vector.tobytes() if np.ndim(row) else int(row)
+            rows[key] = vector
+            laws.setdefault(key, []).append(law)
+        if not rows:
+            raise PatchfemError("the balance wants at least one law at an interface")
+        self.rows, self.laws = frozen_array(np.array(list(rows.values()))), [tuple(v) for v in laws.values()]
+        self.samples = samples
+
+    def with_samples(self, samples: int) -> "Group":
+        """The same on a grid of `samples`."""
+        other = object.__new__(Group)
+        other.rows, other.laws, other.samples = self.rows, self.laws, samples
+        return other
+
+    def samples_for(self, harmonics: int, amplitudes=None) -> int:
+        """A power of two that holds the products of H harmonics and the sharpest stick at the amplitudes (i,) [m].
+
+        What aliases is the corner of a law, so a law counts by the root of its share of all corners.
+        """
+        want = max(FEWEST, 12 * harmonics)
+        if amplitudes is not None:
+            found = [(law.total * a, law.sharpness(a)) for a, laws in zip(amplitudes, self.laws) for law in laws]
+            whole = sum(corner for corner, sharp in found if sharp)
+            want = max([want, *(sharp * np.sqrt(corner / whole) for corner, sharp in found if sharp and whole > 0)])
+        return int(min(2 ** int(np.ceil(np.log2(want))), MOST))
+
+    def stiffness(self) -> np.ndarray:
+        """Tangent stiffness of every row at rest (i,) [N/m]."""
+        return np.array([sum(law.total for law in laws) for laws in self.laws])
+
+    def tracks(self, q, omega: float, samples: int = 0) -> list:
+        """Track of every row."""
+        n = samples or self.samples or self.samples_for(q.shape[1] - 1)
+        values, rates = synthesis(q, n), synthesis(1j * np.arange(q.shape[1]) * q, n)
+        return [Track(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
+
+    def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
+        """Forces (i, N) at the samples of one cycle."""
+        return np.array([sum(law.sample(track).force for law in laws)
+                         for track, laws in zip(self.tracks(q, omega, samples), self.laws)])
+
+    def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
+        """Harmonics (i, harmonics + 1) of the forces."""
+        return analysis(self.forces(q, omega, samples), harmonics)
+
+    def __call__(self, q, omega: float) -> Fold:
+        tracks = self.tracks(q, omega)
+        return fold(tracks, [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)])
+
+
+def fold(tracks: list, sampled: list) -> Fold:
+    """Harmonics of the forces and of their slopes from the laws sampled along the tracks of i rows.
+
+    The local slope K(theta) enters by its harmonics up to 2 H, a Toeplitz and a Hankel part; a turning point s by the
+    harmonics of its share and the basis at its angle: no product over the samples, one transform for all rows.
+    """
+    x, samples, omega = np.array([t.x for t in tracks]), tracks[0].samples, tracks[0].omega
+    rows, h = len(tracks), x.shape[1] - 1
+
+    def added(name):
+        return [_sum([getattr(s, name) for s in laws if getattr(s, name) is not None]) for laws in sampled]
+
+    rates, holds = added("by_rate"), added("hold")
+    moving = any(r is not None for r in rates)
+    lines = [*added("force"), *added("slope"), *(rates if moving else ())]
+    lines = [np.zeros(samples) if line is None else line for line in lines]
+    found = analysis(np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h)
+    slope, rate = local(found[rows:2 * rows]), None
+    at = (3 if moving else 2) * rows
+    if moving:
+        turned, k = local(found[2 * rows:at]), np.arange(1, h + 1)
+        slope[..., 1:h + 1] += turned[..., h + 1:] * (k * omega)
+        slope[..., h + 1:] -= turned[..., 1:h + 1] * (k * omega)
+        speed = 1j * k * x[:, 1:]
+        rate = np.einsum("ikl,il->ik", turned, np.concatenate([np.zeros((rows, 1)), speed.real, speed.imag], axis=1))
+    for i, (track, hold) in enumerate(zip(tracks, holds)):
+        if hold is not None and len(hold):
+            phase = np.arange(h + 1) * track.turning[0][:, None]
+            basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
+            slope[i] += found[at:at + len(hold), :h + 1].T @ basis
+            at += len(hold)
+    return Fold(found[:rows, :h + 1], slope, rate)
+
+
+def _sum(arrays: list):
+    return None if not arrays else arrays[0] if len(arrays) == 1 else sum(arrays)
+
+
+@lru_cache(maxsize=16)
+def _places(h: int) -> tuple:
+    row, column = np.arange(h + 1)[:, None], np.arange(h + 1)[None, :]
+    return row - column + 2 * h, row + column + 2 * h
+
+
+def local(k) -> np.ndarray:
+    """Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta) to those of q; k (i, 2 H + 1) those of K."""
+    h = k.shape[1] // 2
+    two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)  # of exp(i m theta), m = -2 H..2 H
+    less, more = (two[:, place] for place in _places(h))
+    out = np.empty((len(k), h + 1, 2 * h + 1), complex)
+    out[..., :h + 1] = less + more
+    out[..., h + 1:] = 1j * (less - more)[..., 1:]
+    out[..., 0] = k[:, :h + 1]
+    out[:, 0] = out[:, 0].real
+    out[:, 0, 1:] /= 2
+    return out

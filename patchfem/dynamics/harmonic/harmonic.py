@@ -1,0 +1,275 @@
+"""Steady motion under a sine by harmonic balance: the linear part exact, only the interface rows unknown.
+
+With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the modes are condensed to
+the rows that touch: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2 omega^2 + i k omega D)^-1 faces^T/m. The
+contact is any callable from the harmonics of the slides to those of the forces with their Jacobian (alternating
+frequency/time), so the laws stay outside. Harmonics above H of the force that the contact returns tell what the
+truncation leaves out.
+
+A mode that a harmonic finds without stiffness and damping (a rigid mode at k = 0, an undamped one at its own frequency)
+has no receptance: its coordinate becomes an unknown of its own and the balance of its forces an equation of its own.
+
+Method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019; damped Newton: Deuflhard 2004.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from ...core import ModalBasis, NotConverged, PatchfemError
+
+SINGULAR = 1e-10  # stiffness of a mode over its scale below which a harmonic finds nothing that holds it
+
+
+class Fold(NamedTuple):
+    """What a contact answers. force (i, K + 1) complex [N], K >= H; slope (i, H + 1, 2 H + 1) complex [N/m], d force
+    over d (Re q_0..Re q_H, Im q_1..Im q_H) of the same row; rate (i, H + 1) [N s], d force/d omega, or None."""
+
+    force: np.ndarray
+    slope: np.ndarray | None = None
+    rate: np.ndarray | None = None
+
+
+def pack(x) -> np.ndarray:
+    """Complex harmonics (r, H + 1) as reals (r (2 H + 1),)."""
+    return np.concatenate([x.real, x.imag[:, 1:]], axis=1).ravel()
+
+
+def unpack(v, rows: int) -> np.ndarray:
+    """Inverse of `pack`."""
+    v = v.reshape(rows, -1)
+    h = v.shape[1] // 2
+    x = v[:, :h + 1].astype(complex)
+    x[:, 1:] += 1j * v[:, h + 1:]
+    return x
+
+
+def _real(c) -> np.ndarray:
+    """Rows of complex equations (H + 1, ...) as real ones (2 H + 1, ...)."""
+    return np.concatenate([c.real, c.imag[1:]], axis=0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plant:
+    """The modes at one frequency. inverse, slope (H + 1, n, n): R_k and d(R_k^-1)/d omega; free: for every coordinate
+    without receptance (k, right (n,), left (n,), stiffness)."""
+
+    inverse: np.ndarray
+    slope: np.ndarray
+    free: tuple
+
+
+def plant(modes: ModalBasis, omega: float, harmonics: int) -> Plant:
+    """R_k for k = 0..harmonics at omega [rad/s]."""
+    n, k = modes.omega.size, np.arange(harmonics + 1)
+    around = k * omega
+    slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[:, None, None] * modes.dampers
+    if modes.damping is None:
+        along = modes.omega**2 - around[:, None]**2 + 2j * around[:, None] * modes.zeta * modes.omega
+        scale = np.maximum(modes.omega**2 + around[:, None]**2, omega**2)
+        bad = np.abs(along) < SINGULAR * scale
+        inverse = np.zeros((k.size, n, n), complex)
+        inverse[:, np.arange(n), np.arange(n)] = np.where(bad, 0.0, 1 / np.where(bad, 1.0, along))
+        unit = np.eye(n)
+        return Plant(inverse, slope, tuple((int(h), unit[j], unit[j], along[h, j]) for h, j in np.argwhere(bad)))
+    p = np.diag(modes.omega**2) - (around**2)[:, None, None] * np.eye(n) + 1j * around[:, None, None] * modes.dampers
+    u, s, vh = np.linalg.svd(p)
+    bad = s < SINGULAR * np.maximum(np.max(modes.omega)**2 + around[:, None]**2, omega**2)
+    inverse = (vh.conj().transpose(0, 2, 1) * np.where(bad, 0.0, 1 / np.where(bad, 1.0, s))[:, None, :]) \
+        @ u.conj().transpose(0, 2, 1)
+    return Plant(inverse, slope, tuple((int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j])
+                                       for h, j in np.argwhere(bad)))
+
+
+class System(NamedTuple):
+    """Residual (N,), its Jacobian (N, N), its slopes over omega and over the drive level (N,), the contact's Fold."""
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    by_omega: np.ndarray
+    by_level: np.ndarray
+    fold: Fold
+
+
+class Balance:
+    """The equations of the interface rows for a ModalBasis, rows (i, n) and a contact(q (i, H + 1), omega) -> Fold.
+
+    More rows than modes lie in the space of the modes: the unknowns are then `rank` combinations of them, q = lift y.
+    Unknowns: `pack`ed harmonics of y, then the coordinates without receptance. PatchfemError where no mode moves the
+    rows.
+    """
+
+    def __init__(self, modes: ModalBasis, rows, contact):
+        rows = np.asarray(rows, float)
+        u, s, vt = np.linalg.svd(rows, full_matrices=False)
+        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
+        if rank == 0:
+            raise PatchfemError("structure.mode.slide: no mode moves the interface, so there is nothing to balance; "
+                                "give one a slide")
+        full = rank == rows.shape[0]
+        self.modes, self.rows, self.contact = modes, rows, contact
+        self.lift = np.eye(rank) if full else u[:, :rank]
+        self.faces = rows if full else s[:rank, None] * vt[:rank]
+        self._plants = {}
+
+    def on(self, contact) -> "Balance":
+        """The same rows and modes with another contact on them."""
+        other = object.__new__(Balance)
+        other.__dict__.update(self.__dict__, contact=contact)
+        return other
+
+    def plant(self, omega: float, harmonics: int) -> Plant:
+        """`plant`, kept for the last frequencies."""
+        key = (omega, harmonics)
+        if key not in self._plants:
+            if len(self._plants) > 8:
+                self._plants.clear()
+            self._plants[key] = plant(self.modes, omega, harmonics)
+        return self._plants[key]
+
+    def size(self, omega: float, harmonics: int) -> int:
+        """Number of real unknowns."""
+        free = self.plant(omega, harmonics).free
+        return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
+
+    def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
+        """Slides of the interface rows (i, H + 1) complex of unknowns x (N,)."""
+        r = self.lift.shape[1]
+        return self.lift @ unpack(x[:r * (2 * harmonics + 1)], r)
+
+    def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
+        """Modal harmonics (K + 1, n) under the force (i, K + 1); K may exceed H."""
+        top = force.shape[1] - 1
+        return self._motion(self.plant(omega, top), self._coordinates(x, omega, harmonics), level, force)
+
+    def _coordinates(self, x, omega, harmonics) -> list:
+        rest = x[self.lift.shape[1] * (2 * harmonics + 1):]
+        out, at = [], 0
+        for k, *_ in self.plant(omega, harmonics).free:
+            out.append(complex(rest[at], rest[at + 1] if k else 0.0))
+            at += 2 if k else 1
+        return out
+
+    def _motion(self, here, coordinates, level, force):
+        push = -(force.T @ self.rows) / self.modes.mass + 0j
+        if len(push) > 1:
+            push[1] += 1j * level * self.modes.base
+        z = np.einsum("kab,kb->ka", here.inverse, push)
+        for (k, right, *_), c in zip(here.free, coordinates):
+            z[k] += right * c
+        return z
+
+    def system(self, x, omega: float, level: float, harmonics: int) -> System:
+        """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]."""
+        h, r, mass = harmonics, self.lift.shape[1], self.modes.mass
+        here = self.plant(omega, h)
+        coordinates = self._coordinates(x, omega, h)
+        y = unpack(x[:r * (2 * h + 1)], r)
+        fold = self.contact(self.lift @ y, omega)
+        z = self._motion(here, coordinates, level, fold.force[:, :h + 1])
+        through = -np.einsum("ra,kab->krb", self.faces, here.inverse)  # -faces R_k
+        miss = y - (z @ self.faces.T).T
+        receptance = -through @ self.faces.T / mass  # (H + 1, r, r)
+        linked = self.gathered(fold.slope)
+        block = (receptance @ linked).reshape(h + 1, r, r, 2 * h + 1)
+        size = r * (2 * h + 1)
+        jacobian = np.eye(x.size)
+        block = _real(block).transpose(1, 0, 2, 3).reshape(size, size)
+        jacobian[:size, :size] += block
+        turned = -np.einsum("krb,kbc,kc->rk", through, here.slope, z)
+        if fold.rate is not None:
+            turned = turned + np.einsum("krs,sk->rk", receptance, self.lift.T @ fold.rate)
+        lifted = np.zeros((r, h + 1), complex)
+        if h:
+            lifted[:, 1] = 1j * through[1] @ self.modes.base
+        parts = [[pack(miss)], [pack(turned)], [pack(lifted)]]
+        self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
+        return System(*[np.concatenate(parts[0])], jacobian, np.concatenate(parts[1]), np.concatenate(parts[2]), fold)
+
+    def gathered(self, slope) -> np.ndarray:
+        """Slopes (i, H + 1, 2 H + 1) of the rows' forces as those of the forces on y to y, (H + 1, r, r (2 H + 1))."""
+        count, r = self.lift.shape
+        h = slope.shape[1] - 1
+        pairs = (self.lift[:, :, None] * self.lift[:, None, :]).reshape(count, r * r)
+        both = (pairs.T @ np.ascontiguousarray(slope).reshape(count, -1).view(float)).view(complex)
+        return both.reshape(r, r, h + 1, 2 * h + 1).transpose(2, 0, 1, 3).reshape(h + 1, r, -1)
+
+    def met(self, here: System, left, omega: float, level: float, harmonics: int, size: float) -> bool:
+        """Whether what a step leaves of the residual (N,) is rounding: a least-squares step can vanish where nothing
+        balances. size: of the unknowns [m]."""
+        low = self.lift.shape[1] * (2 * harmonics + 1)
+        push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (self.modes.mass * omega**2)
+        for part, own in ((slice(0, low), size), (slice(low, None), push)):
+            scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
+            if float(np.linalg.norm(left[part])) > 1e-7 * scale:
+                return False
+        return True
+
+    def _free(self, here, coordinates, jacobian, parts, fold, z, level, linked, omega, size):
+        """Rows and columns of the coordinates without receptance, equations over omega^2 [m]."""
+        h, r, at = z.shape[0] - 1, self.lift.shape[1], size
+        for (k, right, left, stiffness), c in zip(here.free, coordinates):
+            w = left @ self.rows.T / self.modes.mass / omega**2
+            drive = left @ self.modes.base / omega**2 if k == 1 else 0.0
+            miss = stiffness / omega**2 * c + w @ fold.force[:, k] - 1j * level * drive
+            by_omega = left @ here.slope[k] @ z[k] / omega**2 - 2 * miss / omega
+            if fold.rate is not None:
+                by_omega = by_omega + w @ fold.rate[:, k]
+            row = left @ self.faces.T / self.modes.mass / omega**2 @ linked[k]
+            across = self.faces @ right
+            count = 2 if k else 1
+            for j in range(count):
+                unit = 1j**j
+                jacobian[at + j, :size] = (row.real, row.imag)[j]
+                own = stiffness / omega**2 * unit
+                column = np.zeros((r, h + 1), complex)
+                column[:, k] = -across * unit
+                jacobian[:size, at + j] = pack(column)
+                jacobian[at:at + count, at + j] = [own.real, own.imag][:count]
+            for part, value in zip(parts, (miss, by_omega, -1j * drive)):
+                part.append(np.array([value.real, value.imag][:count]))
+            at += count
+
+
+def solve_linear(matrix):
+    """A function b -> matrix^-1 b; least squares where the matrix is singular (a mean that nothing holds)."""
+    factors, pivots, _ = dgetrf(matrix)
+    sizes = np.abs(np.diag(factors))
+    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():
+        return lambda b: dgetrs(factors, pivots, b)[0]
+    if not np.isfinite(matrix).all():
+        return lambda b: np.full(b.shape, np.nan)
+    return lambda b: np.linalg.lstsq(matrix, b, rcond=1e-12)[0]
+
+
+def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal: float = 1e-10, most: int = 40):
+    """(unknowns, System one last step before, iterations) by Newton's method damped by the natural monotonicity test.
+
+    Ends when a step is below `goal` of the motion; NotConverged after `most` steps.
+    """
+    here = balance.system(x, omega, level, harmonics)
+    for count in range(1, most + 1):
+        solve = solve_linear(here.jacobian)
+        step = -solve(here.residual)
+        length, size = float(np.linalg.norm(step)), float(np.linalg.norm(x))
+        if not np.isfinite(length):
+            break
+        if length <= goal * max(size, 1e-300) or length < 1e-300:
+            if not balance.met(here, here.residual + here.jacobian @ step, omega, level, harmonics, size):
+                break
+            return x + step, here, count
+        share, best = 1.0, None
+        while True:
+            tried = x + share * step
+            there = balance.system(tried, omega, level, harmonics)
+            left = float(np.linalg.norm(solve(there.residual)))
+            if best is None or left < best[0]:
+                best = (left, tried, there)
+            if left <= (1 - share / 4) * length or share < 0.02 or not length > 1e-8 * size:
+                break
+            share /= 2
+        _, x, here = best
+    raise NotConverged(f"accuracy.harmonics: the balance with {harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz "
+                       f"missed its residual in {most} steps; give a start or follow a branch from a lower level")

@@ -1,0 +1,232 @@
+"""Laws of an interface row for the harmonic balance, each sampled along one cycle of a periodic slide.
+
+Endpoint values are taken, not path means: the mean of a trigonometric polynomial over equal samples is exact up to
+their number, so what aliases is only the corners of the force, (slope jump)(2 pi/N)^2/12, while a path mean over a step
+damps every harmonic by (k pi/N)^2/6 besides. Turning points lie where the harmonics have them, not at samples.
+"""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled import load
+from ...core import PatchfemError, frozen_array
+
+SHARPEST = 48  # samples while an element goes from one limit to the other
+
+
+@cache
+def kernels():
+    """The compiled laws."""
+    return load("dynamics.harmonic.cycle_kernels")
+
+
+class Sampled(NamedTuple):
+    """Along N samples: force [N], slope over the slide [N/m], over the rate of the slide [N s/m], derivatives (R, N) to
+    the places of the R turning points, friction limit [N] and limit-weighted elastic stretch [N m]."""
+
+    force: np.ndarray
+    slope: np.ndarray | None = None
+    by_rate: np.ndarray | None = None
+    hold: np.ndarray | None = None
+    limit: float = 0.0
+    stretch: np.ndarray | None = None
+
+
+class Track:
+    """A periodic slide with harmonics x (H + 1,) on N uniform samples of the cycle."""
+
+    def __init__(self, x, omega: float, samples: int, q=None, rate=None):
+        self.x, self.omega, self.samples = x, omega, samples
+        self.q = synthesis(x, samples) if q is None else q
+        self.rate = synthesis(1j * np.arange(x.size) * x, samples) if rate is None else rate
+
+    @cached_property
+    def turning(self) -> tuple:
+        """(angles, places, sample before each, direction at the first sample)."""
+        n = self.samples
+        angle, place, cell = np.empty(n), np.empty(n), np.empty(n, np.int64)
+        re, im = np.ascontiguousarray(self.x.real), np.ascontiguousarray(self.x.imag)
+        count, start = kernels().turning_points(re, im, self.rate, angle, place, cell)
+        return angle[:count], place[:count], cell[:count], start
+
+
+def synthesis(x, samples: int) -> np.ndarray:
+    """Samples (..., N) over one cycle of Re sum X_k exp(i k theta), X (..., H + 1)."""
+    if 2 * x.shape[-1] > samples:
+        every = -(-2 * x.shape[-1] // samples)
+        return synthesis(x, samples * every)[..., ::every]
+    spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
+    spectrum[..., :x.shape[-1]] = x * (samples / 2)
+    spectrum[..., 0] *= 2
+    return np.fft.irfft(spectrum, samples, axis=-1)
+
+
+def analysis(values, harmonics: int) -> np.ndarray:
+    """Harmonics (..., H + 1) of samples (..., N)."""
+    n = values.shape[-1]
+    out = np.fft.rfft(values, axis=-1)[..., :harmonics + 1] * (2 / n)
+    out[..., 0] /= 2
+    return out
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Jenkins:
+    """Parallel elastic-plastic elements: stiffness (t,) [N/m] > 0, limit_slide (t,) [m] >= 0."""
+
+    stiffness: np.ndarray
+    limit_slide: np.ndarray
+    sums: tuple = ()
+
+    def __post_init__(self):
+        k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
+        if k.shape != w.shape or not (np.isfinite(k).all() and np.isfinite(w).all()) or k.min() <= 0 or w.min() < 0:
+            raise PatchfemError("Jenkins elements want as many stiffnesses > 0 as limit slides >= 0, all finite")
+        order = np.argsort(w, kind="stable")
+        k, w = k[order], w[order]
+        object.__setattr__(self, "stiffness", frozen_array(k))
+        object.__setattr__(self, "limit_slide", frozen_array(w))
+        object.__setattr__(self, "sums", tuple(frozen_array(np.append(0.0, np.cumsum(v)))
+                                               for v in (k, k * w, k * w * w)))
+
+    @property
+    def total(self) -> float:
+        """Tangent stiffness at rest [N/m]."""
+        return float(self.sums[0][-1])
+
+    def sharpness(self, amplitude: float) -> int:
+        """Samples of a cycle that resolve a stick at a slide amplitude [m]."""
+        share = float(self.sums[1][-1]) / self.total / max(amplitude, 1e-300)
+        return _samples(share)
+
+    def sample(self, track: Track) -> Sampled:
+        """The periodic steady state that a virgin contact reaches."""
+        _, places, cells, start = track.turning
+        n, (stiff, full, square) = track.samples, self.sums
+        force, slope, stretch, hold = np.empty(n), np.empty(n), np.empty(n), np.zeros((places.size, n))
+        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full,
+                                                        square, force, slope, hold, stretch)
+        return Sampled(force, slope, None, hold, float(full[-1]), stretch)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Stretch:
+    """Bond recursion of the stretch reading, p = 1, constant bond length: limit mu_s N [N], length [m]."""
+
+    limit: float
+    length: float
+
+    def __post_init__(self):
+        if not (self.limit >= 0 and self.length > 0 and np.isfinite(self.limit + self.length)):
+            raise PatchfemError("friction.bond_length must be positive and the friction limit not negative")
+
+    @property
+    def total(self) -> float:
+        """Tangent stiffness at rest [N/m]."""
+        return self.limit / self.length
+
+    def sharpness(self, amplitude: float) -> int:
+        """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
+        return _samples(self.length / max(amplitude, 1e-300))
+
+    def sample(self, track: Track) -> Sampled:
+        """The loop on which the recursion closes, its affine condition solved exactly."""
+        _, places, cells, start = track.turning
+        n = track.samples
+        force, slope, hold = np.empty(n), np.empty(n), np.zeros((places.size, n))
+        kernels().bond_cycle(track.q, start, cells, places, self.limit, self.length, force,
+                                                     slope, hold)
+        return Sampled(force, slope, None, hold, self.limit, self.length * force)
+
+
+@dataclass(frozen=True, slots=True)
+class Spring:
+    """Bonded spring: stiffness [N/m], cubic [N/m3] q^3 besides."""
+
+    stiffness: float = 0.0
+    cubic: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Tangent stiffness at rest [N/m]."""
+        return self.stiffness
+
+    def sharpness(self, amplitude: float) -> int:
+        """No corner."""
+        return 0
+
+    def sample(self, track: Track) -> Sampled:
+        """Force and slope at the samples."""
+        q = track.q
+        return Sampled(q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q)
+
+
+@dataclass(frozen=True, slots=True)
+class Interlock:
+    """Interlocking of wavelength [m]: stiffness wavelength/(2 pi) sin(2 pi q/wavelength), stiffness [N/m] at rest."""
+
+    stiffness: float
+    wavelength: float
+
+    @property
+    def total(self) -> float:
+        """Tangent stiffness at rest [N/m]."""
+        return self.stiffness
+
+    def sharpness(self, amplitude: float) -> int:
+        """Samples for the waves that a cycle passes."""
+        return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
+
+    def sample(self, track: Track) -> Sampled:
+        """Force and slope at the samples."""
+        angle = 2 * np.pi / self.wavelength * track.q
+        return Sampled(self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle), self.stiffness * np.cos(angle))
+
+
+@dataclass(frozen=True, slots=True)
+class Tanh:
+    """Friction limit tanh(q'/speed) of eq. 2.4: limit [N], speed [m/s]."""
+
+    limit: float
+    speed: float
+
+    @property
+    def total(self) -> float:
+        """It creeps under any force: no stiffness."""
+        return 0.0
+
+    def sharpness(self, amplitude: float) -> int:
+        """Left to the finer grid of the check."""
+        return 0
+
+    def sample(self, track: Track) -> Sampled:
+        """Force and slope at the samples."""
+        v = track.omega * track.rate / self.speed
+        t = np.tanh(v)
+        return Sampled(self.limit * t, None, self.limit / self.speed * (1 - t) * (1 + t), None, self.limit,
+                       np.zeros(v.size))
+
+
+def _samples(share: float) -> int:
+    """Samples of a cycle for a stick over `share` of the amplitude: it takes the angle acos(1 - 2 share)."""
+    angle = np.arccos(max(1 - 2 * share, -1.0))
+    return int(min(SHARPEST * 2 * np.pi / max(angle, 1e-9), 65536))
+
+
+def law_of_model(model):
+    """The law of a dynamics.march.march.ContactModel; PatchfemError names what cannot be balanced and what to do."""
+    fields = model.fields
+    if model.kind == 1:
+        return Jenkins(fields["stiffness"], fields["limit"])
+    if model.kind == 4:
+        return Tanh(float(fields["force"][0]), float(fields["force"][1]))
+    if model.kind == 0:
+        raise PatchfemError("accuracy.method: \"harmonic\" cannot balance friction.law = \"coulomb\", a set-valued "
+                            "force; use the event map, or law = \"elastic-plastic\" with a short bond_length")
+    if model.kind == 2 and "psi" not in fields and not model.follow and fields["growth"][0] < 0 \
+            and not fields["growth"][5]:
+        return Stretch(model.limit, model.length)
+    raise PatchfemError("accuracy.method: \"harmonic\" takes the stretch reading with order = 1, a constant bond "
+                        "length, friction.breakaway = 0 and a rigid slide; use method = \"march\"")

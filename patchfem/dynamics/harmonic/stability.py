@@ -1,0 +1,89 @@
+"""Multipliers of a steady motion of the balance: the laws' slopes and memories, cell by cell, for dynamics.floquet."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .floquet import Fading, Mark, is_stable, monodromy, multipliers
+from .laws import Stretch
+
+
+def with_stability(periodic, modes, cells: int = 0):
+    """The Periodic with its multipliers and whether it is stable; cells of the cycle, 0: 1024 or as it was sampled."""
+    found = multipliers(monodromy_of(periodic, modes, cells))
+    return replace(periodic, multipliers=found, stable=is_stable(found))
+
+
+def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
+    """dynamics.floquet.monodromy of a Periodic."""
+    group, n = periodic.group, cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
+    slope, by_rate = np.zeros((len(group.rows), n)), np.zeros((len(group.rows), n))
+    marks, fading = [], []
+    for i, (track, laws) in enumerate(zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)):
+        for law in laws:
+            found = law.sample(track)
+            if isinstance(law, Stretch):
+                fading.append(_bonds(i, law, track, found))
+                continue
+            share = _weights(track, found)
+            slope[i] += _mean(found.slope, share) if found.slope is not None else 0.0
+            by_rate[i] += _mean(found.by_rate, 0.5) if found.by_rate is not None else 0.0
+            if found.hold is not None:
+                marks += _marks(i, track, found.hold, share, slope[i])
+    return monodromy(modes, group.rows, periodic.omega, slope, by_rate, marks, fading)
+
+
+def _mean(values, share) -> np.ndarray:
+    """Means per cell (..., N) of samples (..., N): share of that at its end, 1 - share of that at its start."""
+    return (1 - share) * values + share * np.roll(values, -1, axis=-1)
+
+
+def _weights(track, found):
+    """(N,) share of the later sample in the mean slope of a cell: by where a turning point lies in it, else such that
+    the mean is the secant of the force over the cell."""
+    if found.slope is None:
+        return 0.5
+    after = np.roll(found.slope, -1)
+    rise, jump = np.roll(track.q, -1) - track.q, after - found.slope
+    firm = (np.abs(rise) > 1e-9 * np.ptp(track.q)) & (np.abs(jump) > 1e-9 * np.abs(found.slope).max())
+    secant = (np.roll(found.force, -1) - found.force) / np.where(firm, rise, 1.0)
+    return _turned(track, np.where(firm, np.clip((secant - found.slope) / np.where(firm, jump, 1.0), 0.0, 1.0), 0.5))
+
+
+def _turned(track, share):
+    """Shares (N,) with those of the cells of the turning points set to what follows these."""
+    cells = track.turning[2]
+    share[cells] = 1 - _inside(track)
+    return share
+
+
+def _inside(track) -> np.ndarray:
+    """Place [0, 1] of every turning point in its cell."""
+    return track.turning[0] * (track.samples / (2 * np.pi)) - track.turning[2]
+
+
+def _marks(row: int, track, hold, share, slope) -> list:
+    """Marks of the turning points; what hangs on one all the cycle long never slips and is no memory.
+
+    In its own cell a turning point holds nothing yet: the slide has not left it by more than the square of the cell.
+    """
+    out = []
+    for cell, x, line in zip(track.turning[2], _inside(track), hold):
+        if line.min() < line.max():
+            line = line - line.max()
+            mean = _mean(line, share)
+            mean[cell] = x * line[cell]
+            slope[cell] += (1 - x) * line[(cell + 1) % line.size]
+            out.append(Mark(row, int(cell), float(x), mean))
+    return out
+
+
+def _bonds(row: int, law: Stretch, track, found) -> Fading:
+    n, rise = track.samples, np.roll(track.q, -1) - track.q
+    path = np.abs(rise)
+    _, places, cells, _ = track.turning
+    for k in np.unique(cells):
+        stops = [track.q[k], *places[cells == k], track.q[(k + 1) % n]]
+        path[k] = np.abs(np.diff(stops)).sum()
+    gain = _mean(found.slope, _turned(track, np.full(n, 0.5))) / law.limit if law.limit else np.zeros(n)
+    return Fading(row, gain, path / law.length * (n / (2 * np.pi)), law.limit)

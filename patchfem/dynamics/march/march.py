@@ -1,0 +1,354 @@
+"""From the results of the stages to the arrays of the compiled hub, and the march in pieces of one drive cycle."""
+
+from collections import deque
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...compiled import load_kernels
+from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
+from .models import (
+    ContactModel,
+    coulomb_model,
+    growth_numbers,
+    jenkins_model,
+    list_model,
+    place_model,
+    points_model,
+    rate_model,
+)
+
+__all__ = ["ContactModel", "MarchResult", "Run", "coulomb_model", "growth_numbers", "jenkins_model", "list_model",
+           "march", "place_model", "points_model", "rate_model", "warm_up"]
+
+MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
+GOAL = 1e-11  # residual of the step solve over the friction limit
+MOST_KEPT = 400_000  # samples kept outside the last cycles
+MOST_TURNS = 100  # of them in a cycle
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MarchResult:
+    """A march: kept samples, the last cycles whole and their step-mean forces, extremes and phasors per cycle, the
+    energy ledger and how it ended."""
+
+    response: Response
+    window: Response
+    step_force: np.ndarray
+    amplitudes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None
+    snapshots: list
+    window_work: float
+    cycles_done: float
+    message: str = ""
+    marks: tuple = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mark:
+    """The last window of cycles before a mark: its samples, step-mean forces, friction work [J], extremes of the output
+    per cycle (c, 2), the ledger there, and the march as it stood (`after`), to go on from."""
+
+    window: Response
+    step_force: np.ndarray
+    work: float
+    amplitudes: np.ndarray
+    ledger: dict
+    after: object = None
+
+
+def _response(rows, number, dt, modes, drive) -> Response:
+    """Histories of the samples with step numbers `number` (k,)."""
+    n = modes.omega.size
+    z, rate, time = rows[:, :n], rows[:, n:2 * n], number * dt
+    push = drive.values(time)
+    base = push if drive.moving else np.zeros_like(push)
+    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
+    accel = -np.outer(push, modes.base) - damped - z * modes.omega**2 \
+        - np.outer(rows[:, 2 * n + 2], modes.slide) / modes.mass
+    return Response(time, z, rate, rows[:, 2 * n], rows[:, 2 * n + 1], z @ modes.output, rate @ modes.output,
+                    accel @ modes.output + base, base, rows[:, 2 * n + 2], rows[:, 2 * n + 3],
+                    {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
+
+
+def modes_arrays(modes: ModalBasis, hub):
+    """hub.Modes of a basis."""
+    damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
+    return hub.Modes(*(np.array(v, float) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base,
+                                                    modes.output, damping)))
+
+
+def steps_arrays(prop, hub):
+    """hub.Steps of a Propagator of one interface."""
+    return hub.Steps(*(np.array(v) for v in (prop.free, prop.push, prop.dense, prop.reach, prop.loss,
+                                             prop.dense_loss)), prop.dt, float(prop.beta[0, 0]))
+
+
+def _runner(model):
+    """The class that marches a model: Run, or that of a model of several elements."""
+    return getattr(model, "runner", None) or Run
+
+
+def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
+    """Load the compiled loop, or compile it, by a march of no steps."""
+    run = _runner(model)(modes, drive, model, 4, np.inf, load_kernels(say))
+    run.cycle(0, 0, [])
+
+
+def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None):
+    """A Run at its start."""
+    return _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(), start)
+
+
+def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
+          window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
+          start=None, marks=()) -> MarchResult:
+    """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
+
+    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers of
+    whole cycles after which a Mark is kept besides. The outcome is set
+    for travel and where a step missed its residual or the motion is not finite (not_converged, `message` says what);
+    Missing when a bond list overflows.
+    """
+
+    run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
+    total = round(cycles * steps_per_cycle)
+    last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
+    asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
+    size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
+    while run.done < total and run.outcome is None:
+        final = run.done + size >= total
+        first, rows, work = run.cycle(size, frames if final else 0, snapshots)
+        if len(last) == last.maxlen and samples < MOST_KEPT:
+            pick = _thinned(last[0][1], run)
+            kept.append(last[0][1][pick])
+            kept_at.append(last[0][0] + pick)
+            samples += len(pick)
+        last.append((first, rows, work))
+        extremes.append(_extremes(rows, modes, run.prop.dt))
+        phasors.append(_phasor(rows, modes, first, steps_per_cycle))
+        if run.done in asked:
+            found.append(replace(_mark(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
+        size = steps_per_cycle
+        if progress is not None:
+            progress(run.done / total)
+    run.check()
+    end = _mark(run, list(last)[-window:], extremes)
+    whole, start = _joined(list(last))
+    number = np.concatenate([*kept_at, start + np.arange(len(whole))])
+    full = run.response(np.concatenate([*kept, whole]), number)
+    return MarchResult(full, end.window, end.step_force, end.amplitudes, np.array(phasors), end.ledger, run.outcome,
+                       snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
+
+
+def _mark(run, cycles, extremes) -> Mark:
+    """The Mark of the cycles (first step, rows, work) that end here."""
+    rows, first = _joined(cycles)
+    return Mark(run.response(rows, first + np.arange(len(rows))), rows[:-1, 2 * run.modes.omega.size + 4].copy(),
+                sum(work for _, _, work in cycles), np.array(extremes), run.book())
+
+
+def _joined(parts) -> tuple:
+    """Rows of successive cycles without their shared samples, and the number of the first step."""
+    return np.concatenate([rows[:-1] for _, rows, _ in parts] + [parts[-1][1][-1:]]), parts[0][0]
+
+
+class Run:
+    """The arrays of one march and its clock."""
+
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
+        from ..propagator import propagator
+
+        self.modes, self.drive, self.model, self.travel, self.hub = modes, drive, model, travel, hub
+        self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
+        self.contact, self.work = model.build(hub)
+        self.state, self.held = np.zeros((2, modes.omega.size)), np.zeros(1)
+        if start is not None:
+            self.state[:] = start.z, start.v
+        self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
+        self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 6
+        self.ledger[0] = self.motion()  # what is released at the start counts as work in
+        self.arrays, self.steps = modes_arrays(modes, hub), steps_arrays(self.prop, hub)
+        self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
+
+    def fork(self, drive):
+        """A copy that goes on by itself, under another drive."""
+        twin = copy(self)
+        twin.drive, twin.periodic = drive, None
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                setattr(twin, name, value.copy())
+        twin.contact, twin.work = (type(part)(*(array.copy() for array in part)) for part in (self.contact, self.work))
+        return twin
+
+    def slip_amplitude(self, cycles: int, window: int) -> float:
+        """Half the range of the irreversible slip [m] over the last `window` of `cycles` more cycles."""
+        column, rows = 2 * self.modes.omega.size + 3, deque(maxlen=window)
+        for _ in range(cycles):
+            rows.append(self.cycle(self.prop.steps, 0, [])[1][:, column])
+            if self.outcome is not None:
+                break
+        slip = np.concatenate(rows)
+        return float(slip.max() - slip.min()) / 2
+
+    def table(self, count: int) -> tuple:
+        """(table, row of the next step) for `count` steps from here."""
+        if self.periodic is not None:
+            return self.periodic, self.done % len(self.periodic)
+        return self.prop.tables(self.drive, self.done, max(count, 1)), 0
+
+    def response(self, rows, number) -> Response:
+        """Histories of the samples with step numbers `number` (k,)."""
+        return _response(rows, number, self.prop.dt, self.modes, self.drive)
+
+    def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
+        """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
+        first, before, parts = self.done, self.ledger[8], []
+        self._make_room(size)
+        edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
+        for piece in np.diff(edges) if size else [0]:
+            rows = np.empty((piece + 1, self.width))
+            did, status = self._steps(int(piece), rows)
+            self.done += did
+            parts.append(rows[:did + 1])
+            self._judge(status)
+            if frames:
+                snapshots.append(self._snapshot(rows[did]))
+            if self.outcome is not None:
+                break
+        rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+        return first, self._booked(rows), self.ledger[8] - before
+
+    def _steps(self, count: int, rows) -> tuple:
+        """March `count` steps into rows (count + 1, width): (steps done, status)."""
+        table, row = self.table(count)
+        return self.hub.march(row, count, self.state, self.held, self.arrays, self.steps, table, self.modes.mass,
+                              self.model.kind, self.model.follow, self.contact, self.work, GOAL * self.model.limit,
+                              self.travel, self.ledger, rows)
+
+    def _booked(self, rows) -> np.ndarray:
+        """Rows with the friction work, the energy dissipated and that created since the start [J] as further columns;
+        per step the net of the work and of what the interface stores."""
+        n = 2 * self.modes.omega.size
+        work = self._works(rows)
+        lost = work - np.diff(rows[:, n + 5])
+        # of the step solve, and of the slide's last digit
+        noise = self.model.limit * (1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n]))
+        parts = np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
+        sums = self.totals[:, None] + np.concatenate([np.zeros((3, 1)), np.cumsum(parts, axis=1)], axis=1)
+        self.totals = sums[:, -1]
+        return np.concatenate([rows[:, :n + 6], sums.T, rows[:, n + 6:]], axis=1)
+
+    def _works(self, rows) -> np.ndarray:
+        """Friction work [J] of the steps between the rows."""
+        n = 2 * self.modes.omega.size
+        return rows[:-1, n + 4] * np.diff(rows[:, n])
+
+    def _make_room(self, steps: int) -> None:
+        """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
+        have = self.contact.bondlist.shape[1]
+        if not have or self.contact.law[7]:
+            return
+        want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
+        if want <= have or have >= MOST_STRIPS:
+            return
+        wider = np.zeros((10, min(max(want, 2 * have), MOST_STRIPS)))
+        wider[:, :have] = self.contact.bondlist
+        self.contact = self.contact._replace(bondlist=wider)
+
+    def _judge(self, status: int) -> None:
+        if status == 1:
+            self.outcome = Outcome.EXCEEDS_TRAVEL
+        if status == 2:
+            raise Missing(f"the bond list outgrew {self.contact.bondlist.shape[1]} entries at step {self.done}; loosen "
+                          "accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1")
+        if status == 3:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle"
+
+    def _snapshot(self, row) -> dict:
+        n, c = self.modes.omega.size, self.contact
+        return {"time": self.done * self.prop.dt, "slide": row[2 * n], "rate": row[2 * n + 1], "force": row[2 * n + 2],
+                "slip": row[2 * n + 3], "bonds": c.bonds.copy(), "stretch": c.stretch.copy(), "b": c.b.copy()}
+
+    def check(self) -> None:
+        """Mark the run not_converged when a step missed its residual; what was computed is kept."""
+        if self.ledger[7]:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = (f"{int(self.ledger[7])} of {self.done} steps missed the force residual {GOAL:.0e} of the "
+                            "friction limit; raise accuracy.steps_per_cycle")
+
+    def watched(self, rows) -> tuple:
+        """(rates, slips) (k, i) of the interfaces in booked rows."""
+        n = 2 * self.modes.omega.size
+        return rows[:, n + 1:n + 2], rows[:, n + 3:n + 4]
+
+    def motion(self) -> float:
+        """Kinetic and elastic energy of the modes [J]."""
+        return 0.5 * self.modes.mass * float(np.sum(self.state[1]**2 + (self.modes.omega * self.state[0])**2))
+
+    def strained(self) -> float:
+        """Energy stored in the interface [J]."""
+        slide = float(self.modes.slide @ self.state[0])
+        return float(self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))[1])
+
+    def book(self) -> dict:
+        """The energy ledger [J]."""
+        names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
+        book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
+        tally = self.contact.tally
+        if tally.size:
+            book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),
+                     "strips": float(tally[10])}
+        return book
+
+
+def _thinned(rows, run) -> np.ndarray:
+    """Numbers of the samples of a cycle worth keeping: its first, every reversal of the output and of a slide, every
+    stop and release (slip speed below or above 1e-2 of its peak in the cycle)."""
+    n, output = run.modes.omega.size, run.modes.output
+    speeds, slips = run.watched(rows)
+    speeds = np.concatenate([speeds.T, (rows[:, n:2 * n] @ output)[None]])
+    low = 1e-13 * max(speeds.max(), -speeds.min())
+    way = (speeds > low).view(np.int8) - (speeds < -low).view(np.int8)
+    moved = np.abs(slips.T[:, 1:] - slips.T[:, :-1])
+    low = 1e-13 * np.abs(rows[:, :n] @ output).max()
+    slipping = moved > np.maximum(STICK * moved.max(axis=1), low)[:, None]
+    kept = (way[:, 1:] != way[:, :-1]).any(axis=0)
+    kept[1:] |= (slipping[:, 1:] != slipping[:, :-1]).any(axis=0)
+    kept[0] = True
+    return np.flatnonzero(kept)[:MOST_TURNS]
+
+def _extremes(rows, modes, dt) -> tuple:
+    """(smallest, largest) output of a cycle, found between the samples by the cubic through values and rates."""
+    n = modes.omega.size
+    y, v = rows[:, :n] @ modes.output, rows[:, n:2 * n] @ modes.output
+    return hermite_extremes(y, v, dt)
+
+
+def _phasor(rows, modes, first: int, around: int) -> complex:
+    """Drive-frequency part of the output over a cycle of samples that begins at step number `first`."""
+    y = rows[:-1, :modes.omega.size] @ modes.output
+    return complex(2 * np.mean(y * np.exp(-2j * np.pi * (first + np.arange(y.size)) / around))) if y.size else 0j
+
+
+def hermite_extremes(y, v, dt) -> tuple:
+    """Smallest and largest value of the piecewise cubic with values y (k,) and rates v (k,) at spacing dt."""
+    low, high = float(y.min()), float(y.max())
+    at = np.flatnonzero(v[:-1] * v[1:] < 0)
+    if at.size:
+        a, b, p, q = y[at], y[at + 1], v[at] * dt, v[at + 1] * dt
+        # derivative 3 s^2 A + 2 s B + p of a + p s + B s^2 + A s^3
+        big, mid = 2 * (a - b) + p + q, 3 * (b - a) - 2 * p - q
+        root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0))
+        for sign in (1, -1):
+            denominator = mid + sign * root
+            s = np.where(denominator != 0, -p / np.where(denominator != 0, denominator, 1), -1.0)
+            inside = (s >= 0) & (s <= 1)
+            value = (a + p * s + mid * s**2 + big * s**3)[inside]
+            if value.size:
+                low, high = min(low, float(value.min())), max(high, float(value.max()))
+    return low, high

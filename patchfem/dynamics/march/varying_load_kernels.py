@@ -1,0 +1,223 @@
+"""Compiled step of modes that feel the whole wrench of the contact: normal force, moment and friction.
+
+Heave h (> 0 away) and pitch t (> 0 opens +x) move the upper holder, so d = -h closes it. Over a step the modes move
+exactly under constant forces. Those of the normal contact are the path mean of its slopes along the straight increment,
+through every contact set on the way, so they do exactly the work E(end) - E(start) (a discrete gradient; McLachlan,
+Quispel, Robidoux, Phil. Trans. R. Soc. A 357, 1999). Friction acts with the path mean of its law under the mean load of
+the step. So the sum of all energies never rises by itself.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ...contact.press_kernels import locate, press_state, pull
+from ...contact.press_path_kernels import path_mean
+from ...friction.flags_kernels import LEAN
+from ..modal_kernels import accelerations, free_slide, move, note, sample, stored
+from .varying_friction_kernels import COULOMB, RATE, press_all, rub_commit, rub_solve, rub_state
+from .varying_shear_kernels import shear_solve, spring_back
+
+
+class Ports(NamedTuple):
+    """rows (3, n): slide, heave and pitch per coordinate; beta (3, 3): what constant forces in a step take from them;
+    arm [m]: half the length of the patch."""
+
+    rows: np.ndarray
+    beta: np.ndarray
+    arm: float
+
+
+@njit(error_model="numpy", **LEAN)
+def place_of(state, rows, r):
+    """Slide, heave or pitch of the modes."""
+    out = 0.0
+    for i in range(state.shape[1]):
+        out += rows[r, i] * state[0, i]
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def pushed(rows, force, mass, accel):
+    """Modal accelerations (n,) under the forces (3,) that resist slide, heave and pitch."""
+    for i in range(accel.size):
+        accel[i] = -(rows[0, i] * force[0] + rows[1, i] * force[1] + rows[2, i] * force[2]) / mass
+
+
+@njit(error_model="numpy", **LEAN)
+def press_step(book, k0, begin, f1, f2, beta, arm, turn, out):
+    """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
+    guess in `turn` (2,). Returns (piece at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
+
+    The slopes have a convex potential, so the answer is unique; inside one piece one step finds it.
+    """
+    b11, b12, b21, b22 = beta[1, 1], beta[1, 2], beta[2, 1], beta[2, 2]
+    dh, dt = turn[0], turn[1]
+    old_h, old_t, step_h, step_t, part, best = dh, dt, 0.0, 0.0, 1.0, np.inf
+    k = k0
+    for count in range(1, 100):
+        k = path_mean(book, k0, begin[0], begin[1], dh, dt, out)
+        if k < 0:
+            return k, count, np.inf
+        p1, p2 = b11 * out[0] + b12 * out[1], b21 * out[0] + b22 * out[1]
+        r1, r2 = dh - f1 + p1, dt - f2 + p2
+        size = abs(r1) + arm * abs(r2)
+        noise = 4e-16 * (abs(dh) + abs(f1) + abs(p1) + arm * (abs(dt) + abs(f2) + abs(p2)))
+        turn[0], turn[1] = dh, dt
+        if size <= noise:
+            return k, count, 0.0
+        if size < best * (1 - 0.1 * part) or best == np.inf:
+            best, part, old_h, old_t = size, 1.0, dh, dt
+            j11, j12 = 1 + b11 * out[5] + b12 * out[7], b11 * out[6] + b12 * out[8]
+            j21, j22 = b21 * out[5] + b22 * out[7], 1 + b21 * out[6] + b22 * out[8]
+            det = j11 * j22 - j12 * j21
+            step_h, step_t = (j22 * r1 - j12 * r2) / det, (j11 * r2 - j21 * r1) / det
+        else:
+            part *= 0.5
+            if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
+                turn[0], turn[1] = old_h, old_t
+                k = path_mean(book, k0, begin[0], begin[1], old_h, old_t, out)
+                return k, count, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
+        dh, dt = old_h - part * step_h, old_t - part * step_t
+    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
+
+
+@njit(error_model="numpy", cache=True)
+def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table, mass, kind, rub, book, loads, goal,
+                 travel, ledger, rows):
+    """March `steps` steps from row `first` of the table of the drive.
+
+    held (2,): last friction force, mean force of the step before; at_piece (1,): slot of the present piece; rub:
+    `dynamics.march.varying_friction_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the steps,
+    empty where the contact says it;
+    ledger as in `dynamics.march.loop_kernels.march`; rows (steps + 1, 2 n + 11) as there, then load, moment,
+    energy of the
+    preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
+    contact set fits.
+    """
+    omega, damp, slide, base, output, damping = modes
+    free_map, push, dense, reach, loss, dense_loss, dt, _ = prop
+    n, around, beta = omega.size, table.shape[0], ports.beta
+    free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
+    accel, spare = np.empty(n), np.empty((2, n))
+    given, pointed = loads.size > 0, not (kind == COULOMB or kind == RATE)
+    apart = given or (beta[1, 1] == 0 and beta[2, 2] == 0)
+    mixed = not apart and (beta[0, 1] != 0 or beta[0, 2] != 0)
+    load, k = book.base[0], at_piece[0]
+    for i in range(steps + 1):
+        q, v, stroke = sample(rows[i], state, slide, output)
+        begin[0], begin[1] = place_of(state, ports.rows, 1), place_of(state, ports.rows, 2)
+        moment = book.base[1]
+        if given:
+            load = loads[i]
+            rub.now[0] = load
+        else:
+            k = locate(book, k, -begin[0], begin[1])
+            if k < 0:
+                return i, 4
+            begin[2], begin[3], begin[4] = pull(book, k, begin[0], begin[1])
+            load, moment = max(book.base[0] - begin[3], 0.0), book.base[1] - begin[4]
+            if pointed or i == steps:
+                press_state(book, k, -begin[0], begin[1], rub.now)
+        at_piece[0] = k
+        rows[i, 2 * n + 6], rows[i, 2 * n + 7], rows[i, 2 * n + 8] = load, moment, begin[2]
+        rows[i, 2 * n + 9], rows[i, 2 * n + 10] = begin[0], begin[1]
+        bound = load * (np.inf if pointed else rub.force[0]) if load > 0 else 0.0
+        held[0] = min(max(held[0], -bound), bound)
+        now, energy, slip = rub_state(kind, rub, q, held[0])
+        status = note(rows[i, :2 * n + 6], now, energy, slip, stroke, travel, energy + begin[2]
+                      + stored(state, omega, mass), ledger)
+        if status:
+            return i, status
+        if i == steps:
+            break
+        at = (first + i) % around
+        for r in range(3):
+            free[r] = free_slide(state, reach, r, table, at)
+        for j in range(rub.now.size if pointed else 0):
+            rub.before[j] = rub.now[j]
+        guess, count, wrong, end, bad = held[1], 0, 0.0, k, False
+        low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
+        dq, used = 0.0, 0.0
+        for outer in range(1, 81):
+            mean = load
+            if given:
+                rub.now[0] = loads[i + 1]
+                mean = 0.5 * (load + loads[i + 1])
+            elif not apart:
+                end, its, wrong = press_step(book, k, begin, free[1] - beta[1, 0] * guess, free[2] - beta[2, 0] * guess,
+                                             beta, ports.arm, turn, out)
+                if end < 0:
+                    return i, 4
+                force[1], force[2] = out[0], out[1]
+                count += its
+                mean = max(book.base[0] - out[0], 0.0)
+                if pointed:
+                    press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
+            slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
+            press_all(kind, rub)
+            if rub.b.size:
+                dq, used, its = shear_solve(slides, beta[0, 0], v, dt, kind, rub, goal)
+            else:
+                dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
+            count += abs(its)
+            bad = its < 0 or wrong > goal
+            miss = used - guess
+            if not mixed or abs(miss) <= 0.01 * goal:
+                break
+            if outer == 80 or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
+                if kind == COULOMB and beta[0, 0] > 0 and rub.force[1] * mean <= abs(guess) <= rub.force[0] * mean:
+                    used = guess  # between kinetic and static friction the step starts to slip
+                    dq = slides - beta[0, 0] * used
+                else:
+                    bad = bad or abs(miss) > goal
+                break
+            if miss > 0:
+                low = guess
+            else:
+                high = guess
+            following = used
+            if last_r < np.inf and miss != last_r:
+                following = guess - miss * (guess - last_f) / (miss - last_r)
+            last_f, last_r = guess, miss
+            if not (low < following < high) or outer % 8 == 0:
+                following = 0.5 * (low + high) if low > -np.inf and high < np.inf else used
+            guess = following
+        force[0] = used
+        ledger[5] += count
+        ledger[6] = max(ledger[6], count)
+        ledger[7] += 1.0 if bad else 0.0
+        ledger[8] += used * dq
+        pushed(ports.rows, force, mass, accel)
+        move(state, free_map, push, loss, dense, dense_loss, table, at, accel, spare, ledger)
+        rows[i, 2 * n + 4] = used
+        held[0], held[1], k = used, used, end
+        v1 = 0.0
+        for j in range(n):
+            v1 += slide[j] * state[1, j]
+        ledger[3] += rub_commit(dq, used, v, v1, dt, kind, rub)
+        if rub.b.size:
+            lost, its = spring_back(kind, rub, goal)
+            ledger[3] += lost
+            ledger[5] += abs(its)
+            ledger[7] += 1.0 if its < 0 and not bad else 0.0
+        if given:
+            load = loads[i + 1]
+        elif not apart:
+            load = max(book.base[0] - out[3], 0.0)
+            force[1], force[2] = out[3], out[4]
+        if kind == RATE:
+            held[0] = rub.force[0] * load * np.tanh(v1 / rub.force[1])
+        elif kind == COULOMB and dq != 0.0:
+            held[0] = rub.force[1] * load * (1.0 if dq > 0 else -1.0)
+        elif kind == COULOMB:
+            force[0] = 0.0
+            pushed(ports.rows, force, mass, accel)
+            accelerations(state, omega, damp, damping, base, table[at, 8 * n + 2], accel, spare)
+            need, gain = 0.0, 0.0
+            for j in range(n):
+                need += slide[j] * spare[0, j]
+                gain += slide[j] * slide[j] / mass
+            held[0] = need / gain if gain > 0 else 0.0
+    return steps, 0

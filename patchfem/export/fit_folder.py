@@ -1,0 +1,73 @@
+"""A fit on disk: its object, rows, picture, and the fitted scene, which runs."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..campaigns.fit import Fitted
+from ..identify.least_squares import Fit
+from ..scene.ranges import Range
+from ..scene.scene import loads
+
+
+def fitted_scene(fitted: Fitted, folder: Path) -> str:
+    """The fitted scene in SI with every default, its paths relative to `folder`; a comment says what was fitted."""
+    from .folder import resolved
+
+    scene, moved = fitted.scene, []
+    profile = scene.contact.profile if scene.contact is not None else None
+    for key, file in (("contact.mesh", scene.contact and scene.contact.mesh),
+                      ("contact.profile.file", profile and profile.file), ("slide.file", scene.slide.file),
+                      ("measured.file", scene.measured and scene.measured.file)):
+        if file:
+            moved.append(f"{key}={Path(os.path.relpath(scene.beside(file), folder)).as_posix()}")
+    told = [f"# {one.key} fitted to {fitted.loop.path.name}: {value!r} {one.unit}" + _bar(ends) for one, value, ends in
+            zip(fitted.free, fitted.found.values.tolist(), fitted.found.intervals.tolist())]
+    found = loads(scene.text, folder / "scene.fitted.toml", [*scene.sets, *fitted.sets, *moved])
+    return "\n".join(told) + "\n\n" + resolved(found)
+
+
+def _bar(ends) -> str:
+    return f", 95 % in [{ends[0]!r}, {ends[1]!r}]" if np.isfinite(ends).all() else ", not determined"
+
+
+def answer_of(fitted: Fitted) -> dict:
+    """The object of fit.json; SI."""
+    found, loop = fitted.found, fitted.loop
+    values = {one.key: _value(one, found, k) for k, one in enumerate(fitted.free)}
+    unit = "N" if loop.quantity == "force" else "1"
+    clean = [[None if not np.isfinite(x) else x for x in row] for row in found.correlation.tolist()]
+    held = None if fitted.held_rms is None else {"rows": int(fitted.held.sum()), "rms": fitted.held_rms}
+    unknown = [{one.key: x for one, x in zip(fitted.free, row) if x} for row in found.unknown.tolist()]
+    return {"patchfem": __version__, "title": fitted.scene.title, "measured": loop.path.name, "quantity": loop.quantity,
+            "outcome": str(fitted.outcome), "values": values, "unknown": unknown, "correlation": clean, "unit": unit,
+            "rows": int((~fitted.held).sum()), "rms": fitted.rms, "held": held,
+            "peak": float(np.abs(loop.reading).max()), "step_error": fitted.step_error,
+            "steps_between_rows": fitted.pieces, "evaluations": found.evaluations, "failures": found.failures,
+            "descents_agreed": found.agreed, "warnings": fitted.warnings, "seconds": round(fitted.seconds, 6)}
+
+
+def _value(one: Range, found: Fit, k: int) -> dict:
+    ends = found.intervals[k].tolist()
+    return {"value": float(found.values[k]), "unit": one.unit, "interval": ends if np.isfinite(ends).all() else None,
+            "method": found.methods[k], "bounds": [one.low, one.high], "at_bound": found.at_bound[k] or None,
+            "sensitivity": float(found.sensitivity[k])}
+
+
+def fit_into(fitted: Fitted, target: Path) -> dict:
+    """Write the results folder of a fit (fit.json, fit.csv, fit.svg, scene.fitted.toml); the object of fit.json."""
+    from .fit import draw, write_rows
+    from .results import Folder
+    from .summary import write_json
+
+    answer, loop = answer_of(fitted), fitted.loop
+    with Folder(target) as folder:
+        write_json(answer, folder.path / "fit.json")
+        (folder.path / "scene.fitted.toml").write_text(fitted_scene(fitted, folder.target), encoding="utf-8")
+        write_rows(folder.path / "fit.csv", loop.time, loop.displacement, loop.reading, fitted.model, fitted.held,
+                   loop.quantity)
+        picture = draw(loop.displacement, loop.reading, fitted.model, fitted.held, loop.quantity)
+        (folder.path / "fit.svg").write_text(picture, encoding="utf-8")
+    return answer

@@ -1,0 +1,228 @@
+"""A finished run on disk: summary, netCDF, fields, resolved scene and report in one results folder."""
+
+import sys
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from .. import __version__
+from ..effects import EFFECTS
+from ..model.accuracy import chosen_mesh
+from ..runs.result import Result
+from ..runs.run import run
+from .results import Folder
+from .summary import summary, write_json
+
+LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
+
+
+def versions() -> dict:
+    """Versions of the interpreter and of the packages that compute."""
+    out = {"python": ".".join(map(str, sys.version_info[:3]))}
+    for name in PACKAGES:
+        try:
+            out[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return out
+
+
+def summary_of(result: Result) -> dict:
+    """The object of summary.json."""
+    what = result.plan
+    return summary(__version__, what.scene.title, what.kind, str(result.outcome), result.measures, effects_of(result),
+                   list(what.not_in_scene), result.warnings, result.seconds)
+
+
+def effects_of(result: Result) -> list:
+    """[{"effect", "equations", "seconds"}]: the law and the modes share one loop, whose time stands with the law."""
+    patch, out = result.patch, []
+    loop = result.seconds.get("march", result.seconds.get("bench", 0.0))
+    for name in result.plan.effects:
+        seconds = 0.0
+        if patch is not None and name == "contact":
+            seconds = sum(patch.seconds.get(k, 0.0) for k in ("assemble", "condense", "press"))
+        elif patch is not None and name.removeprefix("contact.") in patch.seconds:
+            seconds = patch.seconds[name.removeprefix("contact.")]
+        elif name == "contact.shear":
+            seconds = result.seconds.get("reduce", 0.0)
+        elif name.startswith("friction.law=") or (name == "structure" and result.plan.kind == "linear"):
+            seconds = loop
+        out.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": round(float(seconds), 6)})
+    return out
+
+
+def run_into(what, target: Path, say=None, progress=None, fresh: bool = False) -> dict:
+    """Claim the results folder `target`, run the plan, fill the folder; the summary. An older folder of results is
+    replaced only when the new one is whole, and a folder with other files is refused before anything runs."""
+    with Folder(target) as folder:
+        result = run(what, say, progress, fresh=fresh)
+        return write(result, folder.path)
+
+
+def write(result: Result, path: Path) -> dict:
+    """Write every file of a run into the folder `path`; the summary."""
+    begin = perf_counter()
+    text = resolved(result.plan.scene)
+    (path / "scene.resolved.toml").write_text(text, encoding="utf-8")
+    _write_netcdf(result, path / "result.nc", text)
+    data = report_data(result)
+    if result.patch is not None:
+        from .bodies import write_fields
+
+        drawn = write_fields(result, path / "fields.vtkhdf")
+        data |= {"bodies": drawn} if drawn else {}
+    from .report import write_report
+
+    result.seconds["files"] = perf_counter() - begin
+    write_report(path / "report.html", data)
+    result.seconds["files"] = perf_counter() - begin
+    answer = summary_of(result)
+    write_json(answer, path / "summary.json")
+    return answer
+
+
+def resolved(scene) -> str:
+    """The scene in SI with every default written out, also those that follow from other keys."""
+    contact, friction = scene.contact, scene.friction
+    free = contact is not None and contact.element_size is None and contact.mesh is None
+    if free and not chosen_mesh(scene):
+        from ..model.pieces import AUTOMATIC_CELLS
+
+        contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})
+    if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
+        if scene.kind == "bench":
+            from ..model.law import bonds_of
+
+            law = bonds_of(scene)
+        else:
+            from ..model.drive import drive_of, speed_of
+            from ..model.law import law_of
+
+            law = law_of(scene, speed_of(scene, drive_of(scene)))
+        friction = friction.model_copy(update={"rest_speed": law.rest_speed})
+    return replace(scene, contact=contact, friction=friction).resolved()
+
+
+def _histories(result: Result) -> tuple:
+    kind, r = result.plan.kind, result.response
+    if r is None:
+        return {}, None
+    if kind == "bench":
+        across = {"lateral_displacement": r.lateral, "lateral_force": r.lateral_force, "yaw_moment": r.yaw_moment}
+        return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
+                "friction_force": r.force, "normal_load": r.load,
+                **dict(zip(LEDGER, r.ledger)),
+                **{name: values for name, values in across.items() if values is not None}}, None
+    out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
+           "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
+    if kind == "rig" and "ledger" in r.extra:
+        out |= dict(zip(LEDGER, r.extra["ledger"]))
+    if result.plan.scene.structure.interface:
+        out |= _between(result)
+    elif kind == "rig":
+        still = np.full(r.time.size, result.measures["normal_load"].value)
+        out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
+    from ..model.structure import modes_of, motions
+
+    modes = modes_of(result.plan.scene)
+    return out, (list(modes.names), motions(modes, r.modal))
+
+
+def _between(result: Result) -> dict:
+    """Histories (i, k) of the interfaces of a rig of masses, those of its output beside them."""
+    r, scene = result.response, result.plan.scene
+    columns = {"relative_displacement": ("slides", r.slide), "relative_velocity": ("slide_rates", r.slide_rate),
+               "friction_force": ("forces", r.force)}
+    loads = np.array([one.load for one in scene.structure.interface])
+    return {"output_displacement": r.output, "output_velocity": r.output_rate,
+            "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
+            **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
+               for name, (many, one) in columns.items()}}
+
+
+def interface_names(scene) -> list:
+    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
+    found = [] if scene.structure is None else [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]
+
+
+def _write_netcdf(result: Result, path: Path, text: str) -> None:
+    from . import netcdf
+
+    histories, modal = _histories(result)
+    patch, extra = result.patch, result.extra
+    x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
+    fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
+    strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
+    levels = _levels(extra["levels"]) if "levels" in extra else None
+    names = interface_names(result.plan.scene) if histories else []
+    data = netcdf.dataset(histories, modal, fields, x, weight, strips, levels, names)
+    if "events" in extra:
+        from ..response.events import MEANINGS
+
+        e = extra["events"]
+        data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
+    if "curve" in extra:
+        data = netcdf.with_curve(data, extra["curve"])
+    if "regime" in extra:
+        data = data.assign_attrs(regime=extra["regime"], largest_multiplier=_multiplier(extra))
+    netcdf.write(data, path, summary_of(result), text, versions())
+
+
+def _multiplier(extra: dict) -> float:
+    """Largest |Floquet multiplier|."""
+    return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
+
+
+def _levels(levels) -> dict:
+    """Columns of a run in levels: the drive, whether it held, every measure and its error."""
+    from ..response.levels import KEPT
+    from ..response.measures import UNITS
+
+    out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
+           "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
+    for name in KEPT:
+        if any(name in one.values for one in levels):
+            out[f"level_{name}"] = (UNITS[name], np.array([one.values.get(name, np.nan) for one in levels]))
+            out[f"level_{name}_error"] = (UNITS[name], np.array([one.errors.get(name, np.nan) for one in levels]))
+    return out
+
+
+def report_data(result: Result) -> dict:
+    """Plain arrays and texts for the report page."""
+    scene, r, w = result.plan.scene, result.response, result.window
+    data = {"name": scene.path.stem, "summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
+            "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
+            "x": None if result.patch is None else result.patch.x, "versions": versions()}
+    if "curve" in result.extra:
+        data["curve"] = result.extra["curve"]
+    if "levels" in result.extra:
+        data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors}
+                          for one in result.extra["levels"]]
+    if "regime" in result.extra:
+        data["steady"] = {"regime": result.extra["regime"], "multiplier": _multiplier(result.extra)}
+    if r is not None:
+        slow = result.plan.kind == "bench"
+        data["history"] = {"time": r.time, "displacement": r.slide if slow else r.output, "force": r.force}
+        data["loop"] = {"slide": w.slide, "force": w.force, "time": w.time}
+        if not slow:
+            data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
+                              "base": w.base_acceleration, "force": w.force, "slide": w.slide}
+            data["loop"] |= {"period": result.extra["period"]}
+    if scene.measured is not None:
+        from ..inputs.measured import read_table
+
+        table = read_table(scene.beside(scene.measured.file))
+        data["measured"] = {"rows": table, "frequency": scene.drive.frequency if scene.drive else None,
+                            "gain": scene.measured.acceleration_gain}
+        if scene.drive is not None:
+            from ..model.drive import drive_of
+            from ..structure.drive_sizes import largest
+
+            data["measured"]["input"] = largest(drive_of(scene))
+    return data

@@ -1,0 +1,289 @@
+"""A shared list of bonds, compiled: force along a straight increment, its path mean, and the step that keeps the list.
+
+numbers of a list: law (24,) of `bond_list.law_numbers`; now (6,): q, path, damage, growth J, mature length, ref;
+tally (12,): first strip, end, spread ones, length after the last merge, stored energy [m], force [1], created and
+dissipated [m], pieces beyond one per step, strips merged although their places differ, largest length.
+"""
+
+from math import ceil, exp, expm1
+
+import numpy as np
+from numba import njit
+
+from ..flags_kernels import LEAN
+from .bond_math_kernels import fexp, flog
+from .bond_merge_kernels import merge
+from .bond_sum_kernels import (
+    AGED,
+    FIRST,
+    MOMENTS,
+    POWER,
+    SECOND,
+    SHARES,
+    aged_sums,
+    first_bonds,
+    formed,
+    moments_of,
+    power_sums,
+    shares_sums,
+)
+from .point_kernels import bond_mean, grow
+
+PIECE = 0.25  # longest strip in bond lengths
+GROWN = 0.5  # most growth J of one strip of growing bonds
+MOST_GROWN = 16
+
+
+@njit(error_model="numpy", **LEAN)
+def _after(dq, now, growth, v0, v1, dt):
+    """(q, path, damage, J, mature length, length half way) after the increment."""
+    eps, more = grow(now[4], v0, v1, abs(dq), dt, growth)
+    middle, _ = grow(now[4], v0, (v0 + v1) / 2, abs(dq) / 2, dt / 2, growth)
+    return now[0] + dq, now[1] + abs(dq), now[2] + abs(dq) / middle, now[3] + more, eps, middle
+
+
+@njit(error_model="numpy", **LEAN)
+def goal_length(before, after, more):
+    """Length that 2.10 tends to in a step that multiplies the distance to it by exp(-more)."""
+    rest = -expm1(-more)
+    return after if rest == 0 else before + (after - before) / rest
+
+
+@njit(error_model="numpy", **LEAN)
+def _pieces(size, eps, more, law):
+    """(strips that a step is cut into, strips of it that still count)."""
+    count = max(1.0, size / (PIECE * eps))
+    if law[1] == AGED:
+        count = max(count, min(more / GROWN, MOST_GROWN))
+    count = ceil(count)
+    kept = min(count, 1 + ceil(count * (law[6] / (size / eps if law[1] < SHARES else size))))
+    return count, kept
+
+
+@njit(error_model="numpy", **LEAN)
+def _young(size, before, after, more, middle, law):
+    """Weight of the growing bonds that form in one increment."""
+    goal = goal_length(before, after, more)
+    count, kept = _pieces(size, middle, more, law)
+    total = 0.0
+    for piece in range(int(kept)):
+        for half in range(2):
+            back = (piece + (FIRST if half == 0 else SECOND)) / count
+            own = max(-goal * expm1(-back * more), 1e-9 * after)
+            x = back * size / own
+            total += fexp(law[0] * flog(x) - x)
+    return total * law[4] * size / (2 * count * law[2])
+
+
+@njit(error_model="numpy", **LEAN)
+def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
+    """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
+
+    Friction force = mu_s N * weight. Energy: the force of each bond over its own stretch at frozen damage.
+    """
+    q, path, damage, age, eps, middle = _after(dq, now, growth, v0, v0, dt)
+    head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] * law[2]
+    force, energy = first_bonds(q, path, damage, law)
+    size, young = abs(dq), 0.0
+    if law[1] == MOMENTS:
+        _, z, s2 = moments_of(q, exp(now[5] - damage), bonds, head, end)
+        force += z / law[2]
+        energy += s2 / (2 * law[2])
+    elif law[1] == POWER:
+        f, g = power_sums(q, damage, bonds, head, many, end, p, coarse, law[8:24])
+        scale = law[4] / law[2] * exp(now[5] - damage)
+        force += scale * f
+        energy += scale * g / (p + 1)
+    elif law[1] == SHARES:
+        f, g = shares_sums(q, path, bonds, head, many, end, p, law[2], table, law[4])
+        force += f
+        energy += g
+    else:
+        f, g = aged_sums(q, path, exp(now[5] - age), eps, bonds, head, many, end, p, coarse)
+        force += law[4] / law[2] * f
+        energy += law[4] / law[2] * g
+    if size > 0:
+        if law[1] == AGED:
+            young = _young(size, now[4], eps, age - now[3], middle, law)
+        else:
+            young = formed(size, middle if law[1] <= POWER else law[2], law)
+    return force + np.copysign(young, dq), energy
+
+
+@njit(error_model="numpy", **LEAN)
+def list_force(dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Weight [1] of the list after the straight increment dq: friction force = mu_s N * weight.
+
+    Twin: `quadrature.Quadrature`.
+    """
+    return list_state(dq, bonds, tally, now, law, growth, table, v0, dt)[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Integral of the force over a share of the increment by five Gauss points."""
+    out = 0.0
+    for y, w in ((-0.906179845938664, 0.23692688505618908), (-0.5384693101056831, 0.47862867049936647),
+                 (0.0, 0.5688888888888889), (0.5384693101056831, 0.47862867049936647),
+                 (0.906179845938664, 0.23692688505618908)):
+        part = low + (high - low) * (1 + y) / 2
+        out += w / 2 * list_force(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
+    return (high - low) * out
+
+
+@njit(error_model="numpy", **LEAN)
+def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Path-mean weight over the increment.
+
+    Closed for the stretch reading of order 1. Else Simpson's rule where the increment is short (its first force is
+    known), five Gauss points up to half a bond length, beyond it such panels that double.
+    """
+    if dq == 0:
+        return tally[5]
+    if law[1] == MOMENTS:
+        return list_slope(dq, bonds, tally, now, law, growth, v0, dt)[0]
+    size = abs(dq) / now[4]
+    if tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0:
+        half = list_force(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
+        return (tally[5] + 4 * half + list_force(dq, bonds, tally, now, law, growth, table, v0, dt)) / 6
+    if size <= 0.5:
+        return _panel(0.0, 1.0, dq, bonds, tally, now, law, growth, table, v0, dt)
+    low, high, out = 0.0, 0.5 / size, 0.0
+    while low < 1:
+        high = 1.0 if high > 0.75 else high
+        out += _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt)
+        low, high = high, 2 * high
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def list_slope(dq, bonds, tally, now, law, growth, v0, dt):
+    """(path-mean weight, its derivative [1/m]) of the stretch reading of order 1, exact."""
+    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), bonds, int(tally[0]), int(tally[1]))
+    first = law[3] * exp(-now[2])
+    middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, growth)
+    mean, slope = bond_mean(m + first, z + first * now[0], dq, 1.0, middle)
+    return mean / law[2], slope / law[2]
+
+
+@njit(error_model="numpy", **LEAN)
+def list_step(dq, bonds, tally, now, law, growth, table, v0, v1, dt):
+    """Commit dq: append its strips, drop those beyond the cut-off, merge now and then. False when the list is full."""
+    before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
+    q, path, damage, grown, eps, middle = _after(dq, now, growth, v0, v1, dt)
+    now[0], now[1], now[2], now[3], now[4] = q, path, damage, grown, eps
+    _rescale(bonds, tally, now, law)
+    size, done = abs(dq), True
+    if size > 0:
+        done = _append(dq, place, way, harm, before, grown - age, middle, bonds, tally, now, law)
+        _cut(bonds, tally, now, law)
+        if law[5] > 0 and tally[1] - tally[0] > 1.2 * tally[3] + 12:
+            merge(bonds, tally, now, law)
+    tally[5], tally[4] = list_state(0.0, bonds, tally, now, law, growth, table, 0.0, 0.0)
+    tally[10] = max(tally[10], tally[1] - tally[0])
+    return done
+
+
+@njit(error_model="numpy", **LEAN)
+def _rescale(bonds, tally, now, law):
+    """Move the reference of the scaled numbers before they overflow."""
+    if law[1] == SHARES:
+        return
+    clock = now[3] if law[1] == AGED else now[2]
+    if clock - now[5] < 300:
+        return
+    less = exp(now[5] - clock)
+    for k in range(int(tally[0]), int(tally[1])):
+        bonds[5, k] *= less
+        bonds[6, k] *= less
+    now[5] = clock
+
+
+@njit(error_model="numpy", **LEAN)
+def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
+    """Strips of the increment dq that began at `place`; False when there is no room."""
+    mode, size, end = law[1], abs(dq), int(tally[1])
+    if mode == SHARES and end > tally[0] + tally[2] and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0 \
+            and bonds[9, end - 1] == way:
+        k = end - 1
+        bonds[1, k] = now[0]
+        bonds[2, k] = bonds[9, k] = now[1]
+        bonds[3, k] += size
+        bonds[4, k] = bonds[8, k] = bonds[3, k]
+        return True
+    count, kept = (1, 1) if mode == SHARES else _pieces(size, middle, more, law)
+    if mode == MOMENTS:
+        count = kept = 1
+    tally[8] += count - 1
+    if end + kept > bonds.shape[1]:
+        end = _pack(bonds, tally)
+        if end + kept > bonds.shape[1]:
+            return False
+    goal = goal_length(before, now[4], more)
+    for piece in range(int(kept) - 1, -1, -1):
+        near, far = piece / count, (piece + 1) / count
+        bonds[0, end], bonds[1, end] = now[0] - far * dq, now[0] - near * dq
+        bonds[7, end] = 1.0
+        bonds[8, end], bonds[9, end] = size / count, now[1] - near * size
+        bonds[2, end], bonds[3, end], bonds[4, end] = bonds[9, end], bonds[8, end], bonds[8, end]
+        if mode == MOMENTS:
+            _as_moments(bonds, end, dq, middle, now)
+        elif mode == POWER:
+            span = (now[2] - harm) / count
+            bonds[2, end], bonds[3, end] = now[2] - near * (now[2] - harm), span
+            bonds[4, end] = size / count * middle ** (-law[0])
+            bonds[5, end] = 0.5 * bonds[4, end] * exp(bonds[2, end] - FIRST * span - now[5])
+            bonds[6, end] = 0.5 * bonds[4, end] * exp(bonds[2, end] - SECOND * span - now[5])
+        elif mode == AGED:
+            for half in range(2):
+                back = (piece + (FIRST if half == 0 else SECOND)) / count
+                # mature length there, times exp(J there - ref): own = mature - exp(ref - J) times this
+                bonds[5 + half, end] = goal * exp(now[3] - back * more - now[5]) \
+                    + (before - goal) * exp(now[3] - more - now[5])
+        end += 1
+    tally[1] = end
+    return True
+
+
+@njit(error_model="numpy", **LEAN)
+def _as_moments(bonds, k, dq, eps, now):
+    """Weight, centre and variance of the bonds of one increment that survive it, exact at a constant length."""
+    x, g = abs(dq) / eps, np.copysign(1.0, dq)
+    if x < 1e-2:
+        zero = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5))))
+        first = x * (1 / 2 - x / 12 * (1 - x * x / 60))
+        spread = x * x / 12 * (1 - x * x / 20)
+    else:
+        e = exp(-x)
+        zero = -expm1(-x)
+        first = 1 - x * e / zero
+        spread = max(1 - x * x * e / (zero * zero), 0.0)
+    bonds[0, k] = now[0] - g * eps * first
+    bonds[1, k] = eps * eps * spread
+    bonds[5, k] = zero * exp(now[2] - now[5])
+
+
+@njit(error_model="numpy", **LEAN)
+def _cut(bonds, tally, now, law):
+    """Pass over the strips older than the cut-off."""
+    head, end = int(tally[0]), int(tally[1])
+    while head < end:
+        old = (now[1] - bonds[9, head]) if law[1] >= SHARES else now[2] - bonds[2, head]
+        if law[1] == MOMENTS:
+            old = (now[1] - bonds[9, head]) / law[2]
+        if old <= law[6]:
+            break
+        head += 1
+        tally[2] = max(tally[2] - 1, 0.0)
+    tally[0] = head
+
+
+@njit(error_model="numpy", **LEAN)
+def _pack(bonds, tally):
+    """Move the list to the front of its array; returns its end."""
+    head, end = int(tally[0]), int(tally[1])
+    for i in range(bonds.shape[0]):
+        for k in range(head, end):
+            bonds[i, k - head] = bonds[i, k]
+    tally[0], tally[1] = 0.0, end - head
+    return end - head

@@ -1,0 +1,53 @@
+"""The numbers of a compiled bond list: which sum its law needs, cut-off, merge width, room."""
+
+from math import ceil, gamma
+
+import numpy as np
+from scipy.special import gammainc, roots_jacobi
+
+from .parameters import Bonds
+
+MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0  # forms of the sum, as in bond_sum_kernels
+NOTHING_LEFT = 745.0  # damage beyond which exp(-damage) is zero
+STRIP = 4  # strips per bond length of a step, at most
+NODES = 1 / 32  # of the table of P(p + 1, x)
+
+
+def form_of(law: Bonds) -> float:
+    """Form of the sum that a law needs."""
+    if law.reading == "stretch":
+        return MOMENTS if law.order == 1 else POWER
+    return AGED if law.grows else SHARES
+
+
+def law_numbers(law: Bonds, reach: float, merge: float) -> np.ndarray:
+    """(24,): order, form, eps_0, m_0, 1/Gamma(p + 1), merge width, cut-off on the clock of the form, -, Gauss points
+    and weights in (0, 1) with |u|^p and with |u|^(p + 1) as their weight.
+
+    reach: cut-off in bond lengths of path; of the stretch reading in units of damage.
+    """
+    form = form_of(law)
+    out = np.zeros(24)
+    reach = min(reach, NOTHING_LEFT)
+    out[:7] = (law.order, form, law.length, law.initial, 1 / gamma(law.order + 1), merge,
+               reach * (law.length if form >= SHARES else 1.0))
+    if form == POWER:
+        for at, power in ((8, law.order), (16, law.order + 1)):
+            x, w = roots_jacobi(4, 0.0, power)
+            out[at:at + 4], out[at + 4:at + 8] = (1 + x) / 2, w / 2**(power + 1)
+    return out
+
+
+def share_table(law: Bonds) -> np.ndarray:
+    """P(p + 1, x) at multiples of 1/32, empty where a closed form serves."""
+    if form_of(law) != SHARES or law.order in (0, 1, 2):
+        return np.zeros(0)
+    return gammainc(law.order + 1, NODES * np.arange(32 * ceil(60 + 4 * law.order)))
+
+
+def room(law: Bonds, reach: float, merge: float) -> int:
+    """Strips to allocate: those that merging leaves, those of one longest step and some to work with."""
+    step = STRIP * ceil(min(reach, NOTHING_LEFT)) + 64
+    if merge > 0:
+        return 4 * step + ceil(16 / merge)
+    return 4 * step + 20_000

@@ -1,0 +1,326 @@
+"""Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy at one place of a rigid slide.
+
+Forms of the sum, `law[1]`: MOMENTS stretch with p = 1 (three sums, exact), POWER stretch of any order, SHARES the
+printed law at constant bond length (differences of P(p + 1, R/eps), exact), AGED the printed law with growing bonds.
+
+Rows of `bonds` (10, capacity): 0, 1 place at the start and at the end of the strip (MOMENTS: centre, variance);
+2, 3 clock at its end and width on the clock (stretch: damage; report: path); 4 weight (POWER: path/eps^p; else path);
+5, 6 at its two Gauss points: scaled weight (stretch; MOMENTS: one scaled weight) or scaled starting length (AGED);
+7 one pass of the slide (1) or several over the same range of places (0, uniform over it); 8, 9 path covered, path at
+its end. Scaled: times exp(clock - ref), so that ageing multiplies the whole sum by one number.
+"""
+
+from math import exp
+
+import numpy as np
+from numba import njit, uint64
+
+from ..flags_kernels import LEAN
+from .bond_math_kernels import FAST, fexp, flog, share, tabled
+
+MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
+FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, seen from the end of a strip
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def moments_of(q, scale, bonds, head, end):
+    """(sum k, sum k u, sum k u^2) of strips in MOMENTS form, k without the factor 1/eps_0."""
+    m, z, s2 = 0.0, 0.0, 0.0
+    for k in range(uint64(head), uint64(end)):
+        u, w = q - bonds[0, k], bonds[5, k]
+        m += w
+        z += w * u
+        s2 += w * (u * u + bonds[1, k])
+    return m * scale, z * scale, s2 * scale
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def _powers(q, bonds, first, end, p):
+    """Sums of w |u|^p sgn u and of w |u|^(p + 1) over both Gauss points of strips that one pass left."""
+    force, energy = 0.0, 0.0
+    if p == 0.0:
+        for k in range(uint64(first), uint64(end)):
+            b = bonds[1, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            force += np.copysign(bonds[5, k], u) + np.copysign(bonds[6, k], v)
+            energy += bonds[5, k] * abs(u) + bonds[6, k] * abs(v)
+    elif p == 2.0:
+        for k in range(uint64(first), uint64(end)):
+            b = bonds[1, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            f, g = bonds[5, k] * u * u, bonds[6, k] * v * v
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
+    else:
+        for k in range(uint64(first), uint64(end)):
+            b = bonds[1, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            f, g = bonds[5, k] * fexp(p * flog(abs(u))), bonds[6, k] * fexp(p * flog(abs(v)))
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
+    return force, energy
+
+
+@njit(error_model="numpy", **LEAN)
+def _reach_in(size, slope, nodes, p):
+    """Integral from 0 to size of t^p exp(slope t), by four points with t^p as their weight."""
+    if size <= 0:
+        return 0.0
+    total = 0.0
+    for i in range(4):
+        total += nodes[4 + i] * fexp(slope * size * nodes[i])
+    return total * fexp((p + 1) * flog(size))
+
+
+@njit(error_model="numpy", **LEAN)
+def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
+    """One strip near u = 0, the power integrated from u = 0 where it bends: each side by the difference of two."""
+    step = b - a
+    slope = dl / step
+    low, high = min(a, b), max(a, b)
+    behind = _reach_in(q - low, -slope, nodes, p) - _reach_in(q - high, -slope, nodes, p)
+    ahead = _reach_in(high - q, slope, nodes, p) - _reach_in(low - q, slope, nodes, p)
+    front = 2 * w0 / abs(step) * exp(slope * (q - b + FIRST * step))
+    return front * (behind - ahead if odd else behind + ahead)
+
+
+@njit(error_model="numpy", **LEAN)
+def spread_over(q, a, b, p):
+    """Means of |u|^p sgn u and of |u|^(p + 1) over places uniform between a < b."""
+    wide, middle = b - a, q - (a + b) / 2
+    if p == 0.0:
+        far = abs(middle)
+        if 2 * far >= wide:
+            return np.sign(middle), far
+        return 2 * middle / wide, wide / 4 + middle * middle / wide
+    if wide < 1e-4 * abs(middle) or wide == 0:
+        f = fexp(p * flog(abs(middle)))
+        return f * np.sign(middle), f * abs(middle)
+    u, v = q - a, q - b
+    f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
+    return (f - g) / ((p + 1) * wide), (f * u - g * v) / ((p + 2) * wide)
+
+
+@njit(error_model="numpy", **LEAN)
+def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
+    """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
+
+    coarse: strips with u = 0 inside are taken as spread evenly over their places where they are narrower than
+    coarse exp(age/3) [m], as merging does; 0 for none.
+    """
+    first = head + many
+    force, energy = _powers(q, bonds, first, end, p)
+    smooth = p == 3.0
+    near = 1.0 if p == 0.0 or p == 2.0 else 5.0
+    for k in range(end if smooth else first, end):
+        a, b = bonds[0, k], bonds[1, k]
+        if abs(2 * q - a - b) > near * abs(b - a):
+            continue
+        narrow = abs(b - a) <= coarse * fexp((damage - bonds[2, k]) / 3)
+        if narrow and (p >= 1 or abs(2 * q - a - b) > abs(b - a)):
+            continue
+        less, lower = _powers(q, bonds, k, k + 1, p)
+        if narrow:
+            more, higher = spread_over(q, min(a, b), max(a, b), p)
+            more, higher = more * (bonds[5, k] + bonds[6, k]), higher * (bonds[5, k] + bonds[6, k])
+        else:
+            more = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p, True, nodes)
+            higher = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p + 1, False, nodes[8:])
+        force += more - less
+        energy += higher - lower
+    for k in range(head, first):
+        f, g = spread_over(q, bonds[0, k], bonds[1, k], p)
+        force += bonds[5, k] * f
+        energy += bonds[5, k] * g
+    return force, energy
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def _shares_closed(q, path, bonds, first, end, p, eps0):
+    """Force and energy [m] of strips of one pass for p = 0, 1, 2; S = 1 - (1 + ..) exp(-x), lever (p + 1) S - x phi."""
+    force, energy = 0.0, 0.0
+    one, two = min(p, 1.0), max(p - 1, 0.0) * 0.5
+    top = 1.0 - one  # x phi = exp(-x) x (top + one x (1 - t2) + two x x)
+    mid, most = one * (1.0 if p == 1.0 else 0.0), two
+    for k in range(uint64(first), uint64(end)):
+        b = bonds[1, k]
+        step = b - bonds[0, k]
+        g = np.copysign(1.0, step)
+        near = path - bonds[2, k]
+        turn = min(max(g * (b - q), 0.0), abs(step))
+        x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
+        ex, ey, ez = fexp(-x), fexp(-y), fexp(-z)
+        sx, sy = (1 + one * x * (1 + two * x)) * ex, (1 + one * y * (1 + two * y)) * ey
+        sz = (1 + one * z * (1 + two * z)) * ez
+        share = 2 * sy - sx - sz
+        lx, ly = ex * x * (top + x * (mid + x * most)), ey * y * (top + y * (mid + y * most))
+        lever = (p + 1) * share + 2 * ly - lx - ez * z * (top + z * (mid + z * most))
+        force += g * share
+        energy += g * (q - b - g * near) * share + eps0 * lever
+    return force, energy
+
+
+@njit(error_model="numpy", **LEAN)
+def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
+    """Force and energy [m] of the printed law at constant length; strips of one pass are split where u changes sign."""
+    first = head + many
+    force, energy = 0.0, 0.0
+    if p == 0.0 or p == 1.0 or p == 2.0:
+        force, energy = _shares_closed(q, path, bonds, first, end, p, eps0)
+    else:
+        before, lever = -1.0, 0.0
+        for k in range(end - 1, first - 1, -1):
+            step = bonds[1, k] - bonds[0, k]
+            g = np.copysign(1.0, step)
+            near = path - bonds[2, k]
+            turn = min(max(g * (bonds[1, k] - q), 0.0), abs(step))
+            x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
+            if before < 0:
+                before = tabled(p, x, table, norm)
+                lever = _lever(p, x, before, norm)
+            sx, lx = before, lever
+            before = tabled(p, z, table, norm)
+            lever = _lever(p, z, before, norm)
+            sy, ly = (sx, lx) if turn == 0 else (before, lever)
+            if 0 < turn < abs(step):
+                sy = tabled(p, y, table, norm)
+                ly = _lever(p, y, sy, norm)
+            share = before - 2 * sy + sx
+            force += g * share
+            energy += g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx)
+    for k in range(head, first):
+        near = path - bonds[2, k]
+        part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
+        own = tabled(p, (near + bonds[3, k]) / eps0, table, norm) - tabled(p, near / eps0, table, norm)
+        force += part * own
+        energy += far * own
+    return force, energy
+
+
+@njit(error_model="numpy", **LEAN)
+def _lever(p, x, s, norm):
+    """Integral from 0 to x of y phi(y): (p + 1) P(p + 1, x) - x phi(x), s = P(p + 1, x)."""
+    if x <= 0:
+        return 0.0
+    return (p + 1) * s - norm * fexp((p + 1) * flog(x) - x)
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def _aged(q, path, psi, length, bonds, first, end, p):
+    """Sums over both Gauss points of W/2 f(R/own), own = length - psi c, times sgn u and times |u| [m]."""
+    force, energy, least = 0.0, 0.0, 1e-9 * length
+    if p == 1.0:
+        for k in range(uint64(first), uint64(end)):
+            b, wide, near = bonds[1, k], bonds[3, k], path - bonds[2, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            x = (near + FIRST * wide) / max(length - psi * bonds[5, k], least)
+            y = (near + SECOND * wide) / max(length - psi * bonds[6, k], least)
+            f, g = wide * x * fexp(-x), wide * y * fexp(-y)
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
+    else:
+        for k in range(uint64(first), uint64(end)):
+            b, wide, near = bonds[1, k], bonds[3, k], path - bonds[2, k]
+            step = b - bonds[0, k]
+            u, v = q - b + FIRST * step, q - b + SECOND * step
+            x = max(near + FIRST * wide, 1e-300) / max(length - psi * bonds[5, k], least)
+            y = max(near + SECOND * wide, 1e-300) / max(length - psi * bonds[6, k], least)
+            f, g = wide * fexp(p * flog(x) - x), wide * fexp(p * flog(y) - y)
+            force += np.copysign(f, u) + np.copysign(g, v)
+            energy += f * abs(u) + g * abs(v)
+    return 0.5 * force, 0.5 * energy
+
+
+@njit(error_model="numpy", **LEAN)
+def start_length(part, c0, c1):
+    """Scaled starting length at the share `part` of a strip from its end, log-linear between the Gauss points."""
+    rise = (part - FIRST) / (SECOND - FIRST)
+    return c0 * exp(rise * (flog(c1) - flog(c0))) if c0 > 1e-300 and c1 > 1e-300 else max(c0, c1)
+
+
+@njit(error_model="numpy", **LEAN)
+def own_length(part, psi, length, c0, c1):
+    """Bond length at the share `part` of a strip from its end."""
+    return max(length - psi * start_length(part, c0, c1), 1e-9 * length)
+
+
+@njit(error_model="numpy", **LEAN)
+def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
+    """One strip of growing bonds with u = 0 inside, or with R^p (p < 0) still steep: two points on each side."""
+    step, near, force, energy = b - a, path - at, 0.0, 0.0
+    turn = min(max((b - q) / step, 0.0), 1.0)
+    steep = p < 0 and near < 3 * wide and own_length(0.0, psi, length, c0, c1) > 0.5 * own_length(
+        1.0, psi, length, c0, c1)
+    for side in range(2):
+        low, high = (0.0, turn) if side == 0 else (turn, 1.0)
+        if high <= low:
+            continue
+        for half in range(2):
+            if steep:
+                x0 = max(near, 0.0) + (low + 0.5 * half * (high - low)) * wide
+                x1 = x0 + 0.5 * (high - low) * wide
+                part = low + (0.25 + 0.5 * half) * (high - low)
+                own = own_length(part, psi, length, c0, c1)
+                f = (x1 ** (p + 1) - x0 ** (p + 1)) / (p + 1) * own ** (-p) * fexp(-(near + part * wide) / own)
+            else:
+                part = low + (FIRST if half == 0 else SECOND) * (high - low)
+                x = max(near + part * wide, 1e-300) / own_length(part, psi, length, c0, c1)
+                f = 0.5 * (high - low) * wide * fexp(p * flog(x) - x)
+            u = q - b + part * step
+            force += np.copysign(f, u)
+            energy += f * abs(u)
+    return force, energy
+
+
+@njit(error_model="numpy", **LEAN)
+def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
+    """Sums over strips of growing bonds of path f(R/own) sgn u and of the same times |u| [m], no factor 1/eps_0."""
+    first = head + many
+    force, energy = _aged(q, path, psi, length, bonds, first, end, p)
+    for k in range(first, end):
+        a, b, near, wide = bonds[0, k], bonds[1, k], path - bonds[2, k], bonds[3, k]
+        if (q - a) * (q - b) >= 0 and (p >= 0 or near > 3 * wide):
+            continue
+        less, lower = _aged(q, path, psi, length, bonds, k, k + 1, p)
+        if p >= 0 and wide <= coarse * fexp(near / (3 * length)) and near > length:
+            part, far = spread_over(q, min(a, b), max(a, b), 0.0)
+            own = _aged(max(a, b) + wide, path, psi, length, bonds, k, k + 1, p)[0]
+            more, higher = part * own, far * own
+        else:
+            more, higher = _aged_split(q, path, psi, length, a, b, bonds[2, k], wide, bonds[5, k], bonds[6, k], p)
+        force += more - less
+        energy += higher - lower
+    for k in range(head, first):
+        near, dl = path - bonds[2, k], bonds[3, k]
+        x = max(near + FIRST * dl, 1e-300) / max(length - psi * bonds[5, k], 1e-9 * length)
+        y = max(near + SECOND * dl, 1e-300) / max(length - psi * bonds[6, k], 1e-9 * length)
+        own = 0.5 * dl * (fexp(p * flog(x) - x) + fexp(p * flog(y) - y))
+        part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
+        force += part * own
+        energy += far * own
+    return force, energy
+
+
+@njit(error_model="numpy", **LEAN)
+def first_bonds(q, path, damage, law):
+    """(force, energy [m]) of the initial cohort of density m_0, per unit mu_s N."""
+    p, eps0, m0, norm = law[0], law[2], law[3], law[4]
+    if m0 == 0 or path <= 0:
+        return 0.0, 0.0
+    if law[1] <= POWER:
+        if q == 0:
+            return 0.0, 0.0
+        f = m0 * norm * fexp(p * flog(abs(q) / eps0) - damage)
+        return f * np.sign(q), f * abs(q) / (p + 1)
+    f = m0 * norm * fexp(p * flog(path / eps0) - path / eps0)
+    return f * np.sign(q), f * abs(q)
+
+
+@njit(error_model="numpy", **LEAN)
+def formed(size, eps, law):
+    """Weight of the bonds of one straight increment of length `size` at constant bond length eps."""
+    return eps / law[2] * share(law[0], size / eps)

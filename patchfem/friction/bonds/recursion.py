@@ -1,0 +1,142 @@
+"""The stretch reading of the quadrature for p = 1, summed exactly by a bond state that never grows.
+
+With k = exp(-int dR/eps) the surviving share of a bond and 1/eps frozen when it forms, the sums over all bonds
+
+    m = sum sigma k dL/eps,   z = sum sigma k u dL/eps,   s2 = sum sigma k u^2 dL/eps        [Pa, Pa m, Pa m2]
+
+obey m' = |v|(sigma - m)/eps, z' = v m - |v| z/eps, s2' = 2 v z - |v| s2/eps; tau = mu_s z/eps_0. Exact step for a bond
+length held over the step. Stored energy mu_s s2/(2 eps_0) and dissipation mu_s s2/(2 eps_0 eps) per path are never
+negative: passive for every path, pressure and bond length, and for every part of the path that is counted as damaging.
+
+Breakaway. The path counts only where the slide drags its elastic range along (`law.elastic_part`); inside it
+z' = v m and s2' = 2 v z. With a share b of the bond length, a dither of the force by less than 2 b mu_s sigma from end
+to end drifts in its first cycle only, b = 0 is Dahl's law and b -> 1 the elastic-plastic one.
+
+Load. Where the load falls at rest, the bonds that carry nothing, the last formed, are let go first: the force stays as
+long as a population with the moments (m, z, s2) exists, m >= z^2/s2. Beyond that all stretches shrink, and no point
+keeps more than mu_s sigma. Where it rises, unstressed bonds come in the density m_0. Neither gives energy.
+"""
+
+from dataclasses import dataclass
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+
+from ..protocol import Step
+from .parameters import Bonds, elastic_part, grow
+
+
+class BondState(NamedTuple):
+    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]; play [1] of `elastic_part`."""
+
+    bonds: np.ndarray
+    eps: float
+    play: float = 0.0
+
+
+def shape_functions(x):
+    """(f1, f2, exp(-x)) with f1 = (1 - exp(-x))/x and f2 = (1 - f1)/x, x >= 0, without cancellation."""
+    x = np.asarray(x, float)
+    small = x < 0.03
+    safe = np.where(small, 1.0, x)
+    f1 = -np.expm1(-safe) / safe
+    f2 = (1 - f1) / safe
+    series = 1 / 2 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320)))))
+    f2 = np.where(small, series, f2)
+    f1 = np.where(small, 1 - x * f2, f1)
+    return f1, f2, np.exp(-x)
+
+
+def moments(x, e):
+    """Integrals 0..x of y exp(-y), of y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x)."""
+    series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
+    c = np.where(x < 0.5, x**4 * series, 6 - e * (x**3 + 3 * x * x + 6 * x + 6))
+    third = (c + x**3 * e) / 3
+    return (third + x * x * e) / 2, third, x * third - c
+
+
+def advance(bonds, dq, sigma, eps):
+    """New bonds (3, m), path-mean stretch zbar (m,) [Pa m], its slope (m,) [Pa], integral of s2 dR/eps (m,) [Pa m2].
+
+    bonds (3, m), dq scalar or (m,) [m], sigma (m,) [Pa] the pressure that forms the new bonds, eps [m].
+    """
+    m, z, s2 = bonds
+    path = np.abs(dq)
+    g = np.sign(dq)
+    x = path / eps
+    f1, f2, e = shape_functions(x)
+    a1, young = x * f1, sigma - m
+    with np.errstate(over="ignore", invalid="ignore"):
+        a2, a3, a4 = moments(x, e)
+    mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))
+    slope = g * z * (f2 - f1) / eps + sigma * (f1 - f2) - young * (f2 - x * (f1 - f2))
+    slope = np.where(path > 0, slope, m / 2)  # the mean of the two sides
+    out = np.stack([sigma - young * e,
+                    z * e + g * eps * (sigma * a1 - young * x * e),
+                    e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * a3])
+    burnt = s2 * a1 + 2 * g * z * eps * a2 + m * eps**2 * a3 + sigma * eps**2 * a4
+    return out, mean, slope, burnt
+
+
+def stretch(bonds, dq):
+    """Bonds (3, m) that all stretch by dq and neither break nor form."""
+    m, z, s2 = bonds
+    return np.stack([m, z + m * dq, s2 + dq * (2 * z + m * dq)])
+
+
+def pressed(law: Bonds, bonds, s0, s1):
+    """Bonds (3, m) after a change of the pressure from s0 to s1 (m,) [Pa] at rest; stored energy never rises."""
+    m, z, s2 = bonds
+    falls = s1 < s0
+    left = np.divide(m * s1, s0, out=np.zeros_like(m), where=s0 > 0)
+    density = np.where(falls, left, m + law.initial * (s1 - s0))
+    least = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
+    keep = np.where(falls & (least > left), left / np.maximum(least, 1e-300), 1.0)
+    bound = law.length * s1
+    keep *= np.where(falls & (keep * np.abs(z) > bound), bound / np.maximum(keep * np.abs(z), 1e-300), 1.0)
+    return np.stack([density, z * keep, s2 * keep])
+
+
+@dataclass(frozen=True, slots=True)
+class Recursion:
+    """Law object of the stretch reading, p = 1; the pressure may change along the increment and in time."""
+
+    law: Bonds
+
+    def start(self, sigma) -> BondState:
+        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa]."""
+        bonds = np.zeros((3, sigma.size))
+        bonds[0] = self.law.initial * sigma
+        return BondState(bonds, self.law.length)
+
+    def step(self, state: BondState, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
+        speed = dq / dt if dt > 0 else 0.0
+        middle = grow(self.law, state.eps, speed, speed, dq / 2, dt / 2)
+        free, damaging, play = elastic_part(self.law, state.play, dq, middle)
+        stretched = stretch(state.bonds, free)
+        out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
+        if free != 0:
+            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
+        scale = self.law.static / self.law.length
+        spent = scale * burnt / 2
+        lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
+        if lost.any():
+            spent = spent + np.where(lost, scale * out[2] / 2, 0.0)
+            out = np.where(lost, 0.0, out)
+        return Step(scale * mean, spent, BondState(out, grow(self.law, state.eps, speed, speed, dq, dt), play))
+
+    def press(self, state: BondState, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        bonds = pressed(self.law, state.bonds, s0, s1)
+        scale = self.law.static / self.law.length
+        return Step(scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds))
+
+    def traction(self, state: BondState):
+        """tau = mu_s z/eps_0 (m,) [Pa]."""
+        return self.law.static / self.law.length * state.bonds[1]
+
+    def stored(self, state: BondState):
+        """Elastic energy of the bonds per area (m,) [J/m2]."""
+        return self.law.static / (2 * self.law.length) * state.bonds[2]

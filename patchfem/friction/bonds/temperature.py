@@ -1,0 +1,103 @@
+"""Growth of bonds on a warm surface (report, 2.13) and how far friction warms it.
+
+a_s = a_0 exp(-T_a/T_s), l_k = l_0 exp(T_l/T_s), stated about a reference at which a_s and l_k are known, so that a
+surface at the reference changes nothing:
+
+    a_s = a_ref exp(T_a (1/T_ref - 1/T_s)),   l_k = l_ref exp(T_l (1/T_s - 1/T_ref)).
+
+The print is the limit of an infinite reference. Temperatures are absolute, in kelvin.
+"""
+
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..protocol import Step
+from .parameters import Bonds, elastic_part, growth_exponents
+from .recursion import BondState, Recursion, advance, stretch
+
+
+def growth_at(rest: float, slip: float, surface, reference: float, rest_activation: float | None,
+              slip_activation: float | None) -> tuple:
+    """(a_s [m s-2], l_k [m]) at `surface` [K], a number or one per point (m,), from their values at `reference` [K].
+
+    An activation [K] of None or 0 leaves its rate as it is. PatchfemError for a temperature that is not above 0 K and
+    for a rate that leaves the range of floating-point numbers.
+    """
+    surface = np.asarray(surface, float)
+    if not (surface > 0).all() or not np.isfinite(surface).all() or not reference > 0:
+        worst = float(surface.min()) if reference > 0 else reference
+        raise PatchfemError(f"a temperature of {worst:g} K: absolute temperatures above 0 K are wanted")
+    cold = 1 / reference - 1 / surface
+    return (_scaled("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
+            _scaled("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"))
+
+
+def _scaled(name: str, value: float, exponent, key: str):
+    total = np.log(value) + exponent
+    if not ((total < np.log(np.finfo(float).max)) & (total > np.log(np.finfo(float).tiny))).all():
+        worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
+        raise PatchfemError(f"{name} would be 1e{worst:.0f} at the surface temperature, beyond what a number holds; "
+                            f"lower temperature.{key} or bring surface and reference together")
+    out = value * np.exp(exponent) if (np.abs(exponent) < 600).all() else np.exp(total)
+    return float(out) if np.ndim(out) == 0 else out
+
+
+def critical_speed(rest, slip):
+    """v_c = sqrt(a_s l_k) [m/s], at which the bond length lies half way between eps_0 and eps_k."""
+    return np.sqrt(rest) * np.sqrt(slip)
+
+
+def surface_rise(flux: float, time: float, conductivity: float, capacity: float) -> float:
+    """Rise [K] of the face of a half-space that takes the heat `flux` [W/m2] from time 0 on: 2 q sqrt(t/(pi k rho c)).
+
+    conductivity k [W m-1 K-1], capacity rho c [J m-3 K-1] (Carslaw and Jaeger, 2.9). One-dimensional: an upper bound
+    for a patch that is small against sqrt(k t/(rho c)).
+    """
+    return 2 * flux * sqrt(time / (pi * conductivity * capacity))
+
+
+def grow_each(law: Bonds, eps, speed: float, dq: float, dt: float):
+    """Bond lengths (m,) after a step at constant speed where `law` holds a_s and l_k per point (twin: `law.grow`)."""
+    rest, slide = growth_exponents(law, speed, speed, dq, dt)
+    total = rest + slide
+    safe = np.where(total > 0, total, 1.0)
+    target = law.length * (rest + slide * law.ratio) / safe
+    return np.where(total > 0, target + (eps - target) * np.exp(-total), eps)
+
+
+@dataclass(frozen=True, slots=True)
+class WarmRecursion(Recursion):
+    """The stretch reading with p = 1 on points of different temperature: every point has a bond length of its own.
+
+    law: a growing `Bonds` whose rest_growth and slip_growth are arrays (m,), as `warm` makes them.
+    """
+
+    @classmethod
+    def warm(cls, law: Bonds, surface, reference: float, rest_activation=None, slip_activation=None):
+        """The law of points at `surface` (m,) [K] from the rates of `law`, which hold at `reference` [K]."""
+        rest, slip = growth_at(law.rest_growth, law.slip_growth, surface, reference, rest_activation, slip_activation)
+        ones = np.ones(np.shape(surface))
+        return cls(replace(law, rest_growth=rest * ones, slip_growth=slip * ones))
+
+    def start(self, sigma) -> BondState:
+        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa], all of length eps_0."""
+        state = Recursion(self.law).start(sigma)
+        return BondState(state.bonds, np.full(sigma.size, self.law.length), np.zeros(sigma.size))
+
+    def step(self, state: BondState, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
+        law = self.law
+        speed = dq / dt if dt > 0 else 0.0
+        middle = grow_each(law, state.eps, speed, dq / 2, dt / 2)
+        free, damaging, play = elastic_part(law, state.play, dq, middle)
+        stretched = stretch(state.bonds, free)
+        out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
+        if dq != 0:
+            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
+        scale, lost = law.static / law.length, s1 <= 0
+        spent = scale * (burnt + np.where(lost, out[2], 0.0)) / 2
+        return Step(scale * mean, spent,
+                    BondState(np.where(lost, 0.0, out), grow_each(law, state.eps, speed, dq, dt), play))

@@ -1,0 +1,141 @@
+"""The average of the pressure behind a point that the report extends (Oden and Pires, J. Appl. Mech. 50, 67, 1983).
+
+    tau(x) = mu_s sgn(v) int_0^inf phi_p(s/eps)/eps sigma_n(x - s sgn v) ds,   phi_p as in 2.14
+
+It has no memory but the last sign of the motion: set-valued at rest, where the last traction is kept. On a pressure
+that stays on the lower piece it is what 2.17 settles to in a steady slide longer than some bond lengths; on a pressure
+that rides on the mover 2.17 settles to mu_s sigma_n itself, without this average, and the two laws differ.
+
+sigma_n is linear between its nodes and 0 outside; the integral is exact, by incomplete gamma functions. Bonds are lost
+where no pressure holds them: nothing is carried at bare places, and the average ends at the first bare stretch behind
+a point.
+"""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.special import gammainc, gammainccinv
+
+from ..protocol import Step
+
+ROWS = 64  # places averaged at a time, so that the nodes out of their reach are left out
+
+
+def _share(order: float, x):
+    """P(order + 1, x), in closed form for the first orders."""
+    if order in (0, 1, 2):
+        e = np.exp(-x)
+        return -np.expm1(-x) - (x * e if order else 0.0) - (x * x * e / 2 if order == 2 else 0.0)
+    return gammainc(order + 1, x)
+
+
+def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
+    """(n, m) weights of the nodes in the averages at places (n,) for motion towards +x; bare (m - 1,): segments without
+    pressure, beyond which nothing is averaged."""
+    behind = places[:, None] - nodes
+    x = np.maximum(behind, 0.0) / length
+    zero, one = -np.diff(_share(order, x), axis=1), -np.diff(_share(order + 1, x), axis=1)
+    near = (behind[:, :-1] * zero - (order + 1) * length * one) / np.diff(nodes)
+    own = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
+    island = np.concatenate([[0], np.cumsum(bare[1:] != bare[:-1])])
+    beyond = places > nodes[-1]  # past the end nothing holds; a bare stretch holds nothing either
+    held = (island == island[own][:, None]) & ~bare & ~beyond[:, None]
+    out = np.zeros((places.size, nodes.size))
+    out[:, :-1] += np.where(held, zero - near, 0.0)
+    out[:, 1:] += np.where(held, near, 0.0)
+    return out
+
+
+def average(places, nodes, sigma, way: float, length: float, order: float) -> np.ndarray:
+    """Averages (n,) [Pa] at places (n,) [m] of the pressure sigma (m,) [Pa] at nodes (m,) [m]; way: sign of motion."""
+    places, nodes, sigma = (np.asarray(part, float) for part in (places, nodes, sigma))
+    if way < 0:
+        return average(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
+    bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
+    reach = length * float(gammainccinv(order + 2, 1e-20))
+    out = np.zeros(places.size)
+    for first in range(0, places.size, ROWS):
+        here = places[first:first + ROWS]
+        low = max(int(np.searchsorted(nodes, here.min() - reach)) - 1, 0)
+        high = max(int(np.searchsorted(nodes, here.max())) + 1, low + 2)
+        some = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
+        weights = _weights(here, nodes[some], bare[some.start:][:nodes[some].size - 1], length, order)
+        out[first:first + ROWS] = weights @ sigma[some]
+    return out
+
+
+def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
+    """(forward, backward) resultants [N] over mu_s of a rigid slide: weight (m,) [m2], sigma (m,) [Pa]. They differ
+    where the pressure is not symmetric: each loses what its own trailing edge would carry."""
+    on = np.asarray(sigma) > 0
+    return tuple(float(np.asarray(weight) @ np.where(on, average(nodes, nodes, sigma, way, length, order), 0.0))
+                 for way in (1.0, -1.0))
+
+
+class Averaged(NamedTuple):
+    """traction (m,) [Pa] of the last motion, slide [m] since the start, way: sign of the last motion, 0 where the
+    traction is no longer its limit."""
+
+    traction: np.ndarray
+    slide: float
+    way: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Convolution:
+    """Law object. nodes (m,) [m] of the mover, None for points without a place (their pressure is even, the average is
+    the pressure itself: Coulomb); pattern (m,) [Pa]: pressure at the same nodes of the lower piece when it stays there,
+    None when it rides on the mover."""
+
+    static: float
+    length: float
+    order: float = 1.0
+    nodes: np.ndarray | None = None
+    pattern: np.ndarray | None = None
+    kept: dict = field(default_factory=dict)
+    at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
+
+    def start(self, sigma) -> Averaged:
+        """No traction before any motion."""
+        return Averaged(np.zeros_like(sigma), 0.0, 0.0)
+
+    def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]; the mean is that of its two ends."""
+        if dq == 0:
+            return Step(state.traction, np.zeros_like(s0), state)
+        way, slide = float(np.sign(dq)), state.slide + dq
+        start = state.traction
+        if way != state.way:
+            start = self.static * way * self._averaged(state.slide, s0, way)
+        end = self.static * way * self._averaged(slide, s1, way)
+        mean = (start + end) / 2
+        return Step(mean, mean * dq, Averaged(end, slide, way))
+
+    def press(self, state: Averaged, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]: the traction is kept within its limit. mean: after it."""
+        way = float(np.sign(state.traction.sum()))
+        held = state.traction
+        if way != 0:
+            held = way * np.minimum(way * held, self.static * self._averaged(state.slide, s1, way))
+        return Step(held, np.zeros_like(held), Averaged(held, state.slide, 0.0))
+
+    def _averaged(self, slide: float, sigma, way: float):
+        if self.nodes is None:
+            return sigma
+        if self.pattern is not None:
+            behind = average(self.nodes + slide, self.nodes, self.pattern, way, self.length, self.order)
+            return np.where(sigma > 0, behind, 0.0)
+        before, behind = self.kept.get(way, (None, None))
+        if before is None or not np.array_equal(before, sigma):
+            behind = average(self.nodes, self.nodes, sigma, way, self.length, self.order)
+            self.kept[way] = np.array(sigma), behind
+        return np.where(sigma > 0, behind, 0.0)
+
+    def traction(self, state: Averaged):
+        """Traction (m,) [Pa] at the end of the last step."""
+        return state.traction
+
+    def stored(self, state: Averaged):
+        """Elastic energy per area (m,) [J/m2]: none."""
+        return np.zeros_like(state.traction)

@@ -1,0 +1,48 @@
+"""Coulomb friction under prescribed motion: the traction has the sign of the slip (2.1)."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..protocol import Step
+
+
+@dataclass(frozen=True, slots=True)
+class Coulomb:
+    """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept.
+
+    `static` is what the contact carries at the instant a rest ends (`breaking`); it does no work.
+    """
+
+    kinetic: float
+    static: float | None = None
+    at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
+
+    def start(self, sigma):
+        """State: the last traction (m,) [Pa], 0 before any motion."""
+        return np.zeros_like(sigma)
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]."""
+        if dq == 0:
+            return Step(state, np.zeros_like(s0), state)
+        mean = self.kinetic * (s0 + s1) / 2 * np.sign(dq)
+        return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
+
+    def press(self, state, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        held = np.clip(state, -self.kinetic * s1, self.kinetic * s1)
+        return Step(held, np.zeros_like(held), held)
+
+    def breaking(self, sigma, direction: float):
+        """Traction (m,) [Pa] under sigma at the instant a rest ends in a motion of this sign."""
+        return (self.kinetic if self.static is None else self.static) * sigma * direction
+
+    def traction(self, state):
+        """Traction (m,) [Pa] at the end of the last step."""
+        return state
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]: none."""
+        return np.zeros_like(state)

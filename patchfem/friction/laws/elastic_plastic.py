@@ -1,0 +1,60 @@
+"""The elastic-plastic law 3.12 with its reversal.
+
+As printed, 3.12 sets dF/dt = 0 for |F| > mu N and so never unloads; here it is zero only while sliding goes on.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..protocol import Step
+
+
+@dataclass(frozen=True, slots=True)
+class ElasticPlastic:
+    """Eq. 3.12 per point: springs of stiffness mu sigma/length up to mu sigma, elastic again on reversal.
+
+    Springs come unstressed where the pressure rises and go where slip breaks them, within one length of slip; a falling
+    pressure only lowers the limit. So no pressure creates energy, and a force below the limit holds still.
+    """
+
+    static: float
+    length: float
+
+    def start(self, sigma):
+        """State: (traction/mu, density of springs), (2, m) [Pa]."""
+        return np.stack([np.zeros_like(sigma), sigma])
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] at the mean pressure of its ends; mean traction of the clipped ramp."""
+        sigma = (s0 + s1) / 2
+        y0, springs = self._at(state, sigma)
+        move = springs * dq / self.length
+        y1 = np.clip(y0 + move, -sigma, sigma)
+        ramp = np.divide(y1 - y0, move, out=np.zeros_like(y0), where=move != 0)
+        mean = np.where(move != 0, ramp * (y0 + y1) / 2 + (1 - ramp) * y1, y0)
+        left = np.minimum(sigma, springs)
+        springs = left + (springs - left) * np.exp(-(1 - ramp) * abs(dq) / self.length)
+        bare = s1 <= 0  # bonds are lost where no pressure holds them
+        after = np.stack([np.where(bare, 0.0, y1), np.where(bare, 0.0, springs)])
+        spent = self.static * mean * dq - (self.stored(after) - self.stored(state))
+        return Step(self.static * mean, spent, after)
+
+    def press(self, state, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        after = np.stack(self._at(state, s1))
+        return Step(self.static * after[0], self.stored(state) - self.stored(after), after)
+
+    def _at(self, state, sigma):
+        """Traction/mu and density of springs under another pressure; without any both are gone."""
+        y, springs = state
+        return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
+
+    def traction(self, state):
+        """Traction (m,) [Pa]."""
+        return self.static * state[0]
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]."""
+        y, springs = state
+        return self.static * self.length * np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)

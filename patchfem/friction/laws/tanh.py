@@ -1,0 +1,42 @@
+"""The rate law of eq. 2.4: friction that follows the slip speed and never holds."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..protocol import Step
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Eq. 2.4 per point: tau = mu sigma tanh(v/v_0), taken at the mean speed of a step. It never holds: under a steady
+    share f of the limit it creeps at v_0 atanh(f)."""
+
+    static: float
+    speed: float
+    at_once: ClassVar[bool] = True
+
+    def start(self, sigma):
+        """State: the last traction (m,) [Pa], 0 before any motion."""
+        return np.zeros_like(sigma)
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] in dt [s] under pressure s0 -> s1 (m,) [Pa]; a jump in no time has no speed
+        limit."""
+        part = np.tanh(dq / dt / self.speed) if dt > 0 else np.sign(dq)
+        mean = self.static * (s0 + s1) / 2 * part
+        return Step(mean, mean * dq, self.static * s1 * part)
+
+    def press(self, state, s0, s1) -> Step:
+        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        held = np.clip(state, -self.static * s1, self.static * s1)
+        return Step(held, np.zeros_like(held), held)
+
+    def traction(self, state):
+        """Traction (m,) [Pa] at the end of the last step."""
+        return state
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]: none."""
+        return np.zeros_like(state)

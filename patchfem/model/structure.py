@@ -1,0 +1,185 @@
+"""[structure] of a scene as a modal basis: from modes, masses or a file, with the drive's share and the start.
+
+Where a number is wanted before anything runs (`plan`), the functions here give it for every description of the rig.
+"""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from ..core import ModalBasis, PatchfemError, Start, frozen_array
+from ..structure.modes import basis
+
+
+def modes_of(scene) -> ModalBasis:
+    """Coordinates of [structure] with a linear [structure.bonded] worked in; `base` is the drive's participation.
+
+    A moving base: each coordinate's share of its motion. A force: minus its share, with a(t) = F/basis.mass; it acts
+    on drive.mass (structure.output_mass unless given), at the output of [[structure.mode]] and of a file without a
+    force of its own. PatchfemError names what a file lacks.
+    """
+    found = _over_strips(scene, _unbonded(scene))
+    if found.faces is not None and not len(found.faces):
+        found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
+    bonded = scene.structure.bonded
+    if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
+        return found
+    from ..structure.bonded import bonded as fold
+
+    if len(found.interfaces) != 1 and not scene.structure.mode:
+        raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
+                            f"{len(found.interfaces)} interfaces; write a spring between the same places")
+    return fold(found, bonded.stiffness, bonded.damping)
+
+
+def _over_strips(scene, found: ModalBasis) -> ModalBasis:
+    """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
+    from .interfaces import strip_rows, yaws
+
+    if not yaws(scene):
+        return found
+    count, width = scene.contact.strips.count, scene.contact.width
+    offsets = (np.arange(count) + 0.5) * (width / count) - width / 2
+    return replace(found, faces=frozen_array(strip_rows(found, offsets)))
+
+
+def _unbonded(scene) -> ModalBasis:
+    structure, drive = scene.structure, scene.drive
+    forced = drive.kind == "force"
+    if structure.mode:
+        found = basis(structure.mode, structure.moving_mass)
+        if not forced:
+            return found
+        return replace(found, base=frozen_array(-found.output))
+    if structure.masses:
+        from ..structure import masses
+
+        return masses.basis(structure.masses, [(s.between, s.stiffness) for s in structure.spring],
+                            [(d.between, d.coefficient) for d in structure.damper],
+                            [i.between for i in structure.interface], structure.output_mass or 1,
+                            pushed_mass(scene) if forced else None)
+    from .structure_files import basis_of_file
+
+    return basis_of_file(scene)
+
+
+def notes_of(scene) -> list:
+    """Sentences for the user on a structure.file that was read otherwise than as it stands; [] without a file."""
+    if scene.structure is None or scene.structure.file is None:
+        return []
+    from .structure_files import notes_of_file
+
+    return notes_of_file(scene)
+
+
+def pushed_mass(scene) -> int:
+    """The mass that a force drives or a release moves, from 1: drive.mass, or else structure.output_mass."""
+    return scene.drive.mass or scene.structure.output_mass or 1
+
+
+def start_state(scene, found: ModalBasis) -> Start:
+    """Coordinates and rates at t = 0 in the basis of the scene.
+
+    [structure.start] gives them per mode or mass. kind = "free": released at rest; with masses drive.mass alone is
+    moved (structure.output_mass unless given), else the output by drive.displacement in the shape of a static force
+    there. A base step in displacement leaves everything where it was. Otherwise at rest.
+    """
+    from ..structure import starts
+
+    structure, drive = scene.structure, scene.drive
+    if structure.start is not None:
+        try:
+            return starts.given(found, structure.start.displacement, structure.start.velocity)
+        except PatchfemError as error:
+            text = str(error).removeprefix("structure.start: ")
+            raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
+    if drive.kind == "free":
+        named = structure.masses is not None or drive.mass is not None
+        if not named:
+            return starts.released(found, drive.displacement)
+        moved = np.zeros(len(found.names))
+        if pushed_mass(scene) > moved.size:
+            raise PatchfemError(f"{scene.where('drive.mass')}: the rig has {moved.size} coordinates")
+        moved[pushed_mass(scene) - 1] = drive.displacement
+        return starts.given(found, moved)
+    if drive.kind == "base" and drive.waveform == "step" and drive.displacement is not None:
+        return step_start(found, drive.displacement)
+    return starts.at_rest(found)
+
+
+def step_start(found: ModalBasis, displacement: float) -> Start:
+    """Start after the base has jumped by `displacement` [m]: nothing has moved yet, z = -displacement base."""
+    from ..structure.starts import base_step
+
+    return base_step(found, displacement)
+
+
+def motions(found: ModalBasis, modal) -> np.ndarray:
+    """Coordinates (k, n) as motions (k, p) of the scene's own modes or masses."""
+    return modal if found.shapes is None else modal @ found.shapes.T
+
+
+def frequencies(scene) -> np.ndarray:
+    """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
+    if scene.structure.mode and scene.structure.bonded is None:
+        return np.array([mode.frequency for mode in scene.structure.mode])
+    return modes_of(scene).omega / (2 * pi)
+
+
+def highest_frequency(scene) -> float:
+    """The largest natural frequency [Hz]; 0 where all coordinates are rigid."""
+    return float(frequencies(scene).max())
+
+
+def first_frequency(scene) -> float:
+    """Frequency [Hz] of the first mode that is not rigid, in the order of the scene, without the bonded spring; 0 where
+    all are rigid. Masses and files have their modes in ascending order."""
+    return _first(scene)[0]
+
+
+def mode_stiffness(scene) -> float:
+    """Stiffness K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all rigid.
+
+    mass: moving_mass for modes, else the modal mass seen at the output, basis.mass / output_1^2.
+    """
+    frequency, mass = _first(scene)
+    return mass * (2 * pi * frequency)**2 if frequency else 0.0
+
+
+def moving_mass(scene) -> float:
+    """The mass [kg] of dimensionless groups: structure.moving_mass, or the modal mass of the first mode at the output;
+    where that mode leaves the output at rest, the mass of all coordinates."""
+    return _first(scene)[1]
+
+
+def _first(scene) -> tuple:
+    structure = scene.structure
+    if structure.mode:
+        held = [mode.frequency for mode in structure.mode if mode.frequency > 0]
+        return (held[0] if held else 0.0), structure.moving_mass
+    found = _unbonded(scene)
+    held = np.flatnonzero(found.omega > 0)
+    k = held[0] if held.size else 0
+    frequency = float(found.omega[k] / (2 * pi)) if held.size else 0.0
+    share = found.output[k]**2
+    reach = max(float(np.square(found.output).sum()), 1e-300)
+    if structure.moving_mass is not None and structure.file is not None:
+        return frequency, structure.moving_mass
+    return frequency, float(found.mass / (share if share > 1e-12 * reach else reach))
+
+
+def friction_limit(scene, load: float) -> float:
+    """Sum of mu_s N [N] over the interfaces of a scene; load [N]: of [contact] or [normal]."""
+    if scene.structure is not None and scene.structure.interface:
+        return float(sum(i.static * i.load for i in scene.structure.interface))
+    return scene.friction.static * load
+
+
+def start_of(scene, modes: ModalBasis):
+    """core.Start of a scene that does not begin at rest, else None."""
+    start, travel = start_state(scene, modes), scene.structure.travel
+    if travel is not None and abs(float(modes.output @ start.z)) > travel:
+        raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
+                            "nearer to the middle")
+    return start if start.z.any() or start.v.any() else None

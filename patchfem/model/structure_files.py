@@ -1,0 +1,74 @@
+"""structure.file of a scene as a modal basis; a file that is fitted or read once is kept for the runs that follow."""
+
+from functools import lru_cache
+
+from ..core import ModalBasis, PatchfemError
+
+PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+
+
+def basis_of_file(scene) -> ModalBasis:
+    """Coordinates of structure.file; PatchfemError with its line."""
+    return _found(scene)[0]
+
+
+def notes_of_file(scene) -> list:
+    """Sentences on what was read otherwise than as it stands."""
+    return _found(scene)[1]
+
+
+def _found(scene) -> tuple:
+    path = scene.beside(scene.structure.file)
+    try:
+        stamp = path.stat()
+    except OSError as error:
+        raise PatchfemError(f"{scene.where('structure.file')}: {path} cannot be read ({error.strerror})") from None
+    kind, mass = scene.drive.kind, scene.drive.mass
+    try:
+        return _built(path, stamp.st_mtime_ns, stamp.st_size, scene.structure, kind, None if kind == "base" else mass,
+                      scene.kind == "rig")
+    except PatchfemError as error:
+        head, _, rest = str(error).partition(": ")
+        named = head.startswith(("structure.", "drive."))
+        key, text = (head, rest) if named else ("structure.file", str(error))
+        raise type(error)(f"{scene.where(key)}: {text}") from None
+
+
+@lru_cache(maxsize=8)
+def _read(path, changed: int, size: int):
+    """Content of a file of this age: arrays by name, or Shapes."""
+    if path.suffix.lower() in (".uff", ".unv"):
+        from ..structure.universal import read
+    else:
+        from ..structure.arrays import read
+    return read(path)
+
+
+@lru_cache(maxsize=8)
+def _built(path, changed: int, size: int, structure, kind: str, mass: int | None, rubs: bool) -> tuple:
+    """(basis, notes) of a file of this age; rubs: an interface is needed."""
+    data = _read(path, changed, size)
+    if path.suffix.lower() in (".uff", ".unv"):
+        return _measured(data, structure, kind, mass)
+    return _arrays(data, structure, kind, mass, rubs)
+
+
+def _arrays(data, structure, kind, mass, rubs) -> tuple:
+    from ..structure import arrays
+
+    forced = kind == "force"
+    pairs = [one.between for one in structure.interface]
+    found = arrays.basis(data, pairs, mass if forced else None, forced, structure.moving_mass)
+    if rubs and not len(found.interfaces):
+        raise PatchfemError("structure.file: lacks slide, the motion at the patch; give it, or [[structure.interface]]")
+    return found, []
+
+
+def _measured(shapes, structure, kind, mass) -> tuple:
+    from ..structure import places
+
+    forced = kind == "force"
+    if mass is not None:
+        raise PatchfemError("drive.mass: a universal file has no numbered masses; use structure.force_at or output_at")
+    found = places.basis(shapes, structure.moving_mass, {key: getattr(structure, key) for key in PLACES}, forced)
+    return found, [*shapes.notes, *([] if forced else places.held_note(found))]

@@ -1,0 +1,55 @@
+"""How a coupled run ended: outcome and steady estimate, by what its drive lets settle."""
+
+from dataclasses import replace
+
+from ..core import Measure, Outcome
+from ..model import drive as model_drive
+from ..structure.drive_sizes import sinusoidal
+from .measures import classify
+
+
+def settle(raw, measures: dict, scene, drive) -> tuple:
+    """(outcome, measures with the steady estimate where there is one).
+
+    Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`). A
+    release or a step is steady once it is at rest: its amplitude below the tolerance of the largest; else the same
+    amplitudes decide, but a release never grows. A sweep or a recorded signal changes to the end: unless it leaves the
+    interface stuck it is transient, without a steady estimate.
+    """
+    tolerance = scene.accuracy.tolerance
+    if raw.outcome is not None:
+        return raw.outcome, measures
+    if not drive.segments:
+        return Outcome.TRANSIENT, measures
+    amplitudes, last = raw.amplitudes, drive.segments[-1]
+    if model_drive.levelled(scene):
+        window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
+        amplitudes = amplitudes[-max(1, int(model_drive.cycles_per_level(scene) / window)):]
+    if last.amplitude == 0:
+        outcome = Outcome.STEADY if amplitudes[-1] <= tolerance * amplitudes.max() else classify(amplitudes, tolerance)
+        return (Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome), measures
+    outcome = classify(amplitudes, tolerance)
+    if outcome is Outcome.GROWS:
+        return outcome, {k: replace(m, error=None) for k, m in measures.items()}
+    steady, error = raw.steady
+    if outcome is Outcome.TRANSIENT and steady is not None:
+        base = measures["relative_displacement_amplitude"]
+        total = error + (base.error or 0.0) * steady / max(abs(base.value), 1e-300)
+        measures = measures | {"relative_displacement_amplitude_steady": Measure(steady, "m", float(total), base.floor)}
+    return outcome, measures
+
+
+def changing_note(outcome: Outcome, drive) -> list:
+    """The sentence on measures under a drive that changes to the end."""
+    if outcome is not Outcome.TRANSIENT or drive.segments:
+        return []
+    return ["the drive changes to the end, so nothing settles: the measures are those of the last cycles; the whole "
+            "motion is in result.nc"]
+
+
+def steady_of(drive, amplitudes, phasors) -> tuple:
+    """`response.measures.steady_amplitude` under a drive that ends as a sine, (None, None) under any other: a released
+    or struck rig comes to rest, whatever the tail of its amplitudes looks like."""
+    from .measures import steady_amplitude
+
+    return steady_amplitude(amplitudes, phasors) if sinusoidal(drive) else (None, None)

@@ -1,0 +1,94 @@
+"""Events of a coupled run, from the log of the exact engine or from its samples, and what is read off between them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
+from .measures import slip_noise
+
+OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
+SOURCE = "located by the event engine"
+
+
+def slips_of(response) -> tuple:
+    """(irreversible motion (k, i), whole motion (k, i)) [m] of every interface."""
+    extra = response.extra
+    if "slides" in extra:
+        return extra.get("slips", extra["slides"]), extra["slides"]
+    return response.slip[:, None], response.slide[:, None]
+
+
+def borders_of(drive) -> list:
+    """Times [s] at which a drive goes from one of its segments to the next."""
+    return [segment.start for segment in drive.segments[1:]]
+
+
+def of_log(log) -> Events:
+    """Events of an EventLog."""
+    part = slice(-MOST, None)
+    kind = np.array([OF_LOG[what] for what in log.what[part].tolist()], float)
+    slide = np.where(kind == BORDER, np.nan, log.slide[part])
+    return table(np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1), log.count, SOURCE)
+
+
+def events_of(window, drive, log=None, held: float = 0.0) -> Events:
+    """Events of a run: all of its log, or those seen in its last cycles; held [m] as in `response.events.detected`."""
+    if log is not None:
+        return of_log(log)
+    slips, slides = slips_of(window)
+    return detected(window.time, slips, slides, drive.period, max(held, slip_noise(window)), borders_of(drive))
+
+
+def moving(window, drive, log=None, held: float = 0.0) -> list:
+    """Whether each interface slips at some time in the window."""
+    slips, held = slips_of(window)[0], max(held, slip_noise(window))
+    if log is not None:
+        return [bool(np.ptp(column) > 0) for column in slips.T]
+    return [bool(states(window.time, column, drive.period, held)[1].any()) for column in slips.T]
+
+
+def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
+    """(ring_frequency and ring_damping by name, their errors) over the sticks of the window, from the acceleration at
+    the output; ({}, {}) where nothing rings, where the drive has no frequency of its own (sweep, recorded), or where
+    the samples do not resolve the fastest mode."""
+    if not drive.segments or window.time.size < 8:
+        return {}, {}
+    if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
+        return {}, {}
+    from .ringing import ringing
+
+    last = drive.segments[-1]
+    spans = sticks(events_of(window, drive, log, held), window.time[0], window.time[-1],
+                   moving(window, drive, log, held))
+    if not spans:
+        return {}, {}
+    return ringing(window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0)
+
+
+def with_own(measures: dict, own: dict | None) -> dict:
+    """Measures with what the run itself leaves open of them added to their errors."""
+    return {name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
+            for name, m in measures.items()}
+
+
+def all_stick(window, held: float) -> bool:
+    """Whether no interface and no strip slips by more than `held` [m] to either side, or by the last digit."""
+    slips = np.column_stack([window.slip, slips_of(window)[0]])
+    return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_noise(window)))
+
+
+def joined_logs(logs, shifts) -> object:
+    """EventLogs of runs one after the other, begun `shifts` [s] later, with a border between them."""
+    from ..dynamics.events import event_list as listed
+
+    first = logs[0]
+    columns = {name: [] for name in ("time", "phase", "interface", "what", "slide")}
+    for number, (log, shift) in enumerate(zip(logs, shifts)):
+        border = {"time": shift, "phase": 0.0, "interface": -1, "what": listed.BORDER, "slide": 0.0}
+        for name, parts in columns.items():
+            if number:
+                parts.append([border[name]])
+            parts.append(getattr(log, name) + (shift if name == "time" else 0))
+    arrays = {name: np.concatenate(parts) for name, parts in columns.items()}
+    return type(first)(**arrays, count=sum(log.count for log in logs) + len(logs) - 1)

@@ -1,0 +1,85 @@
+"""The bench along a slide in two directions: the `lateral` column of slide.file beside its displacement."""
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...model.gap import shape_side
+from ...model.law import bonds_of
+from ...model.slide import lateral_corners
+from .ledger import _frame_numbers, _refuse_costly, _split, ledger_of
+
+
+def refuse(scene) -> None:
+    """PatchfemError naming what a slide in two directions cannot do yet."""
+    f, contact = scene.friction, scene.contact
+    reason = ""
+    if f.law != "nonlocal":
+        reason = f"law '{f.law}': use law 'nonlocal'"
+    elif f.spread is not None:
+        reason = "friction.spread, whose width turns with the path: leave one of them out"
+    elif f.breakaway:
+        reason = "friction.breakaway: leave one of them out"
+    elif contact is not None and contact.gives_way:
+        reason = f"{contact.gives_way}: leave one of them out"
+    elif contact is not None and shape_side(contact) == "lower":
+        reason = "the pressure on the lower piece: put the shapes on the upper piece"
+    elif scene.normal is not None and scene.normal.amplitude:
+        reason = "normal.amplitude: leave one of them out"
+    if reason:
+        raise PatchfemError(f"{scene.where('slide.file')}: a lateral column beside {reason}, or leave the column out; "
+                            "not yet built")
+
+
+def run_plane(scene, patch, time, slide, frames: int) -> tuple:
+    """((force, load, slip, ledger, frames, tau, local) as the bench has them along x, histories of the other direction
+    by name).
+
+    Pressure that rides on a rigid mover is constant at every point and the law is linear in it, so every point has the
+    traction of one point under unit pressure times its own. yaw_moment [N m]: sum of y f_x - x f_y, about +z of the
+    friction on the upper piece, f positive against its slip; strips have their places y over the width.
+    """
+    law = law_for(scene)
+    _refuse_costly(scene, law, time.size, 1, slide)
+    across = np.interp(time, *lateral_corners(scene))
+    q, one = np.stack([slide, across], axis=1), np.ones(1)
+    state, unit = law.start(one), np.zeros((time.size, 2))
+    work, stored, losses = np.zeros(time.size), np.zeros(time.size), np.zeros((time.size, 2))
+    for k in range(1, time.size):
+        step = law.step(state, q[k] - q[k - 1], one, one, time[k] - time[k - 1])
+        state = step.state
+        unit[k], stored[k] = law.traction(state)[:, 0], law.stored(state)[0]
+        work[k] = work[k - 1] + (q[k] - q[k - 1]) @ step.mean[:, 0]
+        losses[k] = _split(step.dissipated)
+    load, moment, roll = _pressed(scene, patch)
+    at = _frame_numbers(time.size, frames)
+    sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
+    give = law.law.length / law.law.static if law.law.static > 0 else 0.0
+    slip = slide - give * unit[:, 0]
+    local = np.where(sigma > 0, slip[at, None], slide[at, None])
+    more = {"lateral": across, "lateral_force": load * unit[:, 1]}
+    if patch is not None:
+        more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
+    return (load * unit[:, 0], np.full(time.size, load), slip, load * ledger_of(work, stored, losses), at,
+            np.outer(unit[at, 0], sigma), local), more
+
+
+def law_for(scene):
+    """The law object in two directions."""
+    law = bonds_of(scene)
+    if law.reading == "stretch" and law.order == 1:
+        from ...friction.bonds.plane import PlaneRecursion
+
+        return PlaneRecursion(law)
+    from ...friction.bonds.plane_quadrature import PlaneQuadrature
+
+    tail = scene.accuracy.tail if scene.accuracy.tail is not None else 1e-3 * scene.accuracy.tolerance
+    return PlaneQuadrature(law, tail)
+
+
+def _pressed(scene, patch) -> tuple:
+    """(load [N], sum f x, sum f y [N m]) of the pressure; y from the strips, 0 without them."""
+    if patch is None:
+        return scene.normal.load, 0.0, 0.0
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    roll = patch.strips.roll_moment if patch.strips is not None else 0.0
+    return float(force.sum()), float(force @ patch.x), roll

@@ -1,0 +1,31 @@
+"""Traction and local slip at every node of the interface, read back from elements or bond points."""
+
+import numpy as np
+
+from ..friction.bonds.parameters import Bonds
+
+
+def element_fields(patch, found, states, length: float) -> tuple:
+    """(traction, irreversible local slip), both (f, m), of a Jenkins set in states [(slide, stretch), ...]."""
+    m, weight = patch.x.size, patch.pieces.interface.weight
+    tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
+    for i, (slide, stretch) in enumerate(states):
+        force = np.zeros(m)
+        force[found.points] = found.share @ stretch
+        tau[i] = force / weight
+        local[i] = slide - patch.giving @ force
+        local[i, found.points] -= length * force[found.points] / found.limit
+    return tau, local
+
+
+def point_fields(patch, law: Bonds, shear, states) -> tuple:
+    """(traction, irreversible local slip), both (f, m), of bond points in states [(slide, bonds (4, a)), ...]."""
+    m = patch.x.size
+    index = np.arange(m) if shear is None else shear.points
+    tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
+    for i, (slide, bonds) in enumerate(states):
+        tau[i, index] = law.static / law.length * bonds[1]
+        local[i] = slide
+        stretch = np.divide(bonds[1], bonds[0], out=np.zeros(index.size), where=bonds[0] > 0)
+        local[i, index] = bonds[3] - stretch
+    return tau, local

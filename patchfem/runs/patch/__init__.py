@@ -1,0 +1,4 @@
+"""The static patch: condense, press, estimate errors on coarser meshes.
+
+Read `press` first, then `ladder` and `measures`.
+"""

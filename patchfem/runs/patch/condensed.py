@@ -1,0 +1,108 @@
+"""The two pieces of a scene: their meshes, materials and the compliance of their common interface."""
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from ...core import Compliance, Interface, frozen_array
+from ...elasticity import cache
+from ...elasticity.elasticity import Layers, assemble, interface_compliance
+from ...mesh.tensor import TensorGrid
+from ...model.pieces import layers_of
+
+LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pair:
+    """Two pieces condensed to their interface; everything about them that no load and no shape changes.
+
+    grid, piece: the lower piece, upper_grid, upper: the other one, the same objects where the pieces are alike;
+    TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all pairs together; closing
+    (m, m): normal closing per shear force on the interface [m/N], zero for like pieces. joint: the Mortar of pieces
+    whose interface nodes do not match, else None; rise (m,): gap [m] that rounded interfaces leave by themselves.
+    """
+
+    grid: object
+    upper_grid: object
+    piece: object
+    upper: object
+    compliance: Compliance
+    closing: np.ndarray
+    joint: object
+    rise: np.ndarray
+    seconds: dict
+
+    @property
+    def coupling(self) -> float:
+        """The largest normal closing per shear force over the largest slide per shear force."""
+        return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
+
+    def forces(self, nodal) -> tuple:
+        """(on the lower, on the upper piece): nodal forces (..., m) of the interface carried to each piece's nodes."""
+        if self.joint is None:
+            return nodal, nodal
+        return self.joint.forces(nodal)
+
+
+def finite_elements(body, layers: Layers):
+    """The assembled piece of a tensor grid (Piece) or of any mesh (Substructure)."""
+    if isinstance(body, TensorGrid):
+        return assemble(body.x, body.depth, body.coating_rows, layers)
+    from ...elasticity import substructure
+
+    return substructure.Substructure(body, layers)
+
+
+def compliance_of(body, piece, fresh: bool) -> tuple:
+    """(nn, tt, nt) of one piece; that of a large one from the cache of operators unless `fresh`."""
+    condense, large = interface_compliance, body.x.size >= LEAST_CACHED
+    if not isinstance(body, TensorGrid):
+        from ...elasticity.substructure import condense
+
+        large = len(body.points) >= LEAST_CACHED * LEAST_CACHED
+    if not large:
+        return condense(piece)
+    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers) if isinstance(body, TensorGrid) else \
+        cache.key_of_mesh(body, piece.layers)
+    found = None if fresh else cache.fetch(key, body.x.size)
+    if found is None:
+        found = condense(piece)
+        cache.keep(key, found)
+    return found
+
+
+def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
+    """Assemble and condense the pieces of a scene: bodies of `bodies_of`, the upper None where it is alike."""
+    contact = scene.contact
+    width = contact.width * contact.pairs
+    start = perf_counter()
+    piece = finite_elements(grid, layers_of(contact, "lower"))
+    upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(contact, "upper"))
+    assembled = perf_counter()
+    low = compliance_of(grid, piece, fresh)
+    high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
+    joint, x, share = None, grid.x, grid.tributary()
+    if upper_grid is not None and not _match(x, upper_grid.x):
+        from ...elasticity.mortar import mortar
+
+        joint = mortar(low, x, high, upper_grid.x)
+        x, share, parts = joint.x, joint.tributary, (joint.nn, joint.tt, joint.nt)
+    else:  # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
+        parts = (low[0] + high[0], low[1] + high[1], low[2] - high[2])
+    normal, tangential, closing = (frozen_array(part / width) for part in parts)
+    interface = Interface(frozen_array(x), frozen_array(share * width), width)
+    rise = sum(_rise(body, interface.x) for body in (grid, upper_grid or grid))
+    seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
+    pieces = Compliance(interface, normal, tangential)
+    return Pair(grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds)
+
+
+def _rise(body, x) -> np.ndarray:
+    rise = getattr(body, "rise", None)
+    return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)
+
+
+def _match(x, other) -> bool:
+    return other.size == x.size and np.abs(other - x).max() <= 1e-9 * np.ptp(x)

@@ -1,0 +1,80 @@
+"""A patch in strips over its width: one holder presses them all, and may roll."""
+
+import numpy as np
+
+from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
+from ...contact.strips_solve import smooth
+from ...core import Compliance, Pressure, frozen_array
+from .skin import borne
+
+
+def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
+    """(Compliance of all strips, Pressure of their means over the width, skin or None, StripsState).
+
+    The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
+    """
+    count, interface = contact.strips.count, pieces.interface
+    skin = law_of(contact)
+    by = contact.approach.distance if contact.approach is not None else None
+    one, _, weight = one_strip(pieces, count)
+    state = press_strips(one, interface.x, weight, strip_offsets(contact.width, count), gap, contact.strips.roll,
+                         contact.load if by is None else None, moment if by is None else None, by, angle,
+                         spring if by is None else 0.0, skin)
+    mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
+    answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
+                      state.moment, state.outcome, state.iterations, state.residuals)
+    return pieces, answer, skin if smooth(skin) else None, state
+
+
+def law_of(contact):
+    """The skin between the strips, None where they are bare."""
+    if contact.asperities is None:
+        return None
+    if contact.asperities.law == "linear":
+        from ...contact.skin_laws import LinearSkin
+
+        return LinearSkin(contact.asperities.normal_stiffness)
+    from .skin import skin_law
+
+    return skin_law(contact)
+
+
+def rotational_stiffness(state, c, x, weight) -> float:
+    """-dM/d(rotation) [N m/rad] of all strips at fixed approach and contact set; c (m, m) [m/N], weight (m,) of one."""
+    from ...slip import shear_modes
+
+    out = 0.0
+    for strip, force in enumerate(state.force):
+        stiff = None if state.stiffness is None else state.stiffness[strip] * weight
+        active = force > 0 if stiff is None else stiff > 1e-12 * (state.stiffness.max() * weight.max())
+        if active.any():
+            skin = 0.0 if stiff is None else np.diag(1 / np.where(active, stiff, 1.0))
+            out += shear_modes.rotational_stiffness(c + skin, x, active)
+    return out
+
+
+def strip_values(patch, peak_of) -> dict:
+    """name -> value of what strips change: peak of any strip, share of the area, stiffnesses, and the lateral place of
+    the pressure with its roll moment. peak_of: largest pressure of one strip from (x, pressure)."""
+    state, pieces = patch.strips, patch.pair.compliance
+    count = len(state.offsets)
+    weight = pieces.interface.weight / count
+    pressed = borne(state.pressure) if smooth(patch.skin) else state.pressure
+    fraction = float((pressed > 0).mean(axis=0) @ weight / weight.sum())
+    out = {"contact_fraction": fraction, "pressure_centre_lateral": state.centre_y,
+           "roll_moment": state.roll_moment}
+    out["pressure_peak"] = max(peak_of(patch.x, row) for row in state.pressure)
+    if not state.load > 0:
+        return out | {"loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0,
+                      "rotational_stiffness": 0.0}
+    out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])
+    ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
+    out["normal_stiffness"] = strips_tangent(pieces.normal * count, weight, state)
+    out["rotational_stiffness"] = rotational_stiffness(state, pieces.normal * count, patch.x, weight)
+    out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state, ratio)
+    return out
+
+
+def strip_loads(patch) -> np.ndarray:
+    """Normal load of every strip of a solved patch (s,) [N]."""
+    return patch.strips.force.sum(axis=1)

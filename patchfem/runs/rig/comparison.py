@@ -1,0 +1,174 @@
+"""The report's own and other comparison methods under a scene: their steps as a run, with the warnings they deserve."""
+
+from dataclasses import replace
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+
+from ...core import Outcome, PatchfemError
+from ...dynamics.march.march import hermite_extremes
+from ...model.interfaces import limits, loads_of, viewed
+from ...model.structure import mode_stiffness
+from ...response import run_events
+from ...response.measures import harmonic, interface_loop, run_measures, slip_measures, window_amplitudes, window_ends
+from ...response.outcome import steady_of
+from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
+from .strips import other_measures
+
+TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
+
+
+def laws_of(scene, load: float) -> list:
+    """A law of dynamics.point_laws per interface; PatchfemError for laws with a memory of bonds."""
+    from ...dynamics.comparison import point_laws
+
+    out = []
+    if scene.friction is None:
+        return out
+    for k, n in enumerate(loads_of(scene) if scene.structure.interface else [load]):
+        f, (static, kinetic) = viewed(scene, k).friction, limits(scene, k, n)
+        if f.law == "coulomb":
+            out.append(point_laws.Coulomb(static, kinetic, scene.accuracy.stick_speed or 0.0))
+        elif f.law == "tanh":
+            out.append(point_laws.Tanh(static, f.reference_speed))
+        elif f.law == "elastic-plastic":
+            out.append(point_laws.ElasticPlastic(static, f.bond_length))
+        else:
+            raise PatchfemError(f"{scene.where('accuracy.method')}: '{scene.accuracy.method}' takes law 'coulomb', "
+                                f"'tanh' or 'elastic-plastic', not '{f.law}'; use method = \"march\"")
+    return out
+
+
+def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=None, progress=None):
+    """march.Raw of a comparison method at settings.steps per cycle; arguments as `march.run_march`."""
+    from ...compiled import load
+    from ...model.structure import start_of
+    from .march import Raw
+
+    load("dynamics.comparison.comparison_kernels", say)
+    bears = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
+    laws, start, begin = laws_of(scene, bears), start_of(scene, modes), perf_counter()
+    done = _integrated(scene, settings, modes, drive, laws, start)
+    response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
+    beyond = np.flatnonzero(np.abs(response.output) > (scene.structure.travel or np.inf))
+    if beyond.size and 0 < beyond[0] < response.time.size - 1:  # the run ends at the first step beyond the stop
+        cut = replace(settings, cycles=response.time[beyond[0]] / drive.period)
+        done = _integrated(scene, cut, modes, drive, laws, start)
+        response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
+    n, window = settings.steps, settings.window
+    first = max(0, response.time.size - 1 - window * n)
+    kept = _cut(response, slice(first, None))
+    extremes, phasors = _cycles(response, n)
+    last = min(window, len(extremes))
+    book = _book(done)
+    values = run_measures(kept, extremes, book, drive, last)
+    stuck, own = False, {}
+    if scene.friction is None:
+        values.pop("friction_force_peak")
+    else:
+        values |= _rubbing(scene, kept, drive, n, bears) | other_measures(kept, drive, n)
+        values |= {"friction_work": book["friction"], "energy_dissipated": book["friction"], "energy_created": 0.0}
+        stuck = run_events.all_stick(kept, 0.0) and scene.friction.law != "tanh"
+        rings, own = run_events.rings(kept, modes, drive)
+        values |= rings
+    outcome = _outcome(scene, done, response)
+    ends = window_ends(extremes, phasors, window)
+    return Raw(values, response, kept, window_amplitudes(extremes, window),
+               steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
+               perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
+
+
+def _integrated(scene, settings, modes, drive, laws, start):
+    accuracy, duration = scene.accuracy, settings.cycles * drive.period
+    if not laws:
+        from ...dynamics.comparison.point_laws import Coulomb
+
+        laws = [Coulomb(1e-300, 1e-300)] * len(modes.interfaces)
+    if accuracy.method == "duhamel":
+        from ...dynamics.comparison import duhamel
+
+        criterion = accuracy.convergence or "force"
+        speed, omega = peak_speed(drive, start), omega_of(drive)
+        unit = {"displacement": speed / omega, "velocity": speed, "force": max(law.limit for law in laws)}[criterion]
+        return duhamel.run(modes, drive, laws, duration, settings.steps, criterion,
+                           (accuracy.convergence_tolerance or TOLERANCE) * unit, start=start)
+    if accuracy.method == "newmark":
+        from ...dynamics.comparison import newmark
+
+        return newmark.run(modes, drive, laws, duration, settings.steps, accuracy.stick_speed, start=start)
+    from ...dynamics.comparison import euler
+
+    return euler.run(modes, drive, laws, duration, settings.steps, start)
+
+
+def _with_interfaces(response, modes):
+    """With slides, slide_rates and forces (k, i) of every interface where there are several."""
+    extra = {name: response.extra[name] for name in ("residual", "iterations")}
+    if len(modes.interfaces) > 1:
+        faces = modes.interfaces.T
+        extra |= {"slides": response.modal @ faces, "slide_rates": response.modal_rate @ faces,
+                  "forces": response.extra["forces"].T}
+    return replace(response, extra=extra)
+
+
+def _with_slip(response, laws):
+    """The irreversible slip of elastic-plastic interfaces in place of their slide."""
+    from ...dynamics.comparison.point_laws import ElasticPlastic
+
+    give = np.array([law.length / law.limit if isinstance(law, ElasticPlastic) else 0.0 for law in laws])
+    if not give.any():
+        return response
+    extra = response.extra
+    if "slides" in extra:
+        extra = extra | {"slips": extra["slides"] - extra["forces"] * give}
+    return replace(response, slip=response.slide - response.force * give[0], extra=extra)
+
+
+def _cut(response, part):
+    from dataclasses import fields
+
+    kept = {f.name: getattr(response, f.name)[part] for f in fields(response) if f.name != "extra"}
+    extra = {name: values[part] for name, values in response.extra.items() if len(values) == response.time.size}
+    return type(response)(**kept, extra=extra)
+
+
+def _cycles(response, n: int) -> tuple:
+    """(extremes (c, 2), phasors (c,)) of the output, the partial cycle first."""
+    edges = np.arange(response.time.size - 1, 0, -n)[::-1]
+    edges = np.concatenate([[0], edges]) if edges[0] else edges
+    dt, low_high, phasors = response.time[1] - response.time[0], [], []
+    for a, b in pairwise(edges):
+        y, v = response.output[a:b + 1], response.output_rate[a:b + 1]
+        low_high.append(hermite_extremes(y, v, dt))
+        phasors.append(2 * np.mean(y[:-1] * np.exp(-2j * np.pi * np.arange(a, b) / n)))
+    return np.array(low_high), np.array(phasors)
+
+
+def _book(done) -> dict:
+    book = {name: float(done.ledger[name]) for name in ("work_in", "viscous", "friction", "stored")}
+    return book | {"power": abs(book["work_in"]) + abs(book["friction"]), "peak_stored": abs(book["stored"]),
+                   "iterations": float(done.iterations.sum())}
+
+
+def _rubbing(scene, window, drive, n: int, load: float) -> dict:
+    """Measures of the first interface over the window; loops by the trapezoidal rule."""
+    values = slip_measures(window, drive, n) | {"normal_load": load}
+    if not sinusoidal(drive):
+        values.pop("slip_start_phase", None)
+    span = window.time[-1] - window.time[0]
+    if whole(span, drive):
+        weight = np.full(window.time.size, 1.0)
+        weight[[0, -1]] = 0.5
+        omega = omega_of(drive)
+        q, f = (harmonic(window.time, weight, y, omega) for y in (window.slide - window.slide.mean(), window.force))
+        work = float(np.trapezoid(window.force, window.slide)) * drive.period / span
+        values |= interface_loop(window.slide, q, f, work, mode_stiffness(scene))
+    return values
+
+
+def _outcome(scene, done, response):
+    if not np.isfinite(response.slide[-1]) or (scene.accuracy.method == "duhamel" and done.failures):
+        return Outcome.NOT_CONVERGED
+    travel = scene.structure.travel or np.inf
+    return Outcome.EXCEEDS_TRAVEL if np.abs(response.output).max() > travel else None

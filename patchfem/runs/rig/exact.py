@@ -1,0 +1,189 @@
+"""The exact engine under a scene: Coulomb friction from event to event, one mode by its own fast engine."""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from ...core import BaseSine, Outcome, Start
+from ...model.interfaces import limits, loads_of, yaws
+from ...model.structure import mode_stiffness
+from ...response import run_events
+from ...response.levels import Level
+from ...response.measures import (
+    circular_mean,
+    harmonic,
+    interface_loop,
+    ledger_measures,
+    run_measures,
+    swing,
+    window_amplitudes,
+    window_ends,
+)
+from ...response.outcome import steady_of
+from ...structure.drive_sizes import omega_of, sinusoidal, whole
+from ..patch.strips import strip_loads
+from . import levels as rig_levels
+from .strips import as_one, other_measures
+
+
+def run_exact(scene, settings, modes, drive, load: float, start=None, progress=None, share: float = 1.0, say=None,
+              patch=None):
+    """runs.rig.march.Raw of a Coulomb scene, or of a structure without friction; load [N] of [contact] or [normal];
+    share: of mu N that the law keeps; patch: the solved Patch, of which strips that yaw take their loads."""
+    from .march import Raw
+
+    begin, forces = perf_counter(), _forces(scene, modes, load, share, patch)
+    if rig_levels.ends(scene):
+        done, levels, slips = _levels(scene, settings, modes, drive, forces, start, progress, say)
+    else:
+        done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
+        levels, slips = (), None
+        done = _whole(_over_strips(done, patch) if yaws(scene) else done)
+    values, stuck = _values(scene, settings, drive, done, load)
+    rubs = scene.friction is not None
+    rings, own = run_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
+    values |= rings
+    outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    ends = window_ends(done.amplitudes, done.phasors, settings.window)
+    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
+               steady_of(drive, *ends), outcome, [], done.ledger, perf_counter() - begin,
+               levels=levels, slips=slips, log=done.log, own=own)
+
+
+def _forces(scene, modes, load: float, share: float, patch=None) -> tuple:
+    """(static, kinetic) friction [N] of every interface (i,)."""
+    if yaws(scene):
+        return tuple(np.array(column) for column in zip(*(limits(scene, 0, n) for n in strip_loads(patch))))
+    if scene.friction is None:
+        return (np.zeros(len(modes.interfaces)),) * 2
+    if scene.structure.interface:
+        pairs = [limits(scene, k, n) for k, n in enumerate(loads_of(scene))]
+    else:
+        static, kinetic = limits(scene, 0, load)
+        pairs = [(static * share, kinetic if scene.friction.kinetic is not None else static * share)]
+    return tuple(np.array(column) for column in zip(*pairs))
+
+
+def _over_strips(done, patch):
+    """An EventRun of strips as that of the patch: loops from the samples of the window, both sides of every event."""
+    loads, offsets = strip_loads(patch), patch.strips.offsets
+    window = as_one(done.window, loads, offsets)
+    gaps = np.diff(window.time)
+    weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
+    held = ~window.extra["slide_rates"].any(axis=1)
+    return replace(done, response=as_one(done.response, loads, offsets), window=window, stick=float(weight[held].sum()),
+                   loop=(window.time, weight, window.slide, window.slide_rate, window.force))
+
+
+def _go(scene, modes, drive, forces, cycles: float, window: int, start, progress, say):
+    travel = scene.structure.travel or np.inf
+    if modes.omega.size == 1 and len(modes.interfaces) == 1:
+        from ...dynamics.events import sdof
+
+        fast = cycles > sdof.COMPILED_FROM
+        if fast:
+            from ...compiled import load
+
+            load("dynamics.events.event_kernels", say)
+        return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
+                             start, fast)
+    from ...dynamics.events.histories import simulate
+
+    return simulate(modes, drive, *forces, cycles, window, travel, progress, start)
+
+
+def _values(scene, settings, drive, done, load: float) -> tuple:
+    """(measures, whether nothing slipped) of the window of an event-driven run."""
+    last = min(settings.window, len(done.amplitudes))
+    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
+    span = done.window.time[-1] - done.window.time[0]
+    if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
+        values["relative_displacement_amplitude"] = swing(done.window)
+    if scene.friction is None:
+        values.pop("friction_force_peak")
+        return values, False
+    slip, lost = done.window.slip, done.ledger["friction"]
+    ledger = ledger_measures(np.array([[lost], [0.0], [lost], [0.0]]))
+    ledger.pop("energy_stored")
+    values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
+               "normal_load": load, **ledger}
+    if done.starts.size and sinusoidal(drive):
+        values["slip_start_phase"] = circular_mean(done.starts)
+    time, weight, slide, rate, force = done.loop
+    power = force * rate
+    if yaws(scene):  # of every strip: a yaw works besides the mean slide
+        power = (done.window.extra["forces"] * done.window.extra["slide_rates"]).sum(axis=1)
+    work = float(weight @ power) * drive.period / span
+    if whole(span, drive):
+        omega = omega_of(drive)
+        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
+        values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
+    if not yaws(scene):
+        values |= other_measures(done.window, drive, 400, done.log)
+        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
+    others = any(run_events.moving(done.window, drive, done.log)[1:])
+    return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _whole(done):
+    """The run without the extremes and the phasor of a last cycle that is cut short."""
+    count = int(done.cycles_done + 1e-9)
+    if not count or count >= len(done.amplitudes):
+        return done
+    return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
+
+
+def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tuple:
+    """(EventRun of all levels one after the other, their Levels, slips as `rig_levels.onset` asks)."""
+    cycles, states, parts, levels = rig_levels.ends(scene)[0], [start], [], []
+
+    def go(level, state, watch=None):
+        sine = BaseSine(level, omega_of(drive), drive.moving)
+        return _go(scene, modes, sine, forces, cycles, settings.window, state, watch, say), sine
+
+    for k, level in enumerate(scene.drive.levels):
+        share = None if progress is None else (lambda part, k=k: progress((k + part) / len(scene.drive.levels)))
+        done, sine = go(level, states[-1], share)
+        values, stuck = _values(scene, settings, sine, done, 0.0)
+        kept = {name: values[name] for name in rig_levels.KEPT if name in values}
+        levels.append(Level(level, stuck, kept, {name: 1e-9 * abs(value) for name, value in kept.items()}))
+        parts.append(done)
+        states.append(Start(done.response.modal[-1], done.response.modal_rate[-1]))
+        if done.outcome is not None:
+            break
+
+    def slips(number, level):
+        return not _values(scene, settings, *go(level, states[number + 1])[::-1], 0.0)[1]
+
+    return _joined(parts, cycles * drive.period), tuple(levels), slips
+
+
+def _joined(parts, each: float):
+    """Runs of `each` [s] one after the other as one EventRun; its window and loop are those of the last."""
+    shift = [k * each for k in range(len(parts))]
+    last, rows = parts[-1], [slice(None, -1)] * (len(parts) - 1) + [slice(None)]  # where one ends the next begins
+
+    def column(of):
+        return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])
+
+    columns = {name: column(lambda p, name=name: getattr(p.response, name))
+               for name in type(last.response).__dataclass_fields__ if name not in ("time", "extra")}
+    time = np.concatenate([_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)])
+    extra = {name: column(lambda p, name=name: p.response.extra[name]) for name in last.response.extra}
+    response = replace(last.response, time=time, extra=extra, **columns)
+    window = replace(last.window, time=_later(last.window.time, shift[-1]))
+    ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
+    ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
+    return replace(last, response=response, window=window, ledger=ledger,
+                   log=run_events.joined_logs([p.log for p in parts], shift),
+                   amplitudes=np.concatenate([p.amplitudes for p in parts]),
+                   phasors=np.concatenate([p.phasors for p in parts]), events=sum(p.events for p in parts))
+
+
+def _later(time, shift: float):
+    """Times moved by `shift` [s], the two sides of an event still apart."""
+    moved = time + shift
+    before = np.flatnonzero(moved[1:] <= moved[:-1])
+    moved[before] = np.nextafter(moved[before], -np.inf)
+    return moved

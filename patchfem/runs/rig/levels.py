@@ -1,0 +1,78 @@
+"""Levels: the level of the drive changed in steps with the state carried over, and the onset of slip between two."""
+
+from dataclasses import replace
+
+from ...core import Measure
+from ...model import drive as model_drive
+from ...response.levels import KEPT, Level, bracket, hysteresis, jump
+from ...response.measures import run_measures
+
+MOST = 40  # halvings of the bracket of an onset
+
+
+def ends(scene) -> tuple:
+    """Cycles after which the levels of a scene end; () without levels."""
+    drive = scene.drive
+    if drive.kind != "base" or drive.waveform != "levels":
+        return ()
+    each = model_drive.cycles_per_level(scene)
+    return tuple(each * (k + 1) for k in range(len(drive.levels)))
+
+
+def rows(scene, marks, drive, held: float, rubbing) -> tuple:
+    """A Level per Mark of a march; held [m]: slip amplitude below which a level sticks; rubbing(mark): its measures of
+    the interface."""
+    out = []
+    for size, mark in zip(scene.drive.levels, marks):
+        values = run_measures(mark.window, mark.amplitudes, mark.ledger, drive, len(mark.amplitudes))
+        if rubbing is not None:
+            values |= rubbing(mark)
+        kept = {name: values[name] for name in KEPT if name in values}
+        out.append(Level(size, rubbing is not None and values["slip_amplitude"] < held, kept, {}))
+    return tuple(out)
+
+
+def with_errors(fine, half, quarter, steps: int) -> tuple:
+    """The levels with the error of the time step, as `response.errors.step_error` has it."""
+    from ...response.errors import step_error
+
+    return tuple(replace(a, errors=step_error(a.values, b.values, c.values, steps))
+                 for a, b, c in zip(fine, half, quarter))
+
+
+def onset(scene, levels, slips, tolerance: float) -> tuple | None:
+    """(onset [m s-2], half its bracket) by halving between the last level that held and the first that slips.
+
+    slips(number of the level that held or -1, level) -> bool runs one more level from the state that it left.
+    """
+    found = bracket(levels)
+    if found is None:
+        return None
+    held, first = found
+    low, high = levels[held].drive if held >= 0 else 0.0, levels[first].drive
+    for _ in range(MOST):
+        if high - low <= tolerance * high:
+            break
+        middle = (low + high) / 2
+        if slips(held, middle):
+            high = middle
+        else:
+            low = middle
+    return (low + high) / 2, (high - low) / 2
+
+
+def drive_with(drive, number: int, level: float):
+    """The drive with the level of this number [m s-2] in place of its own, and none after it."""
+    return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
+
+
+def measures(levels, found: tuple | None) -> dict:
+    """Measures over all levels: onset_level, jump_level, level_hysteresis, as far as there are any."""
+    out = {}
+    if found is not None:
+        out["onset_level"] = Measure(found[0], "m s-2", found[1], 1e-9)
+    if (leap := jump(levels)) is not None:
+        out["jump_level"] = Measure(leap[0], "m s-2", float(leap[2]), float(leap[2]))  # it lies between two levels
+    if (loop := hysteresis(levels)) is not None:
+        out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
+    return out

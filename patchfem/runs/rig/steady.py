@@ -1,0 +1,230 @@
+"""method = "harmonic": the steady motion of a scene found directly, and its curve over frequency or level.
+
+Coulomb interfaces by shooting on the map of their events, other laws by harmonic balance. What is found is a motion
+that repeats with the drive; its regime, multipliers and stability are named.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from ...core import BaseSine, Measure, Outcome, PatchfemError
+from ...model.structure import mode_stiffness
+from ...response.measures import harmonic, interface_loop, run_measures, slip_measures
+from .strips import other_measures
+
+SAMPLES = 1024  # of the cycle that measures are read off
+POINTS = 121  # of a curve by the event map
+
+
+def refuse(scene, drive) -> None:
+    """PatchfemError where no steady motion can be asked for."""
+    where, waveform = scene.where("accuracy.method"), scene.drive.waveform
+    if scene.drive.kind == "free" or waveform not in ("sine", "sweep", "levels"):
+        raise PatchfemError(f"{where}: 'harmonic' finds the steady motion under a sine, or its curve over a sweep or "
+                            "over levels; use method = \"march\"")
+    if waveform == "sweep" and drive.displacement is not None:
+        raise PatchfemError(f"{where}: 'harmonic' keeps the acceleration over a sweep; give drive.acceleration")
+
+
+def steady(scene, settings, modes, drive, patch, load: float, say=None):
+    """(march.Raw, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on
+    a curve over a sweep or over levels, whose sine is extra["at"]."""
+    refuse(scene, drive)
+    from ...model.engine import no_closed_form
+
+    sine = drive if isinstance(drive, BaseSine) else None
+    shear = scene.contact.gives_way if scene.contact is not None else ""
+    at_sine = sine or BaseSine(1.0, 1.0, drive.moving)
+    if scene.friction is None or not no_closed_form(scene, at_sine, shear):
+        finder = _Events(scene, settings, modes, load, say)
+    else:
+        finder = _Balance(scene, settings, modes, drive, patch, say)
+    if sine is not None:
+        return finder.point(sine)
+    curve, best, near = finder.curve(drive)
+    raw, errors, extra = finder.point(best, near)
+    return raw, errors, extra | {"curve": curve, "at": best}
+
+
+def drives_of(drive, count: int) -> list:
+    """Sines of a curve: over a sweep `count` frequencies from end to end, over levels each of them."""
+    if hasattr(drive, "low"):
+        space = np.geomspace if drive.logarithmic else np.linspace
+        return [BaseSine(drive.acceleration, 2 * np.pi * f, drive.moving) for f in space(drive.low, drive.high, count)]
+    return [BaseSine(s.amplitude, s.omega, drive.moving) for s in drive.segments]
+
+
+class _Events:
+    """Coulomb interfaces, or none at all, by the event map."""
+
+    def __init__(self, scene, settings, modes, load, say):
+        from .exact import _forces
+
+        self.scene, self.settings, self.modes, self.load, self.say = scene, settings, modes, load, say
+        self.forces = _forces(scene, modes, load, 1.0)
+
+    def found(self, drive, start=None):
+        """dynamics.steady_events.Steady."""
+        from ...dynamics.events.steady_events import steady
+
+        return steady(self.modes, drive, *self.forces, start=start)
+
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion, found from the start `near`, as a run of the exact engine that begins in it."""
+        from .exact import run_exact
+
+        begin = perf_counter()
+        found = self.found(drive, near)
+        few = replace(self.settings, cycles=2.0, window=1)
+        raw = run_exact(self.scene, few, self.modes, drive, self.load, found.start)
+        outcome = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}.get(found.regime, Outcome.STEADY)
+        extra = {"regime": found.regime, "multipliers": found.multipliers, "residual": found.residual}
+        raw = replace(raw, outcome=outcome, book=raw.book | {"iterations": 0.0}, seconds=perf_counter() - begin)
+        return raw, {name: abs(v) * (1e-9 + found.residual) for name, v in raw.values.items()}, extra
+
+    def curve(self, drive) -> tuple:
+        """(curve as arrays by name, the sine of its largest amplitude, None: the motion there is the only one)."""
+        drives = drives_of(drive, POINTS)
+        if self.modes.omega.size == 1 and len(self.modes.interfaces) == 1:
+            curve = self._single(drives)
+        else:
+            names = ("frequency", "level", "amplitude", "regime", "multiplier")
+            rows = [self._row(one) for one in drives]
+            curve = {name: np.array(column) for name, column in zip(names, zip(*rows))}
+        finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
+        return curve, drives[int(np.argmax(finite))], None
+
+    def _single(self, drives) -> dict:
+        """The curve of one mode by its own map, compiled."""
+        from ...compiled import load
+
+        load("dynamics.events.steady_kernels", self.say)
+        from ...dynamics.events.steady import response
+
+        found = response(self.modes, drives, float(self.forces[0][0]), float(self.forces[1][0]))
+        names = [f"{stops:g} stops" if str(regime) == "stops" else str(regime)
+                 for regime, stops in zip(found.regime, found.stops)]
+        return {"frequency": found.omega / (2 * np.pi), "level": np.array([one.acceleration for one in drives]),
+                "amplitude": found.amplitude, "regime": np.array(names), "multiplier": np.abs(found.multiplier)}
+
+    def _row(self, drive) -> tuple:
+        found = self.found(drive)
+        bounded = found.regime != "unbounded"
+        return (drive.omega / (2 * np.pi), drive.acceleration, found.amplitude if bounded else np.nan, found.regime,
+                float(np.abs(found.multipliers).max(initial=0.0)))
+
+
+class _Balance:
+    """Laws with memory and springs that bend, by harmonic balance."""
+
+    def __init__(self, scene, settings, modes, drive, patch, say):
+        from ...compiled import load
+        from .interface import contact_model
+
+        load("dynamics.harmonic.cycle_kernels", say)
+        from ...dynamics.harmonic.forces import Group
+        from ...dynamics.harmonic.laws import Interlock, Spring
+
+        structure = scene.structure
+        if len(modes.interfaces) > 1:
+            raise PatchfemError(f"{scene.where('accuracy.method')}: 'harmonic' with several interfaces of laws other "
+                                "than 'coulomb': not yet built; use method = \"march\"")
+        parts = []
+        if scene.friction is not None:
+            parts.append((0, contact_model(scene, settings, patch, drive)))
+        if structure.bonded is not None and structure.bonded.wavelength is not None:
+            parts.append((0, Interlock(structure.bonded.stiffness, structure.bonded.wavelength)))
+        if structure.stiffening is not None:
+            parts.append((modes.output, Spring(0.0, structure.stiffening.cubic)))
+        self.scene, self.settings, self.modes, self.patch = scene, settings, modes, patch
+        self.group, self.tolerance = Group(modes, parts), scene.accuracy.tolerance
+
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle;
+        errors from half the harmonics and the balance's own."""
+        from ...dynamics.harmonic.balance import regime
+        from ...dynamics.harmonic.point import point
+        from ...dynamics.harmonic.stability import with_stability
+        from .march import Raw
+
+        begin = perf_counter()
+        found = point(self.modes, drive, self.group, self.scene.accuracy.harmonics, self.tolerance,
+                      start=near)
+        fewer = point(self.modes, drive, self.group, max(1, found.harmonics // 2), self.tolerance, start=near and found)
+        stable = with_stability(found, self.modes)
+        values, response, book = self._measured(found, drive)
+        rough = self._measured(fewer, drive)[0]
+        # the higher harmonics follow those of `found`, not those of `fewer`: measured, 20 times less is left out
+        errors = {name: abs(v - rough.get(name, v)) / 10 + abs(v) * min(found.error, 1.0) for name, v in values.items()}
+        if "slip_start_phase" in errors:
+            errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / SAMPLES
+            errors["stick_fraction"] = errors.get("stick_fraction", 0.0) + 4 / SAMPLES
+        name, _ = regime(found)
+        held = name == "stuck"
+        extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
+                 "residual": found.residual, "harmonics": found.harmonics}
+        amplitude = np.array([values["relative_displacement_amplitude"]])
+        raw = Raw(values, response, response, amplitude, (None, None), Outcome.STUCK if held else Outcome.STEADY, [],
+                  book, perf_counter() - begin)
+        return raw, errors, extra
+
+    def _measured(self, found, drive) -> tuple:
+        from ...dynamics.harmonic.balance import cycle_energy, periodic_response
+
+        response = periodic_response(found, self.modes, drive, SAMPLES)
+        if not drive.moving:
+            response = replace(response, base_acceleration=0 * response.base_acceleration)
+        book = cycle_energy(found, self.modes) | {"stored": 0.0, "iterations": float(found.iterations)}
+        speed = np.arange(len(found.modal))[:, None] * found.omega * np.abs(found.modal)
+        book |= {"power": abs(book["work_in"]), "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2))}
+        top = found.amplitude(self.modes.output)
+        middle = (response.output.max() + response.output.min()) / 2
+        extremes = np.array([[middle - top, middle + top]])
+        values = run_measures(response, extremes, book, drive, 1)
+        values["drift_per_cycle"] = 0.0
+        if self.scene.friction is None:
+            values.pop("friction_force_peak")
+            return values, response, book
+        values |= slip_measures(response, drive, SAMPLES) | other_measures(response, drive, SAMPLES)
+        weight = np.full(response.time.size, 1.0)
+        weight[[0, -1]] = 0.5
+        q, f = (harmonic(response.time, weight, y, drive.omega) for y in (response.slide, response.force))
+        bears = self.patch.pressure.load if self.patch is not None else self.scene.normal.load
+        values |= interface_loop(response.slide, q, f, book["friction"], mode_stiffness(self.scene))
+        return values | {"normal_load": bears}, response, book
+
+    def curve(self, drive) -> tuple:
+        """(curve as arrays by name through its folds, the sine of its largest amplitude, the point there)."""
+        from ...dynamics.harmonic.branch import levels, response
+
+        if hasattr(drive, "low"):
+            first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
+            branch = response(self.modes, first, self.group, (drive.low, drive.high), self.scene.accuracy.harmonics,
+                              self.tolerance, True)
+        else:
+            sizes = [s.amplitude for s in drive.segments]
+            first = BaseSine(sizes[0], drive.segments[0].omega, drive.moving)
+            branch = levels(self.modes, first, self.group, sizes if len(sizes) != 2 else [sizes[0], np.mean(sizes),
+                            sizes[1]], self.scene.accuracy.harmonics, self.tolerance, True)
+        amplitude = branch.amplitudes(self.modes.output)
+        curve = {"frequency": np.array([p.omega / (2 * np.pi) for p in branch.points]),
+                 "level": np.array([p.level for p in branch.points]), "amplitude": amplitude,
+                 "regime": np.array(["stable" if p.stable else "unstable" for p in branch.points]),
+                 "multiplier": np.array([np.abs(p.multipliers).max(initial=0.0) for p in branch.points]),
+                 "folds": np.array(branch.folds)}
+        best = branch.points[int(np.argmax(amplitude))]
+        return curve, BaseSine(best.level, best.omega, drive.moving), best
+
+
+def curve_measures(extra: dict) -> dict:
+    """Measures of a curve: where its largest amplitude lies."""
+    curve = extra.get("curve")
+    if curve is None:
+        return {}
+    finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
+    k = int(np.argmax(finite))
+    spacing = float(np.abs(np.diff(curve["frequency"])).max(initial=0.0))
+    return {"peak_frequency": Measure(float(curve["frequency"][k]), "Hz", spacing, spacing)}
+

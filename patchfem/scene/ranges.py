@@ -1,0 +1,95 @@
+"""Numeric keys of a scene with a range each, as written `table.key=low..high`, by the unit rules of the scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from . import quantities
+from .reader import _message, _owner, _set_value
+from .types import choices, keys, kind_of, model_of, parts
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """A key with low < high in SI; unit "" for a plain number."""
+
+    key: str
+    low: float
+    high: float
+    kind: str | None
+
+    @property
+    def unit(self) -> str:
+        """The SI unit of the key."""
+        return next(iter(quantities.KINDS[self.kind])) if self.kind else "1"
+
+    def assigned(self, value: float) -> str:
+        """`table.key=value` as --set reads it, to the last bit."""
+        text = quantities.format_si(value, self.kind) if self.kind else repr(float(value))
+        return f"{self.key}={text}"
+
+
+def ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
+    """(ranges, mistakes) of texts that each hold one or more `table.key=low..high`, separated by commas."""
+    found, wrong = [], []
+    for one in (part.strip() for text in texts for part in text.split(",")):
+        try:
+            found.append(_range(one))
+        except ValueError as error:
+            wrong.append(f"--free {error}")
+    named = [one.key for one in found]
+    wrong += [f"--free {key}: stands twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+    if not found and not wrong:
+        wrong.append("--free: at least one table.key=low..high is wanted, such as friction.static=0.1..0.6")
+    return found, wrong
+
+
+def _range(text: str) -> Range:
+    key, equals, bounds = (part.strip() for part in text.partition("="))
+    low, dots, high = (part.strip() for part in bounds.partition(".."))
+    if not equals or not dots or not low or not high:
+        raise ValueError(f"{text}: table.key=low..high is wanted, such as friction.bond_length=0.2 um..20 um")
+    model, name = _numeric(key)
+    a, b = (_value(model, name, key, one) for one in (low, high))
+    if not a < b:
+        raise ValueError(f"{key}: the low bound {low} must lie below the high bound {high}")
+    return Range(key, a, b, kind_of(model, name))
+
+
+def _numeric(key: str) -> tuple:
+    """Model and attribute of a key that holds one number; ValueError with the nearest known key otherwise."""
+    model, name = _owner(key)
+    if model is None:
+        table, _, last = key.rpartition(".")
+        owner, at = _owner(table) if table else (None, "")
+        inner = model_of(owner, at) if owner is not None else None
+        help = f"; {choices(last, keys(inner))}" if inner is not None else ""
+        raise ValueError(f"{key}: not a key of a scene{help}")
+    annotation = model.model_fields[name].annotation
+    types = (annotation, *parts(annotation))
+    if model_of(model, name) is not None or tuple in types or float not in types:
+        raise ValueError(f"{key}: holds no number that can vary; quantities and plain numbers can be free")
+    return model, name
+
+
+def _value(model: Any, name: str, key: str, text: str) -> float:
+    written = _set_value(key, text)
+    if isinstance(written, int) and not isinstance(written, bool):
+        written = float(written)
+    good: dict[str, Any] = {}
+    alias = model.model_fields[name].alias or name
+    try:
+        model.model_validate({alias: written}, context=good)
+    except ValidationError as caught:
+        for error in caught.errors(include_url=False):
+            if error["loc"][0] == alias and error["type"] != "missing":
+                raise ValueError(f"{key}: {_message(model, name, error, written)}") from None
+    value = good.get(name)
+    if not isinstance(value, float) or not math.isfinite(value):
+        raise ValueError(f"{key}: '{text}' is not a finite number")
+    return value

@@ -1,0 +1,309 @@
+"""From the plain values of a TOML file to the models, noting every mistake with its line."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import ValidationError
+
+from . import quantities
+from .tables import Material, Tables
+from .types import Table, choices, keys, kind_of, model_of, parts
+
+_LAST = 10**9  # sorts the mistakes of --set behind those of the file
+
+
+class Draft:
+    """A scene being read: what was written, the tables as far as they are right, the mistakes found so far."""
+
+    def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
+        self.path, self.lines, self.raw = path, lines, raw
+        self.sets: set[str] = set()
+        self.tables = Tables.model_construct()
+        self.mistakes: list[tuple[int, str]] = []
+        self.remarks: list[str] = []
+
+    def read(self) -> None:
+        """Read all tables; mistakes are noted, values that are wrong stay None."""
+        self.tables = _table(self, Tables, self.raw, "")
+
+    def given(self, key: str) -> bool:
+        """Whether the key or table was written, right or wrong."""
+        return self.value(key) is not None
+
+    def value(self, key: str) -> Any:
+        """What was written at a dotted key; None if nothing."""
+        value: Any = self.raw
+        for part in key.split("."):
+            if isinstance(value, list):
+                value = value[int(part)] if part.isdecimal() and int(part) < len(value) else None
+            else:
+                value = value.get(part) if isinstance(value, dict) else None
+        return value
+
+    def say(self, key: str, message: str) -> None:
+        """Note a mistake at a key: at its line, or that of the nearest table above."""
+        self._note(*self._where(key), f"{self.shown(key)}: {message}")
+
+    def lacks(self, key: str, reason: str) -> None:
+        """Note a missing key, at the line of its table."""
+        model, name = _owner(key)
+        want = _wanted(model, name) if model else ""
+        self.say(key, "missing" + "".join(f"; {text}" for text in dict.fromkeys((want, reason)) if text))
+
+    def lacks_table(self, name: str, reason: str) -> None:
+        """Note a table that is missing altogether."""
+        self._note(0, self.path, f"missing [{name}]: {reason}")
+
+    def remark(self, sentence: str) -> None:
+        """Keep a sentence for the user that is not a mistake."""
+        if sentence not in self.remarks:
+            self.remarks.append(sentence)
+
+    def lines_of_mistakes(self) -> list[str]:
+        """One whole line per mistake, in the order of the file."""
+        return [text for _, text in sorted(self.mistakes, key=lambda mistake: mistake[0])]
+
+    def shown(self, key: str) -> str:
+        """The key as a user writes it: a mode by its name where it has one."""
+        pieces = key.split(".")
+        if pieces[:2] == ["structure", "mode"] and len(pieces) > 2:
+            mode = self.value(".".join(pieces[:3]))
+            name = mode.get("name") if isinstance(mode, dict) else None
+            if isinstance(name, str) and name and len(pieces) > 3 and pieces[3] != "name":
+                pieces[2] = name
+        return ".".join(pieces)
+
+    def refuse_set(self, text: str) -> None:
+        """Note that a ``--set`` could not be applied."""
+        self._note(_LAST, "--set", text)
+
+    def _where(self, key: str) -> tuple[int, str]:
+        pieces = key.split(".")
+        above = [".".join(pieces[:count]) for count in range(len(pieces), 0, -1)]
+        if self.sets.intersection(above):
+            return _LAST, "--set"
+        line = next((self.lines[path] for path in above if path in self.lines), 0)
+        return line, f"{self.path}:{line}" if line else self.path
+
+    def _note(self, order: int, where: str, text: str) -> None:
+        mistake = (order, f"{where}: " + "".join(sign if sign.isprintable() else " " for sign in text))
+        if mistake not in self.mistakes:
+            self.mistakes.append(mistake)
+
+
+def apply_set(draft: Draft, assignment: str) -> None:
+    """Apply one ``table.key=value`` as if the scene said so; the value stands without quotes, modes by name."""
+    key, equals, text = assignment.partition("=")
+    pieces = [piece.strip() for piece in key.split(".")]
+    if not equals or not all(pieces):
+        draft.refuse_set(f"{assignment}: table.key=value is wanted, such as contact.load=26 lbf")
+        return
+    place: Any = draft.raw
+    for index, piece in enumerate(pieces):
+        if isinstance(place, list):
+            pieces[index] = piece = _item(draft, place, piece, ".".join(pieces[: index + 1]))
+            if not piece:
+                return
+        if index == len(pieces) - 1:
+            break
+        inner = place[int(piece)] if isinstance(place, list) else place.get(piece)
+        if inner is None:
+            inner = place[piece] = {}
+            draft.sets.add(".".join(pieces[: index + 1]))
+        if not isinstance(inner, dict | list):
+            draft.refuse_set(f"{key.strip()}: {'.'.join(pieces[: index + 1])} is a value, not a table")
+            return
+        place = inner
+    path = ".".join(pieces)
+    place[int(piece) if isinstance(place, list) else piece] = _set_value(path, text.strip())
+    draft.sets.add(path)
+
+
+def _item(draft: Draft, items: list[Any], wanted: str, key: str) -> str:
+    """Index of the item of this name (or number) as text; empty, with a mistake noted, if there is none."""
+    names = [item.get("name") if isinstance(item, dict) else None for item in items]
+    if wanted in names:
+        return str(names.index(wanted))
+    if wanted.isdecimal() and int(wanted) < len(items):
+        return str(int(wanted))
+    known = [name for name in names if isinstance(name, str)] or map(str, range(len(items)))
+    draft.refuse_set(f"{key}: no '{wanted}' here; {choices(wanted, known)}")
+    return ""
+
+
+def _set_value(path: str, text: str) -> Any:
+    model, name = _owner(path)
+    plain_text = model is not None and str in (model.model_fields[name].annotation, *_types(model, name))
+    try:
+        found = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    value = found["value"]
+    if _ends_in_comment(text):  # a '#' is a sign of the value here, as in 26#
+        return text
+    if len(found) > 1 or not isinstance(value, str | bool | int | float | list | dict):
+        return text
+    return text if plain_text and isinstance(value, int | float) else value
+
+
+def _ends_in_comment(text: str) -> bool:
+    """Whether TOML takes the end of a valid value's text as a comment: it then swallows a bracket behind it."""
+    try:
+        tomllib.loads(f"value = [{text}]")
+    except (ValueError, RecursionError):
+        return "#" in text
+    return False
+
+
+def _owner(key: str) -> tuple[type[Table] | None, str]:
+    """Model and attribute a dotted key belongs to; None for a key no table knows."""
+    model: type[Table] | None = Tables
+    name = ""
+    for piece in key.split("."):
+        if piece.isdigit():
+            continue
+        if name:
+            model = model_of(model, name)
+        name = keys(model).get(piece, "") if model else ""
+        if not name:
+            return None, ""
+    return model, name
+
+
+def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> Any:
+    """A table as its model; what is missing or wrong is said and left None."""
+    names, values = keys(model), {}
+    for key, value in raw.items():
+        path = f"{at}.{key}" if at else key
+        if key not in names:
+            _unknown(draft, model, key, value, path)
+            continue
+        inner = model_of(model, names[key])
+        plain = _is_value(model, names[key])
+        if inner is not None and not (plain and not isinstance(value, dict)):
+            value = _nested(draft, model, names[key], inner, value, path)
+        if value is not None:
+            values[key] = value
+    good = _validated(draft, model, values, at)
+    for key, name in names.items():
+        if model.model_fields[name].is_required() and key not in raw:
+            draft.lacks(f"{at}.{key}", "")
+    unsure = {name: None for key, name in names.items() if key in raw or model.model_fields[name].is_required()}
+    return model.model_construct(**_by_key(model, unsure | good))
+
+
+def _by_key(model: type[Table], values: dict[str, Any]) -> dict[str, Any]:
+    return {key: values[name] for key, name in keys(model).items() if name in values}
+
+
+def _validated(draft: Draft, model: type[Table], values: dict[str, Any], at: str) -> dict[str, Any]:
+    """Attributes whose values are right; a mistake is said for each of the others."""
+    good: dict[str, Any] = {}
+    try:
+        model.model_validate(values, context=good)
+    except ValidationError as caught:
+        seen = set()
+        for error in caught.errors(include_url=False):
+            key = str(error["loc"][0])
+            if (error["type"] == "missing" and len(error["loc"]) == 1) or key in seen:
+                continue
+            seen.add(key)
+            path = f"{at}.{key}" if at else key
+            index = next((part for part in error["loc"][1:] if isinstance(part, int)), None)
+            value = values.get(key)
+            if index is not None and isinstance(value, list) and index < len(value):
+                path, value = f"{path}.{index}", value[index]
+            draft.say(path, _message(model, keys(model)[key], error, value))
+    return good
+
+
+def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], value: Any, path: str) -> Any:
+    """A sub-table or an array of them; None, with the mistake said, where something else stands."""
+    if get_origin(model.model_fields[name].annotation) is tuple:
+        if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+            return tuple(_table(draft, inner, item, f"{path}.{index}") for index, item in enumerate(value))
+        draft.say(path, f"an array of tables [[{path}]] is wanted, not {_show(value)}")
+    elif isinstance(value, dict):
+        return _table(draft, inner, value, path)
+    else:
+        draft.say(path, f"a table [{path}] is wanted, not {_show(value)}")
+    return None
+
+
+def _unknown(draft: Draft, model: type[Table], key: str, value: Any, path: str) -> None:
+    tables = [name for name, at in keys(model).items() if model_of(model, at) and not _is_value(model, at)]
+    is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))
+    known = tables if is_table and tables else list(keys(model))
+    found = choices(key, known)
+    near, question, _ = found.partition("? ")
+    help = near + "?" if question else f"known here: {', '.join(known)}" if known else "this table has no keys"
+    draft.say(path, f"unknown {'table' if is_table else 'key'}; {help}")
+
+
+def _types(model: type[Table], name: str) -> tuple[Any, ...]:
+    return tuple(parts(model.model_fields[name].annotation))
+
+
+def _is_value(model: type[Table], name: str) -> bool:
+    """Whether a key that may hold an inline table may hold a plain value as well: a material, a coating."""
+    return model_of(model, name) is Material or any(get_origin(part) is Literal for part in _types(model, name))
+
+
+def _allowed(model: type[Table], name: str) -> tuple[str, ...]:
+    """The values of a selector key; empty for a key with free values."""
+    annotation = model.model_fields[name].annotation
+    literal = next((part for part in (annotation, *_types(model, name)) if get_origin(part) is Literal), None)
+    return get_args(literal) if literal else ()
+
+
+def _wanted(model: type[Table], name: str) -> str:
+    """What a key wants, as a clause of a message."""
+    annotation = model.model_fields[name].annotation
+    types = (annotation, *_types(model, name))
+    clause = "a text in quotes is wanted"
+    if kind := kind_of(model, name):
+        clause = quantities.wanted(kind)
+        if tuple in map(get_origin, types):
+            clause = f"an array of quantities is wanted, such as ['{quantities.EXAMPLES[kind]}']"
+    elif Material in types:
+        clause = 'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is wanted'
+    elif allowed := _allowed(model, name):
+        clause = f"one of {', '.join(allowed)} is wanted" + (" (or a whole number)" if int in types else "")
+    elif tuple in map(get_origin, types):
+        clause = "" if model_of(model, name) else "two whole numbers are wanted, such as [1, 2]"
+    elif float in types:
+        clause = "a plain number is wanted"
+    elif int in types:
+        clause = "a whole number is wanted"
+    return clause
+
+
+def _message(model: type[Table], name: str, error: Any, value: Any) -> str:
+    limits = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
+              "less_than_equal": ("le", "<=")}  # fmt: skip
+    allowed = _allowed(model, name)
+    if error["type"] in limits:
+        key, sign = limits[error["type"]]
+        bound = error["ctx"][key]
+        return f"must be {sign} {bound:g}, not {_show(value)}; {_wanted(model, name)}"
+    if error["type"] == "value_error":
+        return str(error["ctx"]["error"])
+    if allowed and isinstance(value, str):
+        return f"unknown value {_show(value)}; {choices(value, allowed)}"
+    return f"{_wanted(model, name) or 'something else is wanted'}, not {_show(value)}"
+
+
+def _show(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return "an array" if value else "an empty array"
+    try:
+        text = repr(value)
+    except ValueError:
+        return "a huge number"
+    return text if len(text) <= 60 else text[:57] + "..."

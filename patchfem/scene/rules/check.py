@@ -1,0 +1,109 @@
+"""What a scene must satisfy beyond the limits of each key: which keys belong together, which exclude each other.
+
+Each rule looks at a `Draft`: the tables as far as they could be read (None where a value is missing or wrong), and
+what was written. A rule says every mistake it finds and stays silent about values that are not there.
+"""
+
+from __future__ import annotations
+
+from ..tables import Friction
+from .accuracy import _method, _quadrature
+from .contact import _contact, _load_line
+from .draft import SLIDES, Draft, _needs
+from .drive import check_drive, check_length
+from .friction import _frictions
+from .structure import check_structure
+
+
+def check(draft: Draft) -> str:
+    """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
+    for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive):
+        rule(draft)
+    kind = _kind(draft)
+    for rule in (_method, _quadrature, _sliding, check_length):
+        rule(draft, kind)
+    return kind
+
+
+def _normal(draft: Draft) -> None:
+    if draft.tables.normal is None:
+        return
+    if draft.given("normal.amplitude") and not draft.given("normal.frequency"):
+        draft.lacks("normal.frequency", "an amplitude needs it")
+    for key in ("frequency", "phase"):
+        if draft.given(f"normal.{key}") and not draft.given("normal.amplitude"):
+            draft.lacks("normal.amplitude", f"{key} needs it")
+    if draft.given("normal.width") and not draft.given("friction.spread"):
+        draft.remark("normal.width has no meaning without friction.spread and is not used")
+
+
+def _slide(draft: Draft) -> None:
+    slide = draft.tables.slide
+    if slide is None:
+        return
+    _needs(draft, "slide", slide, "kind", SLIDES)
+    if slide.kind in ("constant", "dwell") and slide.distance == 0.0:
+        draft.say("slide.distance", f"must be > 0 m for kind '{slide.kind}'")
+    law = draft.tables.friction
+    if slide.kind == "dwell" and slide.hold and law is not None and _ageless(law):
+        draft.remark("slide.hold has no effect while nothing ages at rest; add friction.rest_growth and slip_growth to "
+                     "law 'nonlocal'")  # fmt: skip
+
+
+def _ageless(law: Friction) -> bool:
+    ageless = ("coulomb", "elastic-plastic", "convolution")
+    return law.law in ageless or (law.law == "nonlocal" and law.rest_growth is None)
+
+
+
+
+def _kind(draft: Draft) -> str:
+    """The kind of run from the tables that stand together, or a mistake for each one missing or in the way."""
+    has = {name for name in ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
+           if draft.given(name)}  # fmt: skip
+    if draft.given("structure.interface"):
+        for name in sorted(has & {"friction", "normal", "contact"}):
+            draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: an interface carries its own")
+        has |= {"friction", "normal"}
+    if {"contact", "normal"} <= has:
+        draft.say("normal", "[contact] and [normal] exclude each other: keep one source of the normal load")
+        has.discard("normal")
+    moves, pressed = has & {"structure", "drive"}, has & {"contact", "normal"}
+    if "slide" in has and moves:
+        draft.say("slide", "[slide] prescribes the motion, [structure] with [drive] computes it: keep one")
+        return ""
+    if has == {"contact"}:
+        return "patch"
+    if has == {"structure", "drive"}:
+        return "linear"
+    return _with_friction(draft, has, pressed, moves)
+
+
+def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[str]) -> str:
+    if not has:
+        draft.lacks_table("contact", "a scene needs [contact], or [structure] with [drive], or both with [friction]")
+        return ""
+    if moves and "drive" not in has:
+        draft.lacks_table("drive", "[structure] needs it")
+    if moves and "structure" not in has:
+        draft.lacks_table("structure", "[drive] needs it")
+    friction = pressed or has & {"friction", "slide", "wear"}
+    if friction and "friction" not in has:
+        others = ", ".join(f"[{name}]" for name in sorted(has))
+        draft.lacks_table("friction", f"{others} without it are no kind of run")
+    if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
+        draft.lacks("structure.interface", "masses rub at interfaces between two of them: write "
+                                           "[[structure.interface]] with its law and load instead of [friction]")
+    if friction and not pressed:
+        draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
+    if friction and not moves and "slide" not in has:
+        draft.lacks_table("slide", "friction needs a motion, [slide] or [structure] with [drive]")
+    return "bench" if "slide" in has else "rig"
+
+
+def _sliding(draft: Draft, kind: str) -> None:
+    structure = draft.tables.structure
+    modes = structure.mode if kind == "rig" and structure is not None else ()
+    if modes and all(mode.slide == 0 for mode in modes):
+        draft.say("structure.mode.0.slide", "0 in every mode, so nothing slides at the patch; give the slide of a mode "
+                                            "that moves it, or leave out [friction] and its load")  # fmt: skip

@@ -1,0 +1,63 @@
+"""Rules of [contact]: keys that exclude or need one another."""
+
+from .draft import ASPERITIES, Draft, _needs
+from .limits import NOT_YET_BUILT
+
+
+def _contact(draft: Draft) -> None:
+    contact = draft.tables.contact
+    if contact is None:
+        return
+    load, approach = draft.given("contact.load"), draft.given("contact.approach")
+    if load and approach:
+        draft.say("contact.approach", "[contact.approach] and contact.load exclude each other: keep one")
+    if not load and not approach:
+        draft.lacks("contact.load", "" if "contact.approach" in NOT_YET_BUILT else "or [contact.approach] instead")
+    if contact.element_size and contact.length and contact.element_size > contact.length:
+        draft.say("contact.element_size", f"{contact.element_size} m is longer than contact.length {contact.length} m")
+    if contact.element_size and contact.mesh:
+        draft.remark("contact.element_size is not used beside contact.mesh, whose elements are those of the file")
+    pieces = [("contact.coating", contact.coating, contact.height)]
+    for name in ("upper", "lower"):
+        if piece := getattr(contact, name):
+            own = piece.coating if piece.coating is not None else contact.coating
+            at = f"contact.{name}.coating" if piece.coating is not None else f"contact.{name}"
+            pieces.append((at, own, piece.height or contact.height))
+    for at, coating, height in pieces:
+        thickness = getattr(coating, "thickness", None)
+        if thickness and height and thickness >= height:
+            key = f"{at}.thickness" if at.endswith("coating") else f"{at}.height"
+            draft.say(key, f"coating of {thickness} m must be thinner than the height {height} m of its piece")
+    if contact.holder and not draft.given("contact.holder.rotational_stiffness"):
+        if not draft.given("contact.holder.tangential_stiffness"):
+            draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are wanted")
+    if contact.step and contact.step.at is not None and contact.length and abs(contact.step.at) >= contact.length / 2:
+        draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is wanted")
+    if contact.asperities:
+        _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
+        bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
+        if contact.approach and bare:
+            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' beside [contact.approach] needs it "
+                        "at first touch, where an approach starts")  # fmt: skip
+
+
+def _load_line(draft: Draft) -> None:
+    contact = draft.tables.contact
+    line = contact and contact.load_line
+    if not line:
+        return
+    at = "contact.load_line"
+    offset, moment = draft.given(f"{at}.offset"), draft.given(f"{at}.moment")
+    if offset and moment:
+        draft.say(f"{at}.moment", "offset and moment exclude each other: keep one")
+    if not offset and not moment:
+        draft.lacks(f"{at}.offset", "or load_line.moment instead")
+    if draft.given("contact.tilt.angle") and not draft.given("contact.holder"):
+        draft.say(at, "stands beside contact.tilt.angle without [contact.holder]: a piece free to rotate has no "
+                      "prescribed angle; keep one of the two or add the holder's spring")  # fmt: skip
+    half = contact.length / 2 if contact.length else None
+    if half and line.offset is not None and abs(line.offset) >= half:
+        draft.say(f"{at}.offset", f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is wanted")
+    if half and line.moment and contact.load is not None and abs(line.moment) >= half * contact.load:
+        draft.say(f"{at}.moment", f"{line.moment} N m over the load {contact.load} N lies outside the patch: "
+                                  f"|moment|/load < length/2 = {half} m is wanted")  # fmt: skip

@@ -1,0 +1,64 @@
+"""What the rules of a scene share: the draft under check, and which key belongs to which selector."""
+
+from typing import Any, Protocol
+
+from pydantic import BaseModel
+
+from ..tables import Tables
+from ..types import keys
+
+# selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
+LAWS: dict[str, tuple[str, str]] = {
+    "coulomb": ("", "kinetic"),
+    "tanh": ("reference_speed", ""),
+    "elastic-plastic": ("bond_length", ""),
+    "nonlocal": (
+        "bond_length",
+        "kinetic reading order rest_growth slip_growth rest_speed initial_bonds breakaway spread temperature",
+    ),
+    "convolution": ("bond_length", "order spread"),
+}
+SLIDES: dict[str, tuple[str, str]] = {
+    "constant": ("speed distance", ""),
+    "sine": ("amplitude frequency", "cycles"),
+    "triangle": ("amplitude speed", "distance cycles"),
+    "dwell": ("speed distance hold", "distance_after"),
+    "file": ("file", ""),
+}
+ASPERITIES: dict[str, tuple[str, str]] = {
+    "linear": ("normal_stiffness", "tangential_ratio"),
+    "exponential": ("decay_length", "normal_stiffness tangential_ratio"),
+    "hertz": ("radius density height_deviation", "tangential_ratio"),
+}
+
+
+class Draft(Protocol):
+    """A scene being read: the tables so far, what was written, and where mistakes go."""
+
+    tables: Tables
+
+    def given(self, key: str) -> bool: ...
+    def say(self, key: str, message: str) -> None: ...
+    def remark(self, sentence: str) -> None: ...
+    def lacks(self, key: str, reason: str) -> None: ...
+    def lacks_table(self, name: str, reason: str) -> None: ...
+
+
+def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> set[str]:
+    """Keys of a table that the value of its selector gives no meaning, among those that depend on it."""
+    needs, can = used[getattr(table, selector)]
+    dependent = {key for pair in used.values() for keys in pair for key in keys.split()}
+    return (dependent - set(needs.split()) - set(can.split())) & keys(type(table)).keys()
+
+
+def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]) -> None:
+    """Missing keys that the selector's value needs; remarks on those it gives no meaning."""
+    value = getattr(table, selector, None)
+    if value not in used:
+        return
+    for key in used[value][0].split():
+        if not draft.given(f"{at}.{key}"):
+            draft.lacks(f"{at}.{key}", f"{selector} '{value}' needs it")
+    for key in sorted(unused(table, selector, used)):
+        if draft.given(f"{at}.{key}") and key not in ("kinetic", "spread"):
+            draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")

@@ -1,0 +1,105 @@
+"""Rules of [drive]: which keys its kind and its waveform need, which they give no meaning."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .structure import drives_mass
+
+if TYPE_CHECKING:
+    from .draft import Draft
+
+# waveform -> keys it needs, keys it can use
+WAVEFORMS: dict[str, tuple[str, str]] = {
+    "sine": ("frequency", "acceleration displacement force cycles duration"),
+    "step": ("", "acceleration displacement force cycles duration"),
+    "sweep": ("from to", "rate log_rate acceleration displacement force cycles duration"),
+    "levels": ("frequency levels", "cycles duration"),
+    "file": ("file", "cycles duration"),
+}
+SIZED = ("sine", "step", "sweep")
+LEAST = 0.25  # of a cycle, of a run
+
+
+def check_drive(draft: Draft) -> None:
+    """Say every mistake of [drive]."""
+    drive = draft.tables.drive
+    if drive is None:
+        return
+    if drive.kind in ("base", "force") and drive.waveform in WAVEFORMS:
+        for key in WAVEFORMS[drive.waveform][0].split():
+            if not draft.given(f"drive.{key}"):
+                draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs it")
+        for key in sorted(waveform_unused(drive)):
+            if draft.given(f"drive.{key}"):
+                draft.remark(f"drive.{key} has no meaning for waveform '{drive.waveform}' and is not used")
+    cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
+    if cycles and duration:
+        draft.say("drive.duration", "cycles and duration exclude each other: keep one")
+    if not cycles and not duration and (drive.kind == "free" or drive.waveform in ("sine", "step", "levels")):
+        draft.lacks("drive.cycles", "or drive.duration instead")
+    _size(draft, drive)
+    if drive.kind in ("base", "force") and drive.waveform == "sweep":
+        _sweep(draft, drive)
+    if drive.kind == "force" and drive.waveform == "levels":
+        draft.say("drive.waveform", "'levels' are accelerations of the base; use kind = \"base\"")
+
+
+def _sweep(draft: Draft, drive: Any) -> None:
+    rate, octaves = draft.given("drive.rate"), draft.given("drive.log_rate")
+    if rate and octaves:
+        draft.say("drive.log_rate", "rate (Hz/s) and log_rate (oct/min) exclude each other: keep one")
+    elif not rate and not octaves:
+        draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
+    if drive.from_ is not None and drive.from_ == drive.to:
+        draft.say("drive.to", f"{drive.to:g} Hz is where the sweep starts; another frequency is wanted")
+
+
+def _size(draft: Draft, drive: Any) -> None:
+    sized = drive.waveform in SIZED
+    acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
+    if drive.kind == "base" and sized:
+        if acceleration and displacement:
+            draft.say("drive.displacement", "acceleration and displacement exclude each other: keep one")
+        if not acceleration and not displacement:
+            draft.lacks("drive.acceleration", "or drive.displacement instead")
+    if drive.kind == "force" and sized and not draft.given("drive.force"):
+        draft.lacks("drive.force", "kind 'force' needs it")
+    begins = draft.given("structure.start")
+    if drive.kind == "free" and not displacement and not begins:
+        draft.lacks("drive.displacement", "kind 'free' needs it: released from there; or [structure.start]")
+    if drive.kind == "free" and displacement and begins:
+        draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
+    drives_mass(draft)
+    for key in drive_unused(drive):
+        if draft.given(f"drive.{key}"):
+            draft.remark(f"drive.{key} has no meaning for kind '{drive.kind}' and is not used")
+
+
+def drive_unused(drive: Any) -> list[str]:
+    """Keys of [drive] that its kind gives no meaning, whatever the waveform."""
+    without = {
+        "base": ["force", "mass"],
+        "force": ["acceleration", "displacement"],
+        "free": ["acceleration", "force", "frequency", "from", "to", "rate", "log_rate", "levels", "file", "waveform"],
+    }
+    return without.get(drive.kind, [])
+
+
+def waveform_unused(drive: Any) -> set[str]:
+    """Keys of [drive] that its waveform gives no meaning, among those that depend on it."""
+    needs, can = WAVEFORMS[drive.waveform]
+    dependent = {key for pair in WAVEFORMS.values() for keys in pair for key in keys.split()}
+    return dependent - set(needs.split()) - set(can.split())
+
+
+def check_length(draft: Draft, kind: str) -> None:
+    """Say a run that is shorter than a quarter of a cycle."""
+    drive = draft.tables.drive
+    if kind not in ("rig", "linear") or drive is None:
+        return
+    if drive.cycles is not None and drive.cycles < LEAST:
+        draft.say("drive.cycles", f"at least a quarter of a cycle is wanted, cycles >= {LEAST}, not {drive.cycles:g}")
+    elif drive.duration is not None and drive.frequency and drive.duration * drive.frequency < LEAST:
+        draft.say("drive.duration", f"at least a quarter of a cycle is wanted, duration >= {LEAST / drive.frequency:g} "
+                                    f"s, not {drive.duration:g} s")  # fmt: skip

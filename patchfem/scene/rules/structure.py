@@ -1,0 +1,142 @@
+"""Rules of [structure]: one description of the rig, masses that exist, shares of the base that are possible."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..types import choices
+
+if TYPE_CHECKING:
+    from .draft import Draft
+
+MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
+PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+
+
+def check_structure(draft: Draft) -> None:
+    """Say every mistake of [structure] by itself."""
+    structure = draft.tables.structure
+    if structure is None:
+        return
+    forms = [key for key in ("mode", "masses", "file") if draft.given(f"structure.{key}")]
+    if len(forms) > 1:
+        draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
+    if not forms:
+        draft.lacks("structure.mode", "at least one [[structure.mode]] is wanted")
+    if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
+        draft.lacks("structure.moving_mass", "")
+    for key in ("spring", "damper", "output_mass"):
+        if "masses" not in forms and draft.given(f"structure.{key}"):
+            draft.lacks("structure.masses", f"structure.{key} needs them")
+    if not {"masses", "file"} & set(forms) and draft.given("structure.interface"):
+        draft.lacks("structure.masses", "structure.interface needs them, or structure.file")
+    for key in PLACES:
+        if "file" not in forms and draft.given(f"structure.{key}"):
+            draft.say(f"structure.{key}", "names a place in a file of modes or responses; give structure.file")
+    if forms == ["masses"] and draft.given("structure.moving_mass"):
+        draft.remark("structure.moving_mass has no meaning beside structure.masses and is not used")
+    _modes(draft)
+    _masses(draft, structure)
+    _file(draft, structure)
+    _bonded(draft, structure)
+    _start(draft, structure)
+
+
+def _modes(draft: Draft) -> None:
+    modes = draft.tables.structure.mode or ()
+    names: set[str] = set()
+    for index, mode in enumerate(modes):
+        if mode.name is not None and mode.name in names:
+            draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
+        names.add(mode.name)
+    bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
+             for index, mode in enumerate(modes)]  # fmt: skip
+    squares = [(base or 0.0) * (base or 0.0) for base in bases]
+    if sum(squares) > 1 + 1e-9:
+        at = f"structure.mode.{squares.index(max(squares))}"
+        key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
+        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is wanted (base is the share of "
+                       "the base motion; the first mode's is its slide unless given)")  # fmt: skip
+
+
+def _masses(draft: Draft, structure: Any) -> None:
+    """Every spring, damper, interface and named mass must stand between masses that exist."""
+    count = len(structure.masses) if structure.masses is not None else None
+    if count == 0:
+        draft.say("structure.masses", "at least one mass is wanted, such as masses = [\"1 kg\"]")
+        return
+    for name in ("spring", "damper", "interface"):
+        for index, item in enumerate(getattr(structure, name) or ()):
+            _between(draft, f"structure.{name}.{index}.between", item.between, count)
+    _known(draft, "structure.output_mass", structure.output_mass, count)
+
+
+def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
+    if pair is None:
+        return
+    if pair[0] == pair[1]:
+        what = "the base" if pair[0] == 0 else f"mass {pair[0]}"
+        draft.say(key, f"joins {what} to itself; two different masses are wanted, or a mass and 0, the base")
+    for one in dict.fromkeys(pair):
+        _known(draft, key, one, count)
+
+
+def _known(draft: Draft, key: str, mass: int | None, count: int | None) -> None:
+    if count is not None and mass is not None and mass > count:
+        draft.say(key, f"there is no mass {mass}: masses has {count}, counted from 1" +
+                  ("; 0 is the base" if key.endswith("between") else ""))
+
+
+def drives_mass(draft: Draft) -> None:
+    """Say a drive.mass that does not exist or beside a rig without masses."""
+    drive, structure = draft.tables.drive, draft.tables.structure
+    if drive.mass is None or structure is None or drive.kind == "base":
+        return
+    if draft.given("structure.mode"):
+        draft.say("drive.mass", "names one of structure.masses; [[structure.mode]] is driven at its output: leave it "
+                                "out")  # fmt: skip
+    elif structure.masses:
+        _known(draft, "drive.mass", drive.mass, len(structure.masses))
+
+
+def _file(draft: Draft, structure: Any) -> None:
+    if structure.file is None:
+        return
+    ending = "." + structure.file.rpartition(".")[2].lower()
+    if ending not in (*MATRICES, *MEASURED):
+        draft.say("structure.file", f"the name ends in '{ending}'; {choices(ending, (*MATRICES, '.uff'))}: matrices or "
+                                    "modes as arrays, or universal files")  # fmt: skip
+    measured = ending in MEASURED
+    for key in PLACES:
+        if not measured and draft.given(f"structure.{key}"):
+            draft.say(f"structure.{key}", f"names a place in a universal file; a {ending} file holds the array "
+                                          f"{key.removesuffix('_at')}")  # fmt: skip
+    if measured and not draft.given("structure.moving_mass"):
+        draft.lacks("structure.moving_mass", "the modes of a universal file are scaled to it")
+    if measured and not draft.given("structure.slide_at"):
+        draft.lacks("structure.slide_at", "the place and direction that slide, such as slide_at = \"12:+x\"")
+    if measured and draft.given("structure.interface"):
+        draft.say("structure.interface", "a universal file has nodes, not masses; use slide_at with [friction]")
+
+
+def _bonded(draft: Draft, structure: Any) -> None:
+    """The spring beside the contact needs to know which contact."""
+    if structure.bonded is None or structure.masses is None or len(structure.interface or ()) == 1:
+        return
+    draft.say("structure.bonded", f"stands beside one contact, but there are {len(structure.interface or ())} "
+                                  "interfaces; write a [[structure.spring]] between the same masses")  # fmt: skip
+
+
+def _start(draft: Draft, structure: Any) -> None:
+    start = structure.start
+    if start is None:
+        return
+    if not draft.given("structure.start.displacement") and not draft.given("structure.start.velocity"):
+        draft.lacks("structure.start.displacement", "or structure.start.velocity, one value per mode or mass")
+    count = len(structure.masses or structure.mode or ())
+    form = ("mass" if count == 1 else "masses") if structure.masses else "mode" if count == 1 else "modes"
+    for key in ("displacement", "velocity"):
+        values = getattr(start, key)
+        if values is not None and count and len(values) != count:
+            many = f"{len(values)} value{'s' if len(values) > 1 else ''}"
+            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; one for each is wanted, in their order")

@@ -1,0 +1,206 @@
+"""A scene: one TOML file, read into SI values with every mistake named at once.
+
+`load` reads a file, `loads` a text; both give a `Scene` whose attributes are the tables (`scene.contact.length` is a
+float in metres, an absent table is None) or raise a `SceneError` that holds one line per mistake.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from . import tables
+from .lines import key_lines
+from .reader import Draft, apply_set
+from .rules.accuracy import method_unused
+from .rules.check import check
+from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
+from .rules.drive import drive_unused, waveform_unused
+from .rules.friction import kinetic_unused, temperature_unused
+from .rules.limits import combinations, not_yet_built
+from .text import effects, toml
+from .types import keys as keys_of
+
+
+class SceneError(Exception):
+    """A scene that cannot be run; `mistakes` holds one whole line for each, ``FILE:LINE: table.key: message``."""
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        self.mistakes = list(mistakes)
+        super().__init__("\n".join(self.mistakes))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A valid scene in SI: its tables (None where absent), the kind of run, its text, remarks on unused keys and the
+    --set strings that were applied."""
+
+    path: Path
+    text: str
+    kind: str
+    title: str
+    contact: tables.Contact | None
+    normal: tables.Normal | None
+    friction: tables.Friction | None
+    slide: tables.Slide | None
+    structure: tables.Structure | None
+    drive: tables.Drive | None
+    wear: tables.Wear | None
+    accuracy: tables.Accuracy
+    measured: tables.Measured | None
+    remarks: list[str]
+    sets: tuple[str, ...] = ()
+
+    def tables(self) -> tables.Tables:
+        """All tables as one model, absent ones None."""
+        names = tables.Tables.model_fields
+        return tables.Tables.model_construct(**{name: getattr(self, name) for name in names})
+
+    def resolved(self) -> str:
+        """The scene as TOML in SI with every default written out; loading it gives the same values."""
+        return toml(self.tables())
+
+    def named(self) -> list[str]:
+        """The effects the scene names: a table, or ``table.key=value`` for the selectors of a table that has them."""
+        return effects(self.tables())
+
+    def where(self, key: str) -> str:
+        """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
+        lines = key_lines(self.text)
+        line = lines.get(key) or lines.get(key.rpartition(".")[0])
+        return f"{self.path}:{line}: {key}" if line else f"{self.path}: {key}"
+
+    def beside(self, name: str) -> Path:
+        """A path written in the scene, which is relative to the scene's own folder."""
+        return self.path.parent / name
+
+
+def load(path: str | Path, sets: Iterable[str] = ()) -> Scene:
+    """Read a scene file, with ``table.key=value`` strings applied in order; SceneError with all mistakes at once."""
+    try:
+        content = Path(path).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SceneError([f"{path}: cannot be read: {reason}"]) from None
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        byte = content[error.start]
+        raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
+    found = loads(text, path, sets)
+    missing = [_no_file(found, *named) for named in _files(found) if not found.beside(named[1]).is_file()]
+    if missing:
+        raise SceneError(missing)
+    return found
+
+
+def _files(found: Scene) -> list[tuple[str, str]]:
+    """(key, file) of every file that the scene names."""
+    profile = found.contact and found.contact.profile
+    named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
+             ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
+             ("structure.file", found.structure and found.structure.file),
+             ("measured.file", found.measured and found.measured.file)]
+    return [(key, file) for key, file in named if file]
+
+
+def _no_file(found: Scene, key: str, file: str) -> str:
+    line = key_lines(found.text).get(key)
+    where = f"{found.path}:{line}" if line else "--set"
+    return f"{where}: {key}: there is no file {found.beside(file)}; paths are relative to the scene"
+
+
+def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) -> Scene:
+    """Read a scene from its text; `path` only names it in messages and is what its own paths are relative to."""
+    try:
+        raw = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise SceneError([_syntax(error, text, path)]) from None
+    sets = tuple(sets)
+    draft = Draft(str(path), key_lines(text), raw)
+    for one in sets:
+        apply_set(draft, one)
+    draft.read()
+    kind = check(draft)
+    wrong = bool(draft.mistakes)
+    combinations(draft, kind)
+    if wrong:
+        raise SceneError(draft.lines_of_mistakes())
+    found = _finish(draft.tables, kind)
+    for key, message in not_yet_built(found):
+        draft.say(key, message)
+    if draft.mistakes:
+        raise SceneError(draft.lines_of_mistakes())
+    values = {name: getattr(found, name) for name in tables.Tables.model_fields}
+    return Scene(path=Path(path), text=text, kind=kind, remarks=draft.remarks, sets=sets, **values)
+
+
+def _syntax(error: Exception, text: str, path: str | Path) -> str:
+    if isinstance(error, RecursionError):
+        return f"{path}:1: not valid TOML: nested too deeply"
+    message = str(error)
+    found = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
+    line = int(found[1]) if found and found[1] else text.count("\n") + (not text.endswith("\n"))
+    where = f" (column {found[2]})" if found and found[2] else " (at the end of the file)" if found else ""
+    return f"{path}:{line}: not valid TOML: {message[: found.start()] if found else message}{where}"
+
+
+def _finish(found: tables.Tables, kind: str) -> tables.Tables:
+    """Fill the defaults that depend on other keys and drop the keys that the chosen law or kind does not use."""
+    new: dict[str, Any] = {}
+    if found.contact:
+        new["contact"] = _contact(found.contact)
+    if found.accuracy.method in method_unused(kind):
+        new["accuracy"] = _without(found.accuracy, ["method"])
+    if found.friction:
+        new["friction"] = _law(found.friction)
+    if slide := found.slide:
+        slide = _without(slide, unused(slide, "kind", SLIDES))
+        fill = {"sine": {"cycles": 1.0}, "triangle": {"cycles": 1.0, "distance": 0.0}, "dwell": {"distance_after": 0.0}}
+        new["slide"] = _filled(slide, fill.get(slide.kind, {}))
+    if structure := found.structure:
+        update: dict[str, Any] = {"mode": tuple(_mode(mode, not index) for index, mode in enumerate(structure.mode))}
+        update["interface"] = tuple(map(_law, structure.interface))
+        if structure.masses and structure.output_mass is None:
+            update["output_mass"] = 1
+        new["structure"] = structure.model_copy(update=update)
+    if drive := found.drive:
+        keys = set(drive_unused(drive))
+        if drive.kind != "free":
+            keys |= waveform_unused(drive)
+        new["drive"] = _without(drive, keys)
+    return found.model_copy(update=new)
+
+
+def _contact(contact: tables.Contact) -> tables.Contact:
+    if contact.asperities:
+        asperities = _without(contact.asperities, unused(contact.asperities, "law", ASPERITIES))
+        contact = contact.model_copy(update={"asperities": asperities})
+    return _without(contact, ["element_size"]) if contact.mesh else contact
+
+
+def _law(law: tables.Friction) -> tables.Friction:
+    idle = {"kinetic": kinetic_unused(law), "temperature": temperature_unused(law)}
+    law = _without(law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without})
+    return _filled(law, {"kinetic": law.static}) if law.law in ("coulomb", "nonlocal") else law
+
+
+def _mode(mode: tables.Mode, first: bool) -> tables.Mode:
+    share = mode.slide if first else 0.0
+    return _filled(mode, {"base": share, "output": share})
+
+
+def _filled(table: Any, values: dict[str, Any]) -> Any:
+    """The table with values in place of None."""
+    return table.model_copy(update={name: value for name, value in values.items() if getattr(table, name) is None})
+
+
+def _without(table: Any, keys: Iterable[str]) -> Any:
+    """The table with these keys back at their defaults."""
+    fields, names = type(table).model_fields, keys_of(type(table))
+    return table.model_copy(update={names[key]: fields[names[key]].default for key in keys})

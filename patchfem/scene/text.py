@@ -1,0 +1,85 @@
+"""A scene back as text: TOML in SI with every default, and the effects that it names."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from .quantities import format_si
+from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
+from .rules.drive import drive_unused, waveform_unused
+from .tables import Accuracy, Asperities, Drive, Friction, Material, OnePiece, Slide
+from .types import Table, keys, kind_of
+
+_SELECTORS = ("kind", "law", "reading", "waveform")
+
+
+def toml(table: Table) -> str:
+    """The tables as TOML: quantities in SI with their units, defaults written out, unused keys left out."""
+    return "\n".join(_lines(table, "")).strip("\n") + "\n"
+
+
+def effects(root: Table) -> list[str]:
+    """Effects in contract naming: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``."""
+    return [effect for name in type(root).model_fields for effect in _effects(getattr(root, name), name)]
+
+
+def _effects(table: Any, at: str) -> Iterator[str]:
+    if isinstance(table, Accuracy):
+        if table.method != "auto":
+            yield f"{at}.method={table.method}"
+    elif isinstance(table, tuple):
+        for item in table:
+            yield from (effect for effect in _effects(item, at) if "=" in effect)
+    elif isinstance(table, Table) and not isinstance(table, Material):
+        without = _unused(table)
+        chosen = [key for key in _SELECTORS if key in type(table).model_fields and key not in without]
+        yield from (f"{at}.{key}={getattr(table, key)}" for key in chosen)
+        if not chosen:
+            yield at
+        if not isinstance(table, OnePiece):
+            for name in type(table).model_fields:
+                yield from _effects(getattr(table, name), f"{at}.{name}")
+
+
+def _unused(table: Table) -> set[str]:
+    for model, selector, used in ((Friction, "law", LAWS), (Slide, "kind", SLIDES), (Asperities, "law", ASPERITIES)):
+        if isinstance(table, model):
+            return unused(table, selector, used)
+    if isinstance(table, Drive):
+        return set(drive_unused(table)) | (waveform_unused(table) if table.kind != "free" else set())
+    return set()
+
+
+def _lines(table: Table, at: str) -> Iterator[str]:
+    without, inner = _unused(table), []
+    for key, name in keys(type(table)).items():
+        value = getattr(table, name)
+        if value is None or value == () or key in without:
+            continue
+        path = f"{at}.{key}" if at else key
+        if isinstance(value, tuple) and isinstance(value[0], Table):
+            inner += [(f"[[{path}]]", path, item) for item in value]
+        elif isinstance(value, Table) and not isinstance(value, Material):
+            inner.append((f"[{path}]", path, value))
+        else:
+            yield f"{key} = {_value(value, kind_of(type(table), name))}"
+    for header, path, value in inner:
+        yield ""
+        yield header
+        yield from _lines(value, path)
+
+
+def _value(value: Any, kind: str | None) -> str:
+    if isinstance(value, Material):
+        pairs = ((name, getattr(value, name)) for name in Material.model_fields)
+        written = (f"{name} = {_value(one, kind_of(Material, name))}" for name, one in pairs if one is not None)
+        return "{" + ", ".join(written) + "}"
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_value(one, kind) for one in value) + "]"
+    if kind is not None:
+        return f'"{format_si(value, kind)}"'
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

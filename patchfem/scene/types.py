@@ -1,0 +1,102 @@
+"""What the tables of a scene are made of: checked types with their units, the base model, and looks into a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
+from functools import partial
+from typing import Annotated, Any, get_args
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    WithJsonSchema,
+    field_validator,
+)
+from pydantic.types import AllowInfNan
+
+from .quantities import EXAMPLES, parse
+
+
+class Kind(str):
+    """Marks a key as a quantity of this kind of the unit table."""
+
+
+LARGEST = 1e50  # SI; its fourth power and what is multiplied with it stay within double precision
+DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubic stiffness", "sweep rate"}  # of a rig
+
+
+def _within(value: float, least: float) -> float:
+    if value and not least <= abs(value) <= LARGEST:
+        raise ValueError(f"{value:g} in SI is beyond what can be computed with; 0 or a size from {least:g} to "
+                         f"{LARGEST:g} is wanted")  # fmt: skip
+    return value
+
+
+def quantity(kind: str, **limits: float) -> Any:
+    """The type of a key that holds a quantity of this kind, within limits as `pydantic.Field` names them."""
+    schema = {"type": "string", "examples": [EXAMPLES[kind]]}
+    return Annotated[
+        float, Kind(kind), BeforeValidator(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits),
+        AfterValidator(partial(_within, least=1 / LARGEST if kind in DIVIDED_BY else 0.0)),
+    ]
+
+
+def number(**limits: float) -> Any:
+    """The type of a key that holds a plain finite number within limits; neither a text nor a boolean."""
+    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), AfterValidator(partial(_within, least=0.0))]
+
+
+def whole(least: int) -> Any:
+    """The type of a key that holds a whole number from `least` on."""
+    return Annotated[int, Strict(), Field(ge=least)]
+
+
+class Table(BaseModel):
+    """Base of all tables: unknown keys refused, frozen; a dict given as context collects the keys that are right."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _collect(cls, value: Any, info: Any) -> Any:
+        if info.context is not None:
+            info.context[info.field_name] = value
+        return value
+
+
+def choices(got: str, known: Iterable[str]) -> str:
+    """``did you mean 'x'? one of x, y`` for a wrong name among known ones."""
+    names = list(known)
+    near = get_close_matches(got, names, 1, 0.6) or [n for n in names if n.lower() == got.lower()]
+    return (f"did you mean '{near[0]}'? " if near else "") + f"one of {', '.join(names)}"
+
+
+def keys(model: type[BaseModel]) -> dict[str, str]:
+    """Key as written in a scene -> attribute of the model; they differ only where a key is a word of Python."""
+    return {field.alias or name: name for name, field in model.model_fields.items()}
+
+
+def parts(annotation: Any) -> Iterator[Any]:
+    """Everything an annotation is built from: types, markers, values of a Literal."""
+    for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
+        yield part
+        yield from parts(part)
+
+
+def kind_of(model: type[BaseModel], name: str) -> str | None:
+    """Kind of quantity an attribute holds (each item, for an array); None for anything without a unit."""
+    field = model.model_fields[name]
+    marks = (*field.metadata, *parts(field.annotation))
+    return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
+
+
+def model_of(model: type[BaseModel], name: str) -> type[Table] | None:
+    """The model of a key that holds a table or an array of tables; None for a plain value."""
+    annotation = model.model_fields[name].annotation
+    found = (part for part in (annotation, *parts(annotation)) if isinstance(part, type))
+    return next((part for part in found if issubclass(part, Table)), None)

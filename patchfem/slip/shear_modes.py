@@ -1,0 +1,238 @@
+"""Partial slip of the patch under one rigid slide q of the holders: the pieces' shear compliance made cheap.
+
+Point i feels the local slide q - sum_j C_ij f_j. Two reductions, both of the contact set only:
+
+* Points that yield at a fixed force D_i (Coulomb, elastic-plastic at constant load and tilt) are together exactly a
+  set of parallel Jenkins elements, because the inverse of C has off-diagonals <= 0 and row sums > 0, so slip zones
+  only grow within a stroke (Masing). Corner nodes of bilinear cells can have a small negative row sum: such a node
+  holds on until its neighbours have slipped, which costs 1e-9 of the friction limit at 201 nodes, 4e-8 at 401 (six
+  such nodes with 1.4 % of the load: leaving them out would cost that).
+* Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight: a few carry the resultant.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import PatchfemError, frozen_array
+from ..elasticity.threads import one_thread
+
+SHEAR_MODES = 8  # modes a shear reduction starts from
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JenkinsSet:
+    """Parallel elements: stiffness (t,) [N/m], yield slide (t,) [m]; sum stiffness*yield_slide = friction limit.
+
+    points: (a,) nodes of the contact set, limit: (a,) their yield forces [N]; share (a, t) [N/m]: the force of a point
+    is share @ stretch for any history. reluctant: nodes that at first carry the wrong sign. error: largest error of
+    the resultant over the histories it was `merged` for, relative to the friction limit.
+    """
+
+    stiffness: np.ndarray
+    yield_slide: np.ndarray
+    points: np.ndarray
+    limit: np.ndarray
+    share: np.ndarray
+    reluctant: int
+    error: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ShearModes:
+    """points: (a,) indices of the contact set; shape: (a, r) slide of a point per unit mode coordinate;
+    stiffness: (r,) [N/m] of the coordinates; backbone_error: worst error of the resultant [1] against 64 modes, or four
+    times as many as are kept."""
+
+    points: np.ndarray
+    shape: np.ndarray
+    stiffness: np.ndarray
+    backbone_error: float
+
+
+def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
+    """Exact parallel elements of points that yield at `limit` (m,) [N] behind the compliance (m, m) [m/N].
+
+    `local_length` [m]: bond length of the elastic-plastic law (3.12), local stiffness limit/length in series; 0 for
+    Coulomb points. PatchfemError when no point carries load.
+    """
+    limit = np.asarray(limit, float)
+    if not (limit > 0).any():
+        raise PatchfemError("contact.shear: no point carries friction")
+    points = np.flatnonzero(limit > 0)
+    force = limit[points]
+    if local_length == 0 and np.ptp(tangential) == 0:  # a spring before rigid points: they all slip at once
+        stiffness = 1 / tangential[0, 0]
+        at = [force.sum() / stiffness]
+        return JenkinsSet(frozen_array([stiffness]), frozen_array(at), frozen_array(points, np.int64),
+                          frozen_array(force), frozen_array(force[:, None] / at), 0)
+    c = tangential[np.ix_(points, points)] + np.diag(local_length / force)
+    inverse = np.linalg.inv(c)
+    stick = np.ones(force.size, bool)
+    carried = np.zeros(force.size)
+    slide, rates, at, reluctant = 0.0, [], [], 0
+    while stick.any():
+        rate = inverse.sum(axis=1)
+        index = np.flatnonzero(stick)
+        wait = np.where(rate > 0, (force[index] - carried[index]) / np.where(rate > 0, rate, 1.0), np.inf)
+        reluctant = max(reluctant, int(np.sum(rate <= 0)))
+        first = wait.min()
+        slide += max(first, 0.0)
+        carried[index] += rate * max(first, 0.0)
+        going = wait <= first * (1 + 1e-12)
+        rates.append(np.zeros(force.size))
+        rates[-1][index] = rate
+        at.append(slide)
+        for local in np.flatnonzero(going)[::-1]:
+            column = inverse[:, local]
+            rest = np.delete(np.arange(inverse.shape[0]), local)
+            inverse = inverse[np.ix_(rest, rest)] - np.outer(column[rest], column[rest]) / column[local]
+        carried[index[going]] = force[index[going]]
+        stick[index[going]] = False
+    drop = -np.diff(np.array([*rates, np.zeros(force.size)]), axis=0).T
+    return JenkinsSet(frozen_array(drop.sum(axis=0)), frozen_array(at), frozen_array(points, np.int64),
+                      frozen_array(force), frozen_array(drop), reluctant)
+
+
+def merged(group: JenkinsSet, tolerance: float, nested: bool = True) -> JenkinsSet:
+    """The fewest elements whose resultant stays within `tolerance` (relative to the friction limit) of `group`.
+
+    Neighbours in yield slide become one of their total stiffness and mean yield slide, so the friction limit, the
+    initial stiffness and the limit of every point stay exact. The virgin stroke of a merged run of elements then lies
+    above theirs by one hump of height h at the mean. Masing: a history with turning points adds d(q_1) - 2 d(z_1) +
+    2 d(z_2) - ... at falling strokes z, with d the sum of the humps. One hump gives at most 2h, whatever the history;
+    a loop without loops inside 2 max(h); turning points inside one another, one for each hump, reach 2 sum(h), and no
+    more. `nested` keeps the last within the tolerance, without it the one before. PatchfemError unless tolerance > 0.
+    """
+    if not tolerance > 0:
+        raise PatchfemError(f"accuracy.tolerance: merging elements wants a tolerance > 0, got {tolerance}")
+    hump = _humps(group.stiffness, group.yield_slide) * (2 / group.limit.sum())
+    ends = _cheapest_runs(hump, tolerance) if nested else _longest_runs(hump, tolerance)
+    first = np.concatenate([[0], ends[:-1]])
+    stiffness = np.add.reduceat(group.stiffness, first)
+    reach = np.add.reduceat(group.stiffness * group.yield_slide, first) / stiffness
+    share = np.add.reduceat(group.share * group.yield_slide, first, axis=1) / reach
+    heights = hump[first, ends]
+    error = float(heights.sum() if nested else heights.max())
+    return JenkinsSet(frozen_array(stiffness), frozen_array(reach), group.points, group.limit, frozen_array(share),
+                      group.reluctant, group.error + error)
+
+
+def _humps(stiffness, reach) -> np.ndarray:
+    """(t, t + 1): largest error [N] of the virgin stroke of elements i to j - 1 as one; inf where j <= i."""
+    count = reach.size
+    stiff = np.concatenate([[0.0], np.cumsum(stiffness)])
+    bound = np.concatenate([[0.0], np.cumsum(stiffness * reach)])
+    out = np.full((count, count + 1), np.inf)
+    for i in range(count):
+        total, full = stiff[i + 1:] - stiff[i], bound[i + 1:] - bound[i]
+        mean = full / total
+        below = np.searchsorted(reach, mean, side="left")
+        out[i, i + 1:] = np.maximum(mean * (stiff[below] - stiff[i]) - (bound[below] - bound[i]), 0.0)
+    return out
+
+
+def _longest_runs(hump, most: float) -> np.ndarray:
+    """Ends of the fewest runs with every hump <= most: each as long as it can be."""
+    ends = [0]
+    while ends[-1] < hump.shape[0]:
+        row = hump[ends[-1]]
+        ends.append(max(int(np.flatnonzero(row <= most)[-1]), ends[-1] + 1))
+    return np.array(ends[1:])
+
+
+def _cheapest_runs(hump, most: float) -> np.ndarray:
+    """Ends of the fewest runs whose humps add up to <= most: the least sum for 1, 2, ... runs in turn."""
+    count = hump.shape[0]
+    best, back = hump[0].copy(), []
+    while best[count] > most and len(back) < count:
+        longer = best[:count, None] + hump
+        pick = longer.argmin(axis=0)
+        best = longer[pick, np.arange(count + 1)]
+        back.append(pick)
+    ends = [count]
+    for pick in back[::-1]:
+        ends.append(int(pick[ends[-1]]))
+    return np.array(ends[::-1])
+
+
+def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int,
+                weakening: float = 1.0) -> ShearModes:
+    """The `count` most compliant modes of D^1/2 C D^1/2 for points whose bonds have the stiffness limit/bond_length.
+
+    tangential (m, m) [m/N], limit D (m,) [N], bond_length [m]; weakening = static over kinetic friction.
+    PatchfemError where a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
+    """
+    index = np.flatnonzero(limit > 0)
+    root = np.sqrt(limit[index])
+    even = np.ptp(tangential) == 0  # a spring before points of one rigid piece: one mode is all of it
+    with one_thread():
+        values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
+    values, vectors = values[::-1], vectors[:, ::-1]
+    jump = values[0] / bond_length * (weakening - 1)
+    if jump >= 1:
+        raise PatchfemError(f"contact.shear with friction.kinetic below static: the patch could jump by itself "
+                            f"({jump:.3g} >= 1); raise friction.bond_length or friction.kinetic")
+    if even:
+        return ShearModes(frozen_array(index, np.int64), frozen_array(np.ones((index.size, 1))),
+                          frozen_array([1 / tangential[0, 0]]), 0.0)
+    count = min(count, index.size)
+    shape = vectors / root[:, None]
+    elastic = 2 * np.abs(shape @ (values * (shape.T @ limit[index]))).max()
+    slides = (6 * bond_length + elastic) * (np.arange(1, 25) / 24) ** 2
+    many = max(64, 4 * count)
+    with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+        full = _backbone(limit[index], shape[:, :many], values[:many], bond_length, slides)
+        few = _backbone(limit[index], shape[:, :count], values[:count], bond_length, slides)
+    error = float(np.abs(full - few).max() / limit.sum())
+    return ShearModes(frozen_array(index, np.int64), frozen_array(shape[:, :count]),
+                      frozen_array(1 / values[:count]), error)
+
+
+def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int, tolerance: float,
+                 weakening: float = 1.0, most: int = 64) -> ShearModes:
+    """`shear_modes` with the fewest modes, doubled from `count` up to `most`, whose backbone error meets `tolerance`.
+
+    A soft skin spreads the compliance over many modes; the pieces alone need eight.
+    """
+    found = shear_modes(tangential, limit, bond_length, count, weakening)
+    while found.backbone_error > tolerance and found.stiffness.size == count and count < most:
+        count = min(2 * count, most)
+        found = shear_modes(tangential, limit, bond_length, count, weakening)
+    return found
+
+
+def _backbone(limit, shape, values, length, slides) -> np.ndarray:
+    """Resultant [N] on the virgin slides (k,) for the saturating law D (1 - exp(-xi/length)), by Newton."""
+    b = np.zeros(values.size)
+    out = []
+    for slide in slides:
+        for _ in range(60):
+            xi = slide - shape @ b
+            decay = np.exp(np.minimum(-xi / length, 700.0))
+            traction, slope = 1 - decay, decay / length
+            missing = b / values - shape.T @ (limit * traction)
+            tangent = np.diag(1 / values) + shape.T @ ((limit * slope)[:, None] * shape)
+            step = np.linalg.solve(tangent, missing)
+            b = b - step
+            if np.abs(step).max() <= 1e-11 * (np.abs(b).max() + 1e-300):  # quadratic: the next one is round-off
+                break
+        out.append(limit @ -np.expm1(np.minimum(-(slide - shape @ b) / length, 700.0)))
+    return np.array(out)
+
+
+def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
+    """dT/d(slide) [N/m] with every node of the contact set sticking; active (m,) bool."""
+    index = np.flatnonzero(active)
+    return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
+
+
+def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:
+    """-dM/d(rotation) [N m/rad] about x = 0 at fixed approach and fixed contact set; x (m,) [m]."""
+    index = np.flatnonzero(active)
+    return float(np.linalg.solve(normal[np.ix_(index, index)], x[index]) @ x[index])
+
+
+def normal_stiffness(normal: np.ndarray, active: np.ndarray) -> float:
+    """dN/d(approach) [N/m] at fixed rotation and fixed contact set."""
+    return tangential_stiffness(normal, active)
