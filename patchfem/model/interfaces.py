@@ -1,31 +1,33 @@
 """The interfaces of a rig: which law and load acts on each, and whether load or yaw changes with the motion."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..core import ModalBasis
-from ..scene.tables import Normal
-from .load import varies
-
-ELEMENTS = ("coulomb", "tanh", "elastic-plastic", "nonlocal")
+from .law import Rubbing, acting
 
 
-def viewed(scene, number: int = 0):
-    """The scene as one interface sees it: the law and load of [[structure.interface]] `number` as [friction] and
-    [normal]; the scene itself where it names none."""
-    if scene.structure is None or not scene.structure.interface:
-        return scene
-    one = scene.structure.interface[number]
-    return replace(scene, friction=one, normal=Normal.model_construct(load=one.load, amplitude=None, frequency=None,
-                                                                      phase=None, width=None))
-
-
-def loads_of(scene) -> list:
-    """Normal load of every interface of a scene without [contact] [N]."""
+def rubbings_of(scene) -> tuple:
+    """A Rubbing for every interface of a rig: those of [[structure.interface]], or [friction]; none without either."""
     if scene.structure.interface:
-        return [one.load for one in scene.structure.interface]
-    return [scene.normal.load] if scene.normal is not None else []
+        return tuple(Rubbing(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
+                     for k, one in enumerate(scene.structure.interface))
+    if scene.friction is None:
+        return ()
+    load = scene.normal.load if scene.normal is not None else None
+    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), load),)
+
+
+def pad_width(scene) -> float | None:
+    """Width of the contact across the path [m]; strips share it."""
+    if scene.contact is not None:
+        return scene.contact.width
+    return scene.normal.width if scene.normal is not None else None
+
+
+def interface_names(scene) -> list:
+    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
+    found = [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]
 
 
 def yaws(scene) -> bool:
@@ -41,16 +43,9 @@ def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
     return basis.slide - np.outer(offsets, yaw)
 
 
-def limits(scene, number: int, load: float) -> tuple:
-    """(static, kinetic) friction force [N] of a Coulomb interface."""
-    from .law import acting
-
-    f = acting(viewed(scene, number)).friction
-    return f.static * load, (f.kinetic if f.kinetic is not None else f.static) * load
-
-
 def acts(scene) -> bool:
     """Whether the load of a rig changes with its motion (modes with normal or pitch) or in time (normal.amplitude)."""
-    if scene.structure is None or scene.friction is None:
+    if scene.friction is None and not scene.structure.interface:
         return False
-    return varies(scene) or any(mode.normal or mode.pitch for mode in scene.structure.mode)
+    varies = scene.normal is not None and bool(scene.normal.amplitude)
+    return varies or any(mode.normal or mode.pitch for mode in scene.structure.mode)

@@ -120,40 +120,19 @@ def motions(found: ModalBasis, modal) -> np.ndarray:
     return modal if found.shapes is None else modal @ found.shapes.T
 
 
-def frequencies(scene) -> np.ndarray:
+def frequencies(scene, modes: ModalBasis) -> np.ndarray:
     """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
     if scene.structure.mode and scene.structure.bonded is None:
         return np.array([mode.frequency for mode in scene.structure.mode])
-    return modes_of(scene).omega / (2 * pi)
+    return modes.omega / (2 * pi)
 
 
-def highest_frequency(scene) -> float:
-    """The largest natural frequency [Hz]; 0 where all coordinates are rigid."""
-    return float(frequencies(scene).max())
+def first_of(scene) -> tuple:
+    """(frequency [Hz], mass [kg]) of the first mode that is not rigid, without the bonded spring; 0 where all are.
 
-
-def first_frequency(scene) -> float:
-    """Frequency [Hz] of the first mode that is not rigid, in the order of the scene, without the bonded spring; 0 where
-    all are rigid. Masses and files have their modes in ascending order."""
-    return _first(scene)[0]
-
-
-def mode_stiffness(scene) -> float:
-    """Stiffness K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all rigid.
-
-    mass: moving_mass for modes, else the modal mass seen at the output, basis.mass / output_1^2.
+    mass: structure.moving_mass, or the modal mass at the output; where that mode leaves the output at rest, the mass of
+    all coordinates. Masses and files have their modes in ascending order.
     """
-    frequency, mass = _first(scene)
-    return mass * (2 * pi * frequency)**2 if frequency else 0.0
-
-
-def moving_mass(scene) -> float:
-    """The mass [kg] of dimensionless groups: structure.moving_mass, or the modal mass of the first mode at the output;
-    where that mode leaves the output at rest, the mass of all coordinates."""
-    return _first(scene)[1]
-
-
-def _first(scene) -> tuple:
     structure = scene.structure
     if structure.mode:
         held = [mode.frequency for mode in structure.mode if mode.frequency > 0]
@@ -167,13 +146,6 @@ def _first(scene) -> tuple:
     if structure.moving_mass is not None and structure.file is not None:
         return frequency, structure.moving_mass
     return frequency, float(found.mass / (share if share > 1e-12 * reach else reach))
-
-
-def friction_limit(scene, load: float) -> float:
-    """Sum of mu_s N [N] over the interfaces of a scene; load [N]: of [contact] or [normal]."""
-    if scene.structure is not None and scene.structure.interface:
-        return float(sum(i.static * i.load for i in scene.structure.interface))
-    return scene.friction.static * load
 
 
 def start_of(scene, modes: ModalBasis):

@@ -4,88 +4,79 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import ModalBasis, PatchfemError
-from ...model.accuracy import Settings, quadrature_of
-from ...model.drive import speed_of
-from ...model.interfaces import acts, limits, loads_of, viewed
-from ...model.law import acting, law_of
-from ...model.structure import modes_of
-from ...structure.drive_sizes import omega_of, peak_speed
+from ...core import PatchfemError
+from ...model.accuracy import Numerics, quadrature_of
+from ...model.law import Rubbing, bonds_of
+from ...model.model import Model
+from ...structure.drive_sizes import omega_of
 from ..patch.strips import strip_loads
 
 
-def model_of(scene, settings, patch, modes: ModalBasis, drive, start):
-    """The model that a march takes: one contact, or slots where interfaces or springs stand beside it."""
-    pass
-
-    structure, many = scene.structure, len(modes.interfaces) > 1
-    interlocked = structure.bonded is not None and structure.bonded.wavelength is not None
-    alone = None if many else contact_model(scene, settings, patch, drive)
-    if not many and structure.stiffening is None and not interlocked:
+def model_of(model: Model, numerics: Numerics, patch):
+    """The contact that a march takes: one, or joints where interfaces or springs stand beside it."""
+    rig, many = model.rig, len(model.rig.modes.interfaces) > 1
+    alone = None if many else contact_model(model, numerics, patch)
+    if not many and not rig.bends:
         return alone
     from ...dynamics.march import joints as slots
 
-    rows, elements = [*modes.interfaces], []
+    rows, elements = [*rig.modes.interfaces], []
     if many:
-        loads = strip_loads(patch) if patch is not None else loads_of(scene)
-        elements += [_element(scene, k, load, drive, start) for k, load in enumerate(loads)]
-    if interlocked:
-        elements.append(slots.interlock(0, structure.bonded.stiffness, structure.bonded.wavelength))
-    if structure.stiffening is not None:
-        elements.append(slots.cubic(len(rows), structure.stiffening.cubic))
-        rows.append(modes.output)
-    size = modes.mass * omega_of(drive) * peak_speed(drive, start)
+        loads = strip_loads(patch) if patch is not None else [one.load for one in rig.interfaces]
+        elements += [_element(rig.interfaces[k if patch is None else 0], k, load, rig.speed)
+                     for k, load in enumerate(loads)]
+    if rig.interlock is not None:
+        elements.append(slots.interlock(0, *rig.interlock))
+    if rig.cubic is not None:
+        elements.append(slots.cubic(len(rows), rig.cubic))
+        rows.append(rig.modes.output)
+    size = rig.modes.mass * omega_of(rig.drive) * rig.speed
     beside = alone if alone is not None and alone.limit > 0 else None
     return slots.SlotsModel(beside, tuple(elements), np.array(rows), size)
 
 
-def _element(scene, number: int, load: float, drive, start):
+def _element(one: Rubbing, number: int, load: float, speed: float):
     from ...dynamics.march import joints as slots
-    from ...model.law import acting, law_of
 
-    seen = acting(viewed(scene, number))
-    f = seen.friction
+    f = one.numbers
     if f.law == "coulomb":
-        return slots.coulomb(number, *limits(scene, number, load))
+        return slots.coulomb(number, *one.limits(load))
     if f.law == "tanh":
         return slots.rate(number, f.static * load, f.reference_speed)
     if f.law == "elastic-plastic":
         return slots.elastic_plastic(number, f.static * load, f.bond_length)
     if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1:
-        return slots.bonds(number, law_of(seen, peak_speed(drive, start)), load)
-    at = scene.where(f"structure.interface.{number}.law" if scene.structure.interface else "friction.law")
-    raise PatchfemError(f"{at}: '{f.law}' of reading '{f.reading}' and order {f.order:g} beside other interfaces: not "
-                        "yet built; use reading = \"stretch\" with order = 1")
+        return slots.bonds(number, bonds_of(f, speed, 1e-12), load)
+    raise PatchfemError(f"'{f.law}' of reading '{f.reading}' and order {f.order:g} beside other interfaces: not yet "
+                        "built; use reading = \"stretch\" with order = 1", f"{one.key}.law")
 
 
-def contact_model(scene, settings: Settings, patch, drive):
-    """The ContactModel of a marching scene; patch: the solved Patch or None for [normal]."""
+def contact_model(model: Model, numerics: Numerics, patch):
+    """The ContactModel of the one interface of a rig; patch: the solved Patch or None under [normal]."""
     from ...dynamics.march import march as hub
 
-    scene = acting(scene)
-    f, contact = scene.friction, scene.contact
+    f, soft = model.friction, model.soft
     if f is None:
         return hub.coulomb_model(0.0, 0.0)
-    if acts(scene):
+    if model.rig.load_varies:
         from .varying_load import model_of
 
-        return model_of(scene, modes_of(scene), patch, speed_of(scene, drive), settings.shear_modes)
-    load = patch.pressure.load if patch is not None else scene.normal.load
+        return model_of(model, patch, numerics.shear_modes)
+    load = patch.pressure.load if patch is not None else model.point.load
     limit = f.static * load
-    shear = contact.gives_way if contact is not None else ""
     if f.law == "convolution":
         from ..bench.averaged import limit_share
 
-        return hub.coulomb_model(*(limit * limit_share(scene, patch),) * 2)
+        return hub.coulomb_model(*(limit * limit_share(model, patch),) * 2)
     if f.law in ("coulomb", "elastic-plastic"):
         length = f.bond_length if f.law == "elastic-plastic" else 0.0
-        if shear:
+        if soft:
             from ...slip.shear_modes import jenkins_set
 
             per_node = patch.pressure.sigma_n * patch.pieces.interface.weight
             if f.law == "coulomb" and f.kinetic < f.static:
-                raise PatchfemError(f"{scene.path}: friction.kinetic below static with {shear}: not yet "
-                                    "built; the exact set of elements needs static = kinetic")
+                raise PatchfemError(f"friction.kinetic below static with {soft}: not yet built; the exact set of "
+                                    "elements needs static = kinetic", "")
             found = jenkins_set(patch.giving, f.static * per_node, length)
             return replace(hub.jenkins_model(found.stiffness, found.yield_slide), reduction=found)
         if f.law == "coulomb":
@@ -93,8 +84,14 @@ def contact_model(scene, settings: Settings, patch, drive):
         return hub.jenkins_model([limit / length], [length])
     if f.law == "tanh":
         return hub.rate_model(limit, f.reference_speed)
-    law = law_of(scene, speed_of(scene, drive))
-    found = quadrature_of(scene, settings, drive)
+    return _bonds(model, numerics, patch, load)
+
+
+def _bonds(model: Model, numerics: Numerics, patch, load: float):
+    """The contact of law 'nonlocal': a list of bonds, points behind shear modes, points of a field, or one point."""
+    from ...dynamics.march import march as hub
+
+    law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if found.engine == "exponential":
         return hub.place_model(law, limit, found.tail, found.nodes, found.width, found.ripe)
     if found.engine != "recursion":
@@ -102,16 +99,13 @@ def contact_model(scene, settings: Settings, patch, drive):
 
         reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
         return hub.list_model(law, limit, reach, found.merge)
-    if shear:
+    if model.soft:
         from ..patch.press import shear_of
 
-        reduced = shear_of(patch, law, settings.shear_modes, scene.accuracy.tolerance)
-        model = hub.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
-        return replace(model, reduction=reduced)
-    if settings.per_point:
-        from ...model.gap import shape_side
-
+        reduced = shear_of(patch, law, numerics.shear_modes, model.accuracy.tolerance)
+        contact = hub.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
+        return replace(contact, reduction=reduced)
+    if numerics.per_point:
         x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
-        pattern = (x, sigma) if shape_side(contact) == "lower" else None
-        return hub.points_model(law, weight, sigma, None, pattern)
+        return hub.points_model(law, weight, sigma, None, (x, sigma) if model.side == "lower" else None)
     return hub.points_model(law, [1.0], [load])

@@ -5,10 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import ModalBasis, Outcome, Response
-from ...model.accuracy import Settings
-from ...model.interfaces import yaws
-from ...model.structure import mode_stiffness, start_of
+from ...core import Outcome, Response
 from ...response.measures import (
     energy_balance,
     harmonic,
@@ -63,8 +60,8 @@ def _ledger(ledger) -> dict:
     return {name: value for name, value in ledger_measures(ledger).items() if name != "energy_stored"}
 
 
-def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
-    """One march at settings.steps per cycle."""
+def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Raw:
+    """One march at numerics.steps per cycle; patch: the solved Patch or None."""
     from ...dynamics.march import march as hub
     from ...dynamics.march.march import Mark
     from ...response import run_events
@@ -72,91 +69,93 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     from .interface import model_of
     from .strips import joined, other_measures
 
-    travel, marks, start = scene.structure.travel or np.inf, rig_levels.ends(scene), start_of(scene, modes)
+    rig, f = model.rig, model.friction
+    modes, drive, start, travel, marks = rig.modes, rig.drive, rig.start, rig.travel, rig_levels.ends(rig)
     begin = perf_counter()
-    model = model_of(scene, settings, patch, modes, drive, start)
+    contact = model_of(model, numerics, patch)
     reduced = perf_counter() - begin
-    hub.warm_up(modes, drive, model, say)
+    hub.warm_up(modes, drive, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
-    frames = 0 if yaws(scene) else frames  # strips have no common field of shear
-    done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
+    frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
+    done = hub.march(modes, drive, contact, numerics.cycles, numerics.steps, numerics.window, travel, frames, say,
                      progress, start, marks)
     seconds = perf_counter() - begin
-    done = joined(done, patch) if yaws(scene) else done
-    last = min(settings.window, len(done.amplitudes))
+    done = joined(done, patch) if rig.strips_slide_apart else done
+    last = min(numerics.window, len(done.amplitudes))
     values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
     held, rubbing = 0.0, None
-    if scene.friction is None:
+    if f is None:
         values.pop("friction_force_peak")
     else:
-        length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
-        held = 1e-3 * length if model.kind else 1e-15 * peak_speed(drive) * drive.period
-        held *= scene.friction.law != "tanh"  # a law of the speed never holds
+        length = contact.length or contact.limit / max(float(np.sum(contact.fields.get("stiffness", [0.0]))), 1e-300)
+        held = 1e-3 * length if contact.kind else 1e-15 * peak_speed(drive) * drive.period
+        held *= f.law != "tanh"  # a law of the speed never holds
 
         def rubbing(part):
-            others = {} if yaws(scene) else other_measures(part.window, drive, settings.steps)
-            found = _rubbing(scene, settings, modes, drive, patch, part) | others
-            rigid = not model.kind and found["slip_amplitude"] < held  # what moves is round-off
+            others = {} if rig.strips_slide_apart else other_measures(part.window, drive, numerics.steps)
+            found = _rubbing(model, numerics, patch, part) | others
+            rigid = not contact.kind and found["slip_amplitude"] < held  # what moves is round-off
             return {name: v for name, v in found.items() if not (rigid and name.startswith("equivalent_"))}
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
         values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
     rings, own, stuck = {}, {}, False
-    if scene.friction is not None:
+    if f is not None:
         rings, own = run_events.rings(done.window, modes, drive, None, held)
-        stuck = run_events.all_stick(done.window, held) and scene.friction.law != "tanh"
-        if stuck and not model.kind:  # what moves in round-off does not slide
+        stuck = run_events.all_stick(done.window, held) and f.law != "tanh"
+        if stuck and not contact.kind:  # what moves in round-off does not slide
             values["stick_fraction"] = 1.0
             for name in ("slip_start_phase", "equivalent_stiffness", "equivalent_damping"):
                 values.pop(name, None)
             moving = modes.mass * peak_speed(drive, start)**2  # its energies are round-off of such a one
             values["energy_balance"] = energy_balance(done.ledger | {"power": done.ledger["power"] + moving})
     values |= rings
-    if scene.friction is not None and "normal_load" in done.window.extra:
+    if f is not None and "normal_load" in done.window.extra:
         load = done.window.extra["normal_load"]
         values |= {"normal_load_least": float(load.min()), "normal_load_peak": float(load.max()),
                    "open_fraction": float(np.mean(load <= 0))}
     levels, slips = (), None
     if marks:
-        levels = rig_levels.rows(scene, done.marks, drive, held, rubbing)
+        levels = rig_levels.rows(rig.levels, done.marks, drive, held, rubbing)
 
         def slips(number, level):
             other = rig_levels.drive_with(drive, number + 1, level)
             run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
-                modes, other, model, settings.steps, travel, start)
-            return run.slip_amplitude(round(marks[0]), settings.window) >= held
+                modes, other, contact, numerics.steps, travel, start)
+            return run.slip_amplitude(round(marks[0]), numerics.window) >= held
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    ends = window_ends(done.amplitudes, done.phasors, settings.window)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_of(drive, *ends), outcome, done.snapshots, done.ledger, seconds, model,
+    ends = window_ends(done.amplitudes, done.phasors, numerics.window)
+    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
+               steady_of(drive, *ends), outcome, done.snapshots, done.ledger, seconds, contact,
                {"reduce": reduced, "load": loaded}, done.message, levels, slips, held=held, own=own)
 
 
-def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -> dict:
+def _rubbing(model, numerics, patch, part) -> dict:
     """Measures of the interface in a Mark of a march."""
-    w, omega = part.window, omega_of(drive)
-    values = slip_measures(w, drive, settings.steps)
+    drive, w = model.rig.drive, part.window
+    omega = omega_of(drive)
+    values = slip_measures(w, drive, numerics.steps)
     if not sinusoidal(drive):
         values.pop("slip_start_phase", None)
-    values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
+    values["normal_load"] = patch.pressure.load if patch is not None else model.point.load
     weight = np.full(w.time.size, 1.0)
     weight[[0, -1]] = 0.5
     span = w.time[-1] - w.time[0]
     work = part.work  # of all strips; of interfaces only the first, the others have their own
-    if len(scene.structure.interface) > 1:
+    if len(model.rig.interfaces) > 1:
         work = float(part.step_force @ np.diff(w.slide))
     work *= drive.period / span if span > 0 else 0.0
     q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
     if whole(span, drive):
         values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,
-                                 mode_stiffness(scene))
+                                 model.rig.stiffness)
     return values
 
 
-def created_warning(scene, book: dict, cycles: float) -> list:
+def created_warning(model, book: dict, cycles: float) -> list:
     """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
-    if scene.friction is None or scene.friction.reading != "report":
+    if model.friction is None or model.friction.reading != "report":
         return []
     made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
     if made <= 1e-9 * work or made <= 0:
