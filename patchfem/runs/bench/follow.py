@@ -86,7 +86,7 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
 def _with_room(contact, model, slide):
     """The contact with a list of bonds that holds what the samples slide (k,) [m] may add."""
     have = contact.bondlist.shape[1]
-    if not have or contact.law[7]:
+    if not have:
         return contact
     least = max(min(contact.growth[3], contact.growth[4]), 1e-3 * contact.growth[3])
     each = np.minimum(np.ceil(4 * np.abs(np.diff(slide)) / least), 4 * ceil(min(contact.law[6] / least, 1e6)) + 1)
