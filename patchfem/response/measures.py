@@ -90,6 +90,26 @@ def ledger_measures(ledger) -> dict:
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
+def work_check(work, pairs, jumps: bool = False) -> float:
+    """The energy book against the run's own samples: |trapezoid of the forces over the slides - work|, over the work
+    that went to and fro [1]; it falls with the square of the step.
+
+    work (k,) [J]: running sum of the book; pairs: (slide (k,) [m], force (k,) [N]) of every direction. jumps: whether
+    the force jumps where the slide starts or turns; the sample there holds the force before the jump, so the force
+    after it is taken from the work of the step that follows.
+    """
+    parts = np.diff(work)
+    power, total = np.abs(parts).sum(), 0.0
+    for slide, force in pairs:
+        move, ends = np.diff(slide), force[:-1] + force[1:]
+        if jumps:
+            way = np.sign(move)
+            turned = (way != 0) & (way != np.append(0.0, way[:-1]))
+            ends[turned] = 2 * parts[turned] / move[turned]
+        total += float(ends @ move) / 2
+    return float(abs(total - work[-1]) / power) if power > 0 else 0.0
+
+
 def drift(time, slide, period: float) -> float:
     """Mean motion per cycle [m] over the window: last cycle's mean minus the first one's, per cycle between them."""
     end, start = time[-1], time[0]

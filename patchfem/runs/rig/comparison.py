@@ -12,7 +12,8 @@ from ...response import run_events
 from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...structure.drive_sizes import omega_of, peak_speed
-from .solution import Solution, borne, measures_of, sampled_loop, seen
+from .solution import Solution, borne, sampled_loop, seen
+from ...response.rows import measures_of
 from .strips import other_measures
 
 TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say

@@ -13,7 +13,8 @@ from ...response.outcome import steady_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 from ..patch.strips import strip_loads
 from . import levels as rig_levels
-from .solution import Solution, borne, measures_of, seen
+from .solution import Solution, borne, seen
+from ...response.rows import measures_of
 from .strips import as_one, other_measures
 
 
