@@ -11,9 +11,9 @@ from ...dynamics.march.march import hermite_extremes
 from ...response import run_events
 from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
+from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, peak_speed
 from .solution import Solution, borne, sampled_loop, seen
-from ...response.rows import measures_of
 from .strips import other_measures
 
 TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say

@@ -10,11 +10,11 @@ from ...response import run_events
 from ...response.levels import Level
 from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
 from ...response.outcome import steady_of
+from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 from ..patch.strips import strip_loads
 from . import levels as rig_levels
 from .solution import Solution, borne, seen
-from ...response.rows import measures_of
 from .strips import as_one, other_measures
 
 

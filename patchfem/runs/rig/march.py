@@ -8,10 +8,10 @@ from ...core import Outcome
 from ...response import run_events
 from ...response.measures import step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
+from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, peak_speed
 from . import levels as rig_levels
 from .solution import Solution, sampled_loop, seen
-from ...response.rows import measures_of
 from .strips import joined, other_measures
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core import BaseSine, Measure, Outcome, PatchfemError
 from ...model.engine import no_closed_form
-from .solution import Solution, sampled_loop, seen
 from ...response.rows import measures_of
+from .solution import Solution, sampled_loop, seen
 from .strips import other_measures
 
 SAMPLES = 1024  # of the cycle that measures are read off
