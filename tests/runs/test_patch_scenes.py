@@ -177,7 +177,7 @@ def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(t
     tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
     with pytest.raises(PatchfemError, match=r"scene\.toml:10: contact\.profile\.file: .* % of its height below 2 "
                                             "elem.*element_size"):
-        solved(tables, path=tmp_path / "scene.toml")
+        run(scene(tables, path=tmp_path / "scene.toml"))
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
     assert any("left to the law of the asperities" in note for note in patch.notes)
     box = np.sinc(0.127e-3 / 50e-6)  # of the average over a cell
