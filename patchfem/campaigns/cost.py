@@ -5,6 +5,7 @@ from time import perf_counter
 
 from ..core import NotConverged, PatchfemError
 from ..model.model import Model
+from ..model.source import placed
 from ..runs.plan import plan
 from ..runs.run import run
 
@@ -44,6 +45,11 @@ def curve(model: Model, knob: str, say=None) -> list:
 
     PatchfemError for a knob that this scene does not have.
     """
+    with placed(model.source):
+        return _curve(model, knob, say)
+
+
+def _curve(model: Model, knob: str, say) -> list:
     mine = knobs_of(model)
     if knob not in mine:
         raise PatchfemError(f"cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}", "")
@@ -95,8 +101,8 @@ def _turned(model: Model, knob: str):
             yield str(value), float(value), (replace(model, accuracy=accuracy), 0)
 
 
-def _sized(model, size):
-    return replace(model, contact=model.patch.model_copy(update={"element_size": size}))
+def _sized(model: Model, size: float | None) -> Model:
+    return replace(model, patch=model.patch.sized(size, model.kind))
 
 
 def _timed(turned, label: str, value, say, estimate: bool = False):

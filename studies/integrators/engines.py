@@ -20,8 +20,7 @@ from patchfem.dynamics.events import sdof, sdof_kernels
 from patchfem.dynamics.events.sdof_samples import position
 from patchfem.dynamics.march import march as marching
 from patchfem.model.accuracy import choose
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
+from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
 from patchfem.scene import scene
@@ -78,10 +77,9 @@ def problem(name: str) -> Problem:
         made = Problem(name, problems.TWO, problems.TWO_DRIVE, problems.TWO_LIMIT, 20,
                        {"limit": problems.TWO_LIMIT, "omega": 1.14})
         return replace(made, truth=exact(made, 0))
-    given = scene.load(HERE / "patch.toml")
-    modes, drive = modes_of(given), drive_of(given)
-    contact = contact_model(given, choose(given),
-                                         solve_all(given, False)[0], drive)
+    model = build(scene.load(HERE / "patch.toml"))
+    modes, drive = model.rig.modes, model.rig.drive
+    contact = contact_model(model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0])
     k, y = contact.fields["stiffness"], contact.fields["limit"]
     numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
                "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}

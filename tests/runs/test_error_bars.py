@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from patchfem.mesh.tensor import TensorGrid, coarser, finer
+from patchfem.model.model import build
 from patchfem.runs.patch import grading
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all
@@ -72,14 +73,14 @@ def settings(seed: int, kind: str) -> list:
 
 def compared(seed: int, kind: str) -> dict:
     """name -> (value, error, truth) of a random scene; the truth is what two splits of every cell lead to."""
-    scene = loads(PIECE, "a.toml", settings(seed, kind))
-    series = solve_all(scene)
+    model = build(loads(PIECE, "a.toml", settings(seed, kind)))
+    series = solve_all(model.patch, model.accuracy.tolerance)
     found = measures(*series)
     grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
     same = grids[0] is grids[1]
     for _ in range(2):
         grids = [finer(grid) for grid in grids[:2 - same]]
-        finest.append(values(pressed(scene, condensed(scene, *grids))))
+        finest.append(values(pressed(model.patch, condensed(model.patch, *grids))))
     return {name: (m.value, m.error, limit(*(value[name] for value in finest))) for name, m in found.items()}
 
 

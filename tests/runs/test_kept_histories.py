@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from patchfem.core import G_N, Outcome
-from patchfem.model.drive import drive_of
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -81,8 +80,8 @@ CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES
 
 @pytest.mark.parametrize(("engine", "drive"), CASES)
 def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, engine, drive):
-    scene, result = done(engine, drive)
-    r, sine = result.response, drive_of(scene)
+    _, result = done(engine, drive)
+    r, sine = result.response, result.plan.model.rig.drive
     end = result.window.time[-1]
     assert np.all(np.diff(r.time) > 0) and r.time[0] == 0 and r.time[-1] == end
     assert r.time.size >= 100
@@ -113,7 +112,8 @@ def test_always_every_reversal_is_kept(done, engine, drive):
 @pytest.mark.parametrize("engine", ["exact", "exact two modes", "march coulomb", "march plastic", "march bonds"])
 def test_always_every_stop_and_release_is_kept(done, engine):
     """Of the exact engine each event of its list; of a march, those of a run whose window is the whole run."""
-    scene, result = done(engine, "sine")
+    _, result = done(engine, "sine")
+    period = result.plan.model.rig.drive.period
     r, events = result.response, result.extra["events"]
     gaps = np.array([np.abs(r.time - t).min() for t in events.time])
     if engine.startswith("exact"):
@@ -128,12 +128,11 @@ def test_always_every_stop_and_release_is_kept(done, engine):
     whole = run(plan(short), estimate=False)
     # the first cycles are kept whole in the short run: the same steps of the same motion
     slips, slides = slips_of(whole.response)
-    seen = detected(whole.response.time[-2 * step - 1:], slips[-2 * step - 1:], slides[-2 * step - 1:],
-                    drive_of(scene).period)
+    seen = detected(whole.response.time[-2 * step - 1:], slips[-2 * step - 1:], slides[-2 * step - 1:], period)
     stops = seen.time[np.isin(seen.kind, (0, 1, 2))]
     assert stops.size >= 4
     apart = np.array([np.abs(r.time - t).min() for t in stops])
-    assert apart.max() <= 1.6 * drive_of(scene).period / step
+    assert apart.max() <= 1.6 * period / step
 
 
 def test_exact_how_runs_end():

@@ -11,7 +11,7 @@ from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.plane import PlaneRecursion
 from patchfem.inputs.paths import read_path
-from patchfem.model.slide import path_of, peak_speed
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
@@ -54,7 +54,7 @@ def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
     assert abs(force) == pytest.approx(size, abs=1e-5)
     assert -np.degrees(np.angle(force / motion)) == pytest.approx(lag, abs=2e-3)
     assert found.values["energy_balance"] < 1e-12 and found.yaw_moment is None
-    assert peak_speed(scene) == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
+    assert build(scene).speed == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
 
 
 @pytest.mark.parametrize("keys", ["", "order = 0\n", 'reading = "report"\norder = 2\n',
@@ -96,14 +96,14 @@ def test_exact_the_resting_turn_of_a_right_angle(table):
 def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     """Resultants and yaw moment from the law at every node of every strip, with that strip's own pressure."""
     scene = table(L_SHAPE, SMALL_PATCH + strips + NONLOCAL)
-    patch = solve_all(scene, False)[0]
+    patch = solve_all(build(scene).patch, 1e-3, False)[0]
     found = law_bench.run(scene, patch, 60, 6)
     count = 4 if strips else 1
     sigma = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
     y = patch.strips.offsets if strips else np.zeros(1)
     weight = np.tile(patch.pieces.interface.weight / count, count)
     law, flat = PlaneRecursion(Bonds(0.3, 2e-6)), sigma.ravel()
-    time, slide, *_ = path_of(scene, 60)
+    time, slide, *_ = build(scene).slide.samples(60)
     q = np.stack([slide, np.interp(time, *np.array([[0, 2e-3, 6e-3, 8e-3], [0, 0, 20e-6, 24e-6]]))], axis=1)
     state, rows = law.start(flat), [np.zeros((2, flat.size))]
     for dq, dt in zip(np.diff(q, axis=0), np.diff(time)):
@@ -204,5 +204,5 @@ def test_exact_level_strips_are_the_patch(side):
 
 def bench_of(text, *sets):
     scene = loads(text + TRIANGLE, sets=sets)
-    patch = solve_all(scene, False)[0] if scene.contact is not None else None
+    patch = solve_all(build(scene).patch, 1e-3, False)[0] if scene.contact is not None else None
     return law_bench.run(scene, patch, 120, 4)

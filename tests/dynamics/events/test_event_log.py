@@ -68,15 +68,12 @@ def test_exact_borders_of_levels_are_listed_by_both():
 
 def test_exact_levels_of_a_scene_are_those_of_one_run():
     """The scene runs level after level; the list is that of one run through all segments."""
-    scene = loads(RIG)
-    found = run(plan(scene), estimate=False).extra["events"]
-    from patchfem.model.drive import drive_of
-    from patchfem.model.structure import modes_of
-
-    drive = drive_of(scene)
+    result = run(plan(loads(RIG)), estimate=False)
+    found, model = result.extra["events"], result.plan.model
+    drive = model.rig.drive
     assert isinstance(drive, Piecewise)
-    limit = 0.3 * scene.normal.load
-    whole = of_log(sdof.simulate(modes_of(scene), drive, limit, limit, 100, 10).log)
+    limit = 0.3 * model.point.load
+    whole = of_log(sdof.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
     assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()
     assert found.time == pytest.approx(whole.time, abs=1e-10)
     assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)

@@ -10,8 +10,6 @@ from patchfem.dynamics.harmonic.balance import periodic_response, regime
 from patchfem.dynamics.harmonic.branch import response
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring, Stretch, synthesis
 from patchfem.dynamics.harmonic.point import group_of, point
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
 from patchfem.response.measures import acceleration_peak, harmonic, interface_loop, slip_measures
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -27,8 +25,8 @@ DRIVE = BaseSine(1.0, 1.0)
 def test_exact_measures_of_a_run_of_a_scene(law):
     """The last ten of 300 cycles of a marched run at 5 g and the measures of the balance."""
     scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
-    found = run(plan(scene), estimate=False).measures
-    modes, drive = modes_of(scene), drive_of(scene)
+    result = run(plan(scene), estimate=False)
+    found, modes, drive = result.measures, result.plan.model.rig.modes, result.plan.model.rig.drive
     limit = 0.3 * LOAD
     p = point(modes, drive, Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else Stretch(limit, 20e-6),
               tolerance=1e-5)

@@ -15,7 +15,7 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.model.accuracy import choose as settings_of
 from patchfem.model.accuracy import quadrature_of
-from patchfem.model.drive import drive_of
+from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.march import created_warning
@@ -176,9 +176,10 @@ def test_exact_engine_of_a_scene(tmp_path):
     for engine, order, reading, kind in (("auto", 1, "stretch", 2), ("direct", 1, "stretch", 3),
                                          ("merged", 2, "stretch", 3), ("truncated", 0, "report", 3),
                                          ("recursion", 1, "stretch", 2)):
-        found = rig(tmp_path, engine, reading, order)
-        assert contact_model(found, settings_of(found), None, drive_of(found)).kind == kind
-        used = quadrature_of(found, settings_of(found), drive_of(found)).engine
+        found = build(rig(tmp_path, engine, reading, order))
+        numerics = settings_of(found)
+        assert contact_model(found, numerics, None).kind == kind
+        used = quadrature_of(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"sum over bonds by {used}" in line for line in plan(found).verdict)
 
@@ -191,8 +192,8 @@ def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
 
 
 def test_exact_warning_of_energy_created(tmp_path):
-    found = rig(tmp_path)
+    found = build(rig(tmp_path))
     assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
         "the printed law created 5e-07 J per cycle, 0.2 % of what it dissipated; reading = \"stretch\" creates none"]
     assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
-    assert created_warning(rig(tmp_path, reading="stretch"), {"created": 1.0, "dissipated": 1.0}, 4) == []
+    assert created_warning(build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4) == []

@@ -8,7 +8,8 @@ from scene_texts import GROWING, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.integrate import dblquad
 
 from patchfem.friction.bonds.spread import pad_factor
-from patchfem.model.law import acting, bonds_of
+from patchfem.model.law import acting
+from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -56,20 +57,21 @@ def patch_of(text):
         return None
     from patchfem.runs.patch.ladder import solve_all
 
-    return solve_all(loads(SMALL_PATCH + NONLOCAL + TRIANGLE), False)[0]
+    return solve_all(build(loads(SMALL_PATCH + NONLOCAL + TRIANGLE)).patch, 1e-3, False)[0]
 
 
 def test_exact_a_growing_law_keeps_its_ratio_of_lengths():
     scene = loads(SMALL_PATCH + GROWING + TRIANGLE, sets=SPREAD)
-    before, after = bonds_of(loads(SMALL_PATCH + GROWING + TRIANGLE)), bonds_of(scene)
+    model = build(scene)
+    before, after = build(loads(SMALL_PATCH + GROWING + TRIANGLE)).bonds, model.bonds
     assert after.ratio == pytest.approx(before.ratio, rel=1e-15) and after.length == before.length
     assert after.static == pytest.approx(pad_factor(12.7e-3, 4e-3) * before.static, rel=1e-15)
-    assert acting(acting(scene)).friction == acting(scene).friction
+    assert acting(model.friction, model.pad, scene.where) == model.friction and model.friction.spread is None
 
 
 def test_exact_strips_share_the_whole_width():
     sets = ["contact.strips.count=4"]
-    one, four = (acting(loads(SMALL_PATCH + NONLOCAL + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
+    one, four = (build(loads(SMALL_PATCH + NONLOCAL + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
     assert one.static == four.static == pytest.approx(0.3 * pad_factor(12.7e-3, 4e-3), rel=1e-15)
 
 

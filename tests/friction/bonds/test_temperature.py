@@ -13,7 +13,7 @@ from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.bonds.temperature import WarmRecursion, critical_speed, grow_each, growth_at, surface_rise
-from patchfem.model.law import acting, law_of
+from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -125,7 +125,7 @@ def test_exact_a_warm_rig_is_a_rig_with_the_rates_of_the_warm_surface():
     warm = loads(POINT + GROWING + WARM + SHORT, sets=["friction.rest_speed=10 um/s"])
     same = loads(POINT + GROWING + SHORT, sets=["friction.rest_speed=10 um/s", f"friction.rest_growth={rest!r} m/s^2",
                                               f"friction.slip_growth={slip!r} m"])
-    assert law_of(warm, 1.0) == law_of(same, 1.0)
+    assert build(warm).bonds == build(same).bonds != build(loads(POINT + GROWING + SHORT)).bonds
     one, two = (run(plan(scene), estimate=False).measures for scene in (warm, same))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
     assert one != run(plan(loads(POINT + GROWING + SHORT)), estimate=False).measures
@@ -135,7 +135,7 @@ def test_exact_the_plan_names_the_temperature():
     warm, plain = plan(loads(POINT + GROWING + WARM + SLIDE)), plan(loads(POINT + GROWING + SLIDE))
     assert "friction.temperature" in warm.effects and "friction.temperature" not in warm.not_in_scene
     assert "friction.temperature" in plain.not_in_scene
-    assert acting(loads(POINT + GROWING + SLIDE)).friction.temperature is None
+    assert warm.model.heat is not None and warm.model.friction.temperature is None and plain.model.heat is None
 
 
 @pytest.mark.parametrize("sets, says", [

@@ -14,7 +14,7 @@ from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
-from patchfem.model.load import load_at, refined
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -127,7 +127,7 @@ def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
     """At v: m = N, z' = v (N - z/eps), s2' = v (2 z - s2/eps), the rule for a falling N in between: order 1."""
     scene = bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING)
     time = np.linspace(0, 0.02, 400_001)
-    load, z, s2 = load_at(scene, time), np.zeros(time.size), 0.0
+    load, z, s2 = build(scene).point.at(time), np.zeros(time.size), 0.0
     x = 1e-3 * 0.5e-7 / 2e-6  # v dt/eps; lengths in eps, loads in N
     for k in range(1, time.size):
         mean, last = (load[k] + load[k - 1]) / 2, z[k - 1]
@@ -146,8 +146,8 @@ def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
 
 
 def test_exact_samples_hold_the_instants_without_load():
-    scene = bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N"))
-    time, slide = refined(scene, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16)
+    model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N")))
+    time, slide = model.point.refined(model.slide, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16)
     turns = (np.arange(-1, 8)[:, None] + np.array([1, -1]) * np.arccos(-100 / 150) / (2 * np.pi)).ravel()
     edges = (turns - 0.5 / (2 * np.pi)) / 300
     edges = edges[(edges > 0) & (edges < 0.02)]
