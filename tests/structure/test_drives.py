@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
@@ -117,23 +118,7 @@ def test_order_a_recorded_sine_tends_to_the_sine():
 
 # ---- scenes
 
-RIG = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "elastic-plastic"
-static = 0.3
-bond_length = "1 um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[accuracy]
-tolerance = 1e-2
-"""
+RIG = POINT + PLASTIC + MODE + "[accuracy]\ntolerance = 1e-2\n"
 
 
 def measured(drive, head=RIG):
