@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from friction_paths import random_walk, triangle, upper_pressure, walk
 from march_paths import OMEGA, follow, one_mode
+from scene_texts import DRIVE, KILOGRAM
 
 from patchfem.core import BaseSine
 from patchfem.dynamics.march.march import march
@@ -33,18 +34,7 @@ order = {order}
 bond_length = "1 um"
 initial_bonds = 0.0
 {growth}
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 3
+""" + KILOGRAM + DRIVE.replace("cycles = 30", "cycles = 3") + """\
 [accuracy]
 quadrature = "{engine}"
 """
