@@ -10,7 +10,7 @@ from ...model.load import refined, varies
 from ...model.slide import lateral_corners, path_of
 from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
 from .engine import STEPPED, WITHOUT_MEMORY, Engine, engine_of
-from .follow import Watch
+from .follow import UNWATCHED, Watch
 from .rigid import rigid
 from .shear import with_shear
 from .stepped import stepped
@@ -42,7 +42,7 @@ class BenchRun:
     yaw_moment: np.ndarray | None = None
 
 
-def run(scene, patch, steps: int, frames: int = 0, path=None, watch: Watch = Watch()) -> BenchRun:
+def run(scene, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNWATCHED) -> BenchRun:
     """Slide the interface of a scene along its path with `steps` per cycle, or along `path` in the form of `path_of`;
     patch None for [normal]; frames: fields kept on the way."""
     begin = perf_counter()

@@ -26,7 +26,8 @@ def rigid(scene, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
         force, ledger, at, tau = _closed(scene, patch, time, slide, frames)
         watch.tell(1.0)
     else:
-        done = follow(one_point(scene, load, engine), time, slide, frames, watch, scene.friction.rest_growth is not None)
+        ages = scene.friction.rest_growth is not None
+        done = follow(one_point(scene, load, engine), time, slide, frames, watch, ages)
         force, ledger, at = done.force, done.ledger, done.at
         tau = np.outer(force[at] / load if load > 0 else np.zeros(at.size), sigma)
     loads = np.full(time.size, load)
