@@ -7,12 +7,10 @@ import numpy as np
 
 from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
 from .engine import STEPPED, WITHOUT_MEMORY, Engine, engine_of
-from .follow import Watch
+from .follow import UNWATCHED, Watch
 from .rigid import rigid
 from .shear import with_shear
 from .stepped import stepped
-
-UNWATCHED = Watch()
 
 
 @dataclass(frozen=True, eq=False, slots=True)

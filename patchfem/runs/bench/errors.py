@@ -42,12 +42,15 @@ def sum_errors(model, patch, fine, quarter, few: int, say=None) -> list:
 
 def stated(model, fine) -> dict:
     """Error by measure name that follows from the bound of the sum over bonds, which is a share of the friction limit:
-    forces and slip directly, energies as that share of the work that went to and fro."""
+    forces and slip directly, work as that share of what went to and fro, the store as that of a bond length at the
+    limit."""
     error, f, power = fine.engine.choice.error, model.friction, float(np.abs(np.diff(fine.ledger[0])).sum())
     force = error * f.static
     out = {"friction_force_peak": force * float(fine.load.max()), "friction_ratio_end": force,
            "friction_ratio_peak": force, "slip_amplitude": error * f.bond_length, "work_check": error}
-    out |= {name: error * power for name in ("friction_work", "energy_stored", "energy_dissipated", "energy_created")}
+    out |= {name: error * power for name in ("friction_work", "energy_dissipated")}
+    out["energy_stored"] = out["friction_force_peak"] * f.bond_length
+    out["energy_created"] = error * fine.values["energy_created"]
     out["loop_area"] = error * float(np.abs(np.diff(fine.ledger[0][fine.first:])).sum())
     out["equivalent_stiffness"] = error * abs(fine.values.get("equivalent_stiffness", 0.0))
     return {name: value for name, value in out.items() if name in fine.values} | \

@@ -55,6 +55,9 @@ class Followed:
         return ledger_of(work, self.stored, losses)
 
 
+UNWATCHED = Watch()
+
+
 def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -> Followed:
     """Slide a ContactModel along the samples time [s], slide [m] (k,), with `frames` copies of its state on the way.
 
