@@ -9,7 +9,6 @@ from ...response.measures import harmonic, interface_loop, ledger_measures, step
 from .engine import STEPPED, WITHOUT_MEMORY, Engine, engine_of
 from .follow import UNWATCHED, Watch
 from .rigid import rigid
-from .shear import with_shear
 from .stepped import stepped
 
 
@@ -70,6 +69,8 @@ def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
 
         return run_plane(model, patch, *path, frames, watch)
     if model.soft:
+        from .shear import with_shear
+
         return with_shear(model, patch, *path, frames, watch), {}
     if engine.kind == STEPPED:
         return stepped(model, patch, *path, frames, watch), {}
