@@ -261,7 +261,7 @@ def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float
 @app.command
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
     """Write the fields of a results folder as .pvd (series), .vtu or .csv (last or --frame), or .vtkhdf."""
-    from .export.vtu import export as write
+    from .export.fields.vtu import export as write
 
     print(write(folder, out, frame))
 
@@ -270,7 +270,7 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out
 def view(folder: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None,
          frame: int | None = None, magnify: float | None = None):
     """Show the pressed pieces of a results folder in a window, or draw them into -o PICTURE.png."""
-    from .export.view import view as show
+    from .export.fields.view import view as show
 
     show(folder, out, frame, magnify, say)
 

@@ -59,8 +59,3 @@ def load(module: str, say=None):
 
         numba.config.CACHE_DIR = str(folder)
     return import_module(f"patchfem.{module}")
-
-
-def load_kernels(say=None):
-    """The compiled hub `dynamics.march.loop_kernels`."""
-    return load("dynamics.march.loop_kernels", say)

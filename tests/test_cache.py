@@ -22,7 +22,8 @@ SCENE = (
 MARCH = """\
 import json, sys
 import patchfem.runs.run as simulate
-from patchfem.compiled import load, load_kernels
+from patchfem.compiled import load
+from patchfem.dynamics.march.models import load_kernels
 from patchfem.scene.scene import loads
 said = []
 result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estimate=False)

@@ -55,7 +55,7 @@ def test_exact_a_rubbing_point_needs_no_patch(scene):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled")
-    assert {"patchfem.dynamics.events.sdof", "patchfem.structure.modes"} <= modules
+    assert {"patchfem.dynamics.one_mode.sdof", "patchfem.structure.modes"} <= modules
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
@@ -65,7 +65,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
            "dynamics.comparison.newmark",
            "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
-           "dynamics.events.steady", "dynamics.events.steady_events",
+           "dynamics.one_mode.steady", "dynamics.events.steady_events",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load", "runs.rig.comparison",
            "runs.rig.steady", "dynamics.harmonic.balance", "contact.atlas", "inputs.signals")
@@ -90,7 +90,7 @@ def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled")
-    assert "patchfem.dynamics.events.sdof" in modules
+    assert "patchfem.dynamics.one_mode.sdof" in modules
 
 
 def test_exact_a_bench_needs_no_structure(scene):

@@ -72,7 +72,7 @@ def write(result: Result, path: Path) -> dict:
     _write_netcdf(result, path / "result.nc", text)
     data = report_data(result)
     if result.patch is not None:
-        from .bodies import write_fields
+        from .fields.bodies import write_fields
 
         drawn = write_fields(result, path / "fields.vtkhdf")
         data |= {"bodies": drawn} if drawn else {}

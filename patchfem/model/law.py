@@ -1,4 +1,4 @@
-"""The numbers of a friction law as they act: at its surface temperature (2.13) and spread over its pad (2.15)."""
+"""The law of every interface with its numbers as they act: at a surface temperature (2.13) and over a pad (2.15)."""
 
 from __future__ import annotations
 
@@ -64,3 +64,27 @@ def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)
+
+
+def rubbings_of(scene) -> tuple:
+    """A Rubbing for every interface of a rig: those of [[structure.interface]], or [friction]; none without either."""
+    if scene.structure.interface:
+        return tuple(Rubbing(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
+                     for k, one in enumerate(scene.structure.interface))
+    if scene.friction is None:
+        return ()
+    load = scene.normal.load if scene.normal is not None else None
+    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), load),)
+
+
+def pad_width(scene) -> float | None:
+    """Width of the contact across the path [m]; strips share it."""
+    if scene.contact is not None:
+        return scene.contact.width
+    return scene.normal.width if scene.normal is not None else None
+
+
+def interface_names(scene) -> list:
+    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
+    found = [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]

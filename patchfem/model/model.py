@@ -119,8 +119,7 @@ def _law(scene: Scene) -> tuple:
         scene.friction
     if given is None:
         return None, None, None, None
-    from .interfaces import pad_width
-    from .law import acting
+    from .law import acting, pad_width
 
     pad = pad_width(scene)
     return acting(given, pad, scene.where), given.temperature, given.spread, pad

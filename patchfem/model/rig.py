@@ -7,8 +7,8 @@ import numpy as np
 from ..core import ModalBasis, Start
 from ..structure.drive_sizes import peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
-from .interfaces import acts, interface_names, rubbings_of, yaws
-from .structure import first_of, frequencies, modes_of, notes_of, start_of
+from .law import interface_names, rubbings_of
+from .structure import acts, first_of, frequencies, modes_of, notes_of, start_of, yaws
 
 
 @dataclass(frozen=True, eq=False, slots=True)

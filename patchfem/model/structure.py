@@ -35,8 +35,6 @@ def modes_of(scene) -> ModalBasis:
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
     """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
-    from .interfaces import strip_rows, yaws
-
     if not yaws(scene):
         return found
     count, width = scene.contact.strips.count, scene.contact.width
@@ -155,3 +153,24 @@ def start_of(scene, modes: ModalBasis):
         raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
                             "nearer to the middle")
     return start if start.z.any() or start.v.any() else None
+
+
+def yaws(scene) -> bool:
+    """Whether strips slide each by themselves: modes that yaw the patch about its normal, over [contact.strips]."""
+    strips = scene.contact is not None and scene.contact.strips is not None
+    return strips and scene.friction is not None and any(mode.yaw for mode in scene.structure.mode)
+
+
+def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
+    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
+    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
+    yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
+    return basis.slide - np.outer(offsets, yaw)
+
+
+def acts(scene) -> bool:
+    """Whether the load of a rig changes with its motion (modes with normal or pitch) or in time (normal.amplitude)."""
+    if scene.friction is None and not scene.structure.interface:
+        return False
+    varies = scene.normal is not None and bool(scene.normal.amplitude)
+    return varies or any(mode.normal or mode.pitch for mode in scene.structure.mode)

@@ -12,14 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Response
-from .measures import (
-    acceleration_peak,
-    drift,
-    energy_balance,
-    interface_loop,
-    ledger_measures,
-    slip_measures,
-)
+from .measures import acceleration_peak, drift, energy_balance, interface_loop, ledger_measures, slip_measures
 
 
 @dataclass(frozen=True, eq=False)

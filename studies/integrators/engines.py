@@ -16,9 +16,9 @@ from patchfem.compiled import load
 from patchfem.core import ModalBasis, NotConverged, Start
 from patchfem.dynamics.comparison import duhamel, euler, newmark
 from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh
-from patchfem.dynamics.events import sdof, sdof_kernels
-from patchfem.dynamics.events.sdof_samples import position
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.one_mode import sdof, sdof_kernels
+from patchfem.dynamics.one_mode.sdof_samples import position
 from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
@@ -96,7 +96,7 @@ def exact(one: Problem, _) -> np.ndarray:
 
 def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
     """The compiled event engine of one mode."""
-    kernels = kernels or load("dynamics.events.event_kernels")
+    kernels = kernels or load("dynamics.one_mode.event_kernels")
     made = sdof.scene_of(one.modes, one.drive, one.limit, one.limit, one.cycles * one.drive.period)
     rows, state, none = np.zeros((16 * one.cycles, sdof_kernels.ROW)), np.zeros(9), np.empty((0, 2))
     z, v = (0.0, 0.0) if one.start is None else (float(one.start.z[0]), float(one.start.v[0]))

@@ -21,12 +21,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from against_march import TEXTS
 
 from patchfem.core import Start
-from patchfem.dynamics.events.sdof import simulate as simulate_sdof
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import branches
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Spring
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.one_mode.sdof import simulate as simulate_sdof
 from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs import run as runner

@@ -19,9 +19,9 @@ from vtkmodules.vtkCommonCore import vtkDataArray
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from patchfem.core import Missing, PatchfemError
+from patchfem.export.fields.vtkhdf import NAME, Series
+from patchfem.export.fields.vtu import BLOCK, _packed, export
 from patchfem.export.results import FILES
-from patchfem.export.vtkhdf import NAME, Series
-from patchfem.export.vtu import BLOCK, _packed, export
 
 
 def through_vtk(path):

@@ -195,8 +195,8 @@ def test_exact_a_table_of_the_corners_is_the_triangle(table):
 
 
 def test_exact_a_table_with_a_rest_is_the_dwell(table):
-    found = bench.run(build(table("displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n",
-                            NONLOCAL, "accuracy.steps_per_cycle=600")), None, 600)  # fmt: skip
+    rows = "displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n"
+    found = bench.run(build(table(rows, NONLOCAL, "accuracy.steps_per_cycle=600")), None, 600)
     other = sliding(POINT + NONLOCAL + DWELL, steps=600)
     assert found.force == pytest.approx(other.force, rel=1e-9)
     assert found.values == pytest.approx(other.values, rel=1e-9, abs=1e-12)

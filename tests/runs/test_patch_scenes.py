@@ -203,7 +203,7 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
         assert mine[name] == pytest.approx(same[name], rel=0.02), name
     result = run(plan(found), estimate=False)
-    from patchfem.export.bodies import write_fields
+    from patchfem.export.fields.bodies import write_fields
 
     write_fields(result, tmp_path / "fields.vtkhdf")
     assert (tmp_path / "fields.vtkhdf").stat().st_size > 1e4

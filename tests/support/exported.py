@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from scene_texts import COATED, COULOMB
 
-from patchfem.export.vtkhdf import NAME, bodies, write_series
+from patchfem.export.fields.vtkhdf import NAME, bodies, write_series
 
 UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "part": "1", "material": "1",
          "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond": "Pa"}

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...compiled import load_kernels
 from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
 from .models import (
     ContactModel,
@@ -14,6 +13,7 @@ from .models import (
     growth_numbers,
     jenkins_model,
     list_model,
+    load_kernels,
     points_model,
     rate_model,
 )

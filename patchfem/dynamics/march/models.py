@@ -4,7 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...compiled import load
+
 RATE = 4  # kind of a force that follows the speed, as in loop_kernels
+
+
+def load_kernels(say=None):
+    """The compiled module `loop_kernels`; `say` is told when it has to compile first."""
+    return load("dynamics.march.loop_kernels", say)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

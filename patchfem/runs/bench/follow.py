@@ -6,9 +6,9 @@ from math import ceil
 
 import numpy as np
 
-from ...compiled import load_kernels
 from ...core import Missing
 from ...dynamics.march.march import GOAL, MOST_STRIPS
+from ...dynamics.march.models import load_kernels
 from .ledger import frame_numbers, ledger_of
 
 BLOCK = 4096  # samples between two words of progress; what it costs to enter compiled code is lost in it

@@ -70,13 +70,13 @@ def _over_strips(done, patch):
 def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
     modes, travel = rig.modes, rig.travel
     if modes.omega.size == 1 and len(modes.interfaces) == 1:
-        from ...dynamics.events import sdof
+        from ...dynamics.one_mode import sdof
 
         fast = cycles > sdof.COMPILED_FROM
         if fast:
             from ...compiled import load
 
-            load("dynamics.events.event_kernels", say)
+            load("dynamics.one_mode.event_kernels", say)
         return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
                              start, fast)
     from ...dynamics.events.histories import simulate

@@ -97,8 +97,8 @@ class _Events:
         """The curve of one mode by its own map, compiled."""
         from ...compiled import load
 
-        load("dynamics.events.steady_kernels", self.say)
-        from ...dynamics.events.steady import response
+        load("dynamics.one_mode.steady_kernels", self.say)
+        from ...dynamics.one_mode.steady import response
 
         found = response(self.modes, drives, float(self.forces[0][0]), float(self.forces[1][0]))
         names = [f"{stops:g} stops" if str(regime) == "stops" else str(regime)

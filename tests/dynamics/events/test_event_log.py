@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics.events import event_list, histories, sdof
+from patchfem.dynamics.events import event_list, histories
+from patchfem.dynamics.one_mode import sdof
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run

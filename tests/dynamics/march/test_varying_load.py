@@ -15,7 +15,7 @@ from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion, pressed
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.model.interfaces import strip_rows
+from patchfem.model.structure import strip_rows
 
 
 @pytest.mark.parametrize("row", [0, 1])

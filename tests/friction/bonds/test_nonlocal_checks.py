@@ -17,10 +17,9 @@ from scipy.special import gammainc
 
 from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude
-from patchfem.compiled import load_kernels
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march.march import GOAL, march, modes_arrays, steps_arrays
-from patchfem.dynamics.march.models import growth_numbers, jenkins_model, points_model
+from patchfem.dynamics.march.models import growth_numbers, jenkins_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds import point_kernels
 from patchfem.friction.bonds.parameters import Bonds, grow

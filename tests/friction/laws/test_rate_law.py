@@ -104,8 +104,7 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
 
 
 def test_exact_the_compiled_step_is_the_plain_one():
-    from patchfem.compiled import load_kernels
-    from patchfem.dynamics.march.models import rate_model
+    from patchfem.dynamics.march.models import load_kernels, rate_model
 
     hub, model = load_kernels(None), rate_model(2.5, 1e-3)
     contact, work = model.build(hub)
