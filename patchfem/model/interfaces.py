@@ -13,8 +13,7 @@ def rubbings_of(scene) -> tuple:
                      for k, one in enumerate(scene.structure.interface))
     if scene.friction is None:
         return ()
-    load = scene.normal.load if scene.normal is not None else None
-    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), load),)
+    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), None),)
 
 
 def pad_width(scene) -> float | None:

@@ -9,7 +9,7 @@ from ..friction.bonds.parameters import Bonds
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbing:
     """One interface and its law. key: of its table, for messages; numbers: keys of the law as they act; load: normal
-    load [N], None where a patch carries it."""
+    load [N] of an interface between masses, None where the patch or the point of the model carries it."""
 
     key: str
     numbers: object
