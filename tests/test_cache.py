@@ -10,14 +10,13 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from scene_texts import STRUCTURE
+from scene_texts import PLASTIC, POINT, STRUCTURE
 
 import patchfem
 from patchfem import compiled
 
 SCENE = (
-    '[normal]\nload = "26 lbf"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n'
-    + STRUCTURE.replace("cycles = 30", "cycles = 4")
+    POINT + PLASTIC + STRUCTURE.replace("cycles = 30", "cycles = 4")
     + "[accuracy]\nsteps_per_cycle = 100\n"
 )
 MARCH = """\

@@ -13,7 +13,7 @@ from ..inputs.loops import Loop, read_loop
 from ..scene.quantities import KINDS
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
-from .fit_model import Model
+from .fit_model import BenchModel
 
 MOST_PIECES = 64  # steps between two rows
 LOAD_UNITS = {"time": KINDS["time"], "displacement": KINDS["length"],
@@ -67,7 +67,7 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
     if used <= len(wanted):
         raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(wanted)} values and their "
                             "intervals")
-    bench = Model(scene, loop, wanted, say)
+    bench = BenchModel(scene, loop, wanted, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
     def residual(values):

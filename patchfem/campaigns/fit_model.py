@@ -4,10 +4,12 @@ import numpy as np
 
 from ..core import Outcome, PatchfemError
 from ..inputs.loops import Loop
+from ..model.model import Model, build
+from ..model.source import placed
 from ..scene.scene import Scene, SceneError, loads
 
 
-class Model:
+class BenchModel:
     """The bench of a scene along the measured rows, as a function of the free values."""
 
     def __init__(self, scene: Scene, loop: Loop, wanted: list, say):
@@ -32,17 +34,22 @@ class Model:
 
     def __call__(self, values) -> np.ndarray:
         """(k,) reading at the rows; PatchfemError where the values make no scene."""
-        from ..runs.bench import bench as law_bench
-
-        scene = self.scene_at(values)
+        model = build(self.scene_at(values))
         self.made += 1
-        patch = self._patch(scene)
+        with placed(model.source):
+            return self._reading(model)
+
+    def _reading(self, model: Model) -> np.ndarray:
+        from ..runs.bench import bench as law_bench
+        from ..runs.bench.follow import Watch
+
+        patch = self._patch(model)
         corner = np.arange(self.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
         path = np.interp(number, corner, self.time), np.interp(number, corner, self.loop.displacement), 0, 0.0
-        run = law_bench.run(scene, patch, 4, 0, self.say, path)
+        run = law_bench.run(model, patch, 4, 0, path, Watch(say=self.say))
         if not run.load[0] > 0:
-            raise PatchfemError(f"{scene.path}: no load presses the pieces")
+            raise PatchfemError("no load presses the pieces", "")
         out = run.force[corner]
         if self.instant:  # a row stands between two straight legs: the mean of both sides
             after = run.force[np.minimum(corner + 1, number[-1])]
@@ -58,15 +65,15 @@ class Model:
             self.refused = self.refused or error
             raise PatchfemError(error.mistakes[0]) from None
 
-    def _patch(self, scene):
-        if scene.contact is None:
+    def _patch(self, model: Model):
+        if model.patch is None:
             return None
         if self.patch is None or self.moving:
             from ..runs.patch.ladder import solve_all
 
-            self.patch = solve_all(scene, False)[0]
+            self.patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
             if self.patch.pressure.outcome is Outcome.NO_CONTACT:
-                raise PatchfemError(f"{scene.path}: {self.patch.pressure.outcome.sentence}")
+                raise PatchfemError(self.patch.pressure.outcome.sentence, "")
         return self.patch
 
     def _on_lower(self) -> bool:

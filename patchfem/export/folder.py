@@ -153,14 +153,14 @@ def _multiplier(extra: dict) -> float:
 def _levels(levels) -> dict:
     """Columns of a run in levels: the drive, whether it held, every measure and its error."""
     from ..response.levels import KEPT
-    from ..response.measures import UNITS
+    from ..response.rows import TABLE
 
     out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
            "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
     for name in KEPT:
         if any(name in one.values for one in levels):
-            out[f"level_{name}"] = (UNITS[name], np.array([one.values.get(name, np.nan) for one in levels]))
-            out[f"level_{name}_error"] = (UNITS[name], np.array([one.errors.get(name, np.nan) for one in levels]))
+            out[f"level_{name}"] = (TABLE[name].unit, np.array([one.values.get(name, np.nan) for one in levels]))
+            out[f"level_{name}_error"] = (TABLE[name].unit, np.array([one.errors.get(name, np.nan) for one in levels]))
     return out
 
 

@@ -59,7 +59,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         engine, steps, more = _rig_cost(model, per_point, unknowns)
         seconds += more
     elif model.kind == "bench":
-        engine, steps, more = _bench_cost(model, unknowns.get("interface_points", 1))
+        engine, steps, more = _bench_cost(model, unknowns)
         seconds += more
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
@@ -72,28 +72,24 @@ def _planned(model: Model, per_point: bool) -> Plan:
                 chain, groups, tuple(_verdict(model, groups, size)))
 
 
-def _bench_cost(model: Model, points: int) -> tuple:
+def _bench_cost(model: Model, unknowns: dict) -> tuple:
     """(engine, steps of all passes, seconds) of a bench."""
+    from .bench.engine import engine_of
+
     if model.slide.across is not None:
         from .bench.two_directions import refuse
 
         refuse(model)
-    f, accuracy = model.friction, model.accuracy
-    per_cycle = model.slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, f.bond_length)
+    accuracy = model.accuracy
+    per_cycle = model.slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
     time, slide = model.slide.samples(per_cycle)[:2]
-    steps = 2 * (model.point.refined(model.slide, time, slide, per_cycle)[0] if model.load_varies else time).size
-    return "bench", steps, steps * _bench_step(f, slide, points, model.load_varies)
-
-
-def _bench_step(f, slide, points: int, changing: bool) -> float:
-    """Seconds of one step of a bench: laws of the last increment, or a sum over the strips of the path."""
-    if f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
-        return 6e-5
-    import numpy as np
-
-    moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
-    return (3 if changing else 1) * (1.2e-3 + 2e-6 * strips + 8e-9 * strips * points)
+    if model.load_varies:
+        time, slide = model.point.refined(model.slide, time, slide, per_cycle)
+    runs = engine_of(model, slide, unknowns.get("interface_points", 1))
+    if runs.choice is not None and runs.choice.strips:
+        unknowns["bond_list_about"] = int(runs.choice.strips)
+    steps = 2 * time.size  # half and a quarter of the steps and what checks the sum beside them
+    return runs.name, steps, steps * runs.seconds
 
 
 def free_bytes() -> float:

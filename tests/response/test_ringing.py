@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import KILOGRAM
 
 from patchfem.response.ringing import ring, ringing
 from patchfem.runs.plan import plan
@@ -17,13 +18,7 @@ load = "130.8 N"
 law = "{law}"
 static = 0.3
 bond_length = "{length} um"
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+""" + KILOGRAM + """\
 [drive]
 kind = "free"
 displacement = "200 um"

@@ -7,7 +7,7 @@ import pytest
 from command_line import cli
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_texts import POINT, SHEAR, SMALL_PATCH
+from scene_texts import COULOMB, PLASTIC, POINT, SHEAR, SLIDE, SMALL_PATCH
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.closed_forms.friction import steady_bond_length
@@ -30,8 +30,7 @@ slip_growth = "1 um"
 rest_speed = "1 um/s"
 """
 DWELL = ('[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "0.3 s"\ndistance_after = "20 um"\n')
-COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-ELASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"\n'
+ELASTIC = PLASTIC.replace("1 um", "2 um")
 
 
 def healed(hold, scale=1.0):
@@ -183,7 +182,7 @@ def test_exact_a_table_of_the_corners_is_the_triangle(table):
     rows = "time [ms],displacement [um]\n0,0\n2,10\n6,-10\n8,0\n"
     found = table(rows, ELASTIC)
     one = bench.run(found, None, 400)
-    other = sliding(POINT + ELASTIC + '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n', steps=400)
+    other = sliding(POINT + ELASTIC + SLIDE, steps=400)
     top = one.slide.argmax()
     assert build(found).slide.peak_speed == pytest.approx(5e-3) and one.time[top] == pytest.approx(2e-3)
     up = np.minimum(one.slide[:top + 1] / 2e-6, 1)

@@ -5,6 +5,7 @@ from math import asin, cos, pi, sin
 
 import numpy as np
 import pytest
+from scene_texts import PIECE
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -295,11 +296,7 @@ def test_exact_a_stiffened_rig_is_bistable():
         balanced(one, 1e-8)
 
 
-HEAVE = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+HEAVE = PIECE + """\
 load = "100 N"
 element_size = "1.27 mm"
 substrate = {young = "1e6 GPa", poisson = 0.3, density = "4370 kg/m^3"}

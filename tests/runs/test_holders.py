@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scene_texts import COATING, PIECE
 
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome, PatchfemError
@@ -17,19 +18,11 @@ from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.values import values
 from patchfem.scene import scene
 
-TEXT = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+TEXT = PIECE + """\
 element_size = "0.2 mm"
 substrate = "Ti-8Al-1Mo-1V"
 {}
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-{}
-"""
+""" + COATING + "{}\n"
 LOAD = 'load = "26 lbf"'
 TOLERANCE = 1e-3
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_texts import COATED, COULOMB, PIECE, SLIDE
 
 from patchfem import closed_forms
 from patchfem.core import Outcome, PatchfemError, frozen_array
@@ -24,11 +25,7 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
-TEXT = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+TEXT = PIECE + """\
 {keys}
 substrate = {material}
 {tables}
@@ -358,9 +355,8 @@ def test_exact_nothing_touching_is_a_result_with_its_gap():
 def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
     """Strips under a roll of 0.1 mrad: two finite-element programs of other elements (quadratic to quartic, graded to
     the far corners) agree on K_n = 6.93285e8 N/m, lateral centre -4.975888 mm and roll moment -0.575480 N m."""
-    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "115.65376 N"\n'
-            'element_size = "{} um"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\n'
-            'thickness = "6 mil"\n[contact.strips]\ncount = 8\nroll = "0.1 mrad"\n')
+    text = COATED.replace("26 lbf", "115.65376 N").replace("0.5 mm", "{} um") + \
+        '[contact.strips]\ncount = 8\nroll = "0.1 mrad"\n'
     truth = {"normal_stiffness": 6.93285e8, "pressure_centre_lateral": -4.975888e-3, "roll_moment": -0.575480}
     for size in (250, 127, 100):
         found = measures(*solve_all(build(loads(text.format(size))).patch, 1e-3))
@@ -398,8 +394,7 @@ def test_always_what_leaves_the_model_is_said(tables, keys, said):
 
 def test_exact_the_chain_of_a_plan_knows_both_pieces():
     soft = '[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.3, density = "1 kg/m^3"}\n[contact.shear]\n'
-    rub = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "triangle"\namplitude = "1 um"\n' \
-          'speed = "1 mm/s"\n'
+    rub = COULOMB + SLIDE.replace("10 um", "1 um").replace("5 mm/s", "1 mm/s")
     chain = plan(scene(soft + rub)).chain
     bars = 1 / (HEIGHT * 2.6 / 210e9 + HEIGHT * 2.6 / 1e9) * LENGTH * WIDTH
     assert chain["pieces_shear"] == pytest.approx(bars, rel=1e-9)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from scene_texts import BENCH, COULOMB, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
+from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -28,7 +28,6 @@ from patchfem.scene.scene import load, loads
 
 STUDIES = Path(__file__).parents[2] / "studies"
 LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143
-NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
 STEPS = "[accuracy]\nsteps_per_cycle = 200\n"
 SCENES = {
     "patch": SMALL_PATCH, "bench": BENCH, "bench patch": SMALL_PATCH + SHEAR + COULOMB + SLIDE + STEPS,

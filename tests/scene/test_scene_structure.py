@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import LINEAR, STRUCTURE, line_of, only
+from scene_texts import COULOMB, LINEAR, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
@@ -173,7 +173,7 @@ def test_refuses_at_the_line_of_the_file():
 
 
 @pytest.mark.parametrize("text, key, says", [
-    (MASSES + '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "structure.interface",
+    (MASSES + '[normal]\nload = "1 N"\n' + COULOMB, "structure.interface",
      "write [[structure.interface]]"),
     (MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 0 interfaces"),
     (RUB + RUB + MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 2 interfaces"),
@@ -207,7 +207,7 @@ frequency = "40 Hz"
 acceleration = "2 m/s^2"
 cycles = 300
 """
-POINT = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+POINT = '[normal]\nload = "1 N"\n' + COULOMB
 
 
 def write_scene(folder, text):

@@ -26,7 +26,7 @@ def limit_share(model, patch) -> float:
     forward, back = limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError("'convolution' on a pressure that is not symmetric: the limit is "
-                            f" {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
+                            f"{forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
                             "patch symmetric or use a bench, [slide]; not yet built", "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 

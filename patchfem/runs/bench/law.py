@@ -1,9 +1,8 @@
 """The law object that a bench steps: one per value of friction.law."""
 
-from ...model.law import bonds_of
 
 
-def law_for(scene, patch=None):
+def law_for(model, patch=None):
     """The NumPy law object of a bench; only an averaged law looks at the patch."""
     from ...friction.bonds.quadrature import Quadrature
     from ...friction.bonds.recursion import Recursion
@@ -11,7 +10,7 @@ def law_for(scene, patch=None):
     from ...friction.laws.elastic_plastic import ElasticPlastic
     from ...friction.laws.tanh import Rate
 
-    f = scene.friction
+    f = model.friction
     if f.law == "coulomb":
         return Coulomb(f.kinetic, f.static)
     if f.law == "elastic-plastic":
@@ -21,12 +20,12 @@ def law_for(scene, patch=None):
     if f.law == "convolution":
         from .averaged import law_on
 
-        return law_on(scene, patch)
-    law = bonds_of(scene)
-    engine = scene.accuracy.quadrature
+        return law_on(model, patch)
+    law = model.bonds
+    engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
         return Recursion(law)
     if engine == "direct":
         return Quadrature(law, 0.0)
-    tail = scene.accuracy.tail if scene.accuracy.tail is not None else 1e-3 * scene.accuracy.tolerance
+    tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
     return Quadrature(law, tail)

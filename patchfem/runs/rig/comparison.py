@@ -9,9 +9,11 @@ import numpy as np
 from ...core import Outcome, PatchfemError
 from ...dynamics.march.march import hermite_extremes
 from ...response import run_events
-from ...response.measures import harmonic, interface_loop, run_measures, slip_measures, window_amplitudes, window_ends
+from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
-from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
+from ...response.rows import measures_of
+from ...structure.drive_sizes import omega_of, peak_speed
+from .solution import Solution, borne, sampled_loop, seen
 from .strips import other_measures
 
 TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
@@ -37,14 +39,12 @@ def laws_of(model, load: float) -> list:
 
 
 def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=None):
-    """march.Raw of a comparison method at numerics.steps per cycle; arguments as `march.run_march`."""
+    """Solution of a comparison method at numerics.steps per cycle; arguments as `march.run_march`."""
     from ...compiled import load
-    from .march import Raw
 
     load("dynamics.comparison.comparison_kernels", say)
     rig, modes, drive = model.rig, model.rig.modes, model.rig.drive
-    bears = patch.pressure.load if patch is not None else model.point.load if model.point is not None else 0.0
-    laws, begin = laws_of(model, bears), perf_counter()
+    laws, begin = laws_of(model, borne(model, patch)), perf_counter()
     done = _integrated(model, numerics, laws)
     response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
     beyond = np.flatnonzero(np.abs(response.output) > rig.travel)
@@ -58,19 +58,20 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     extremes, phasors = _cycles(response, n)
     last = min(window, len(extremes))
     book = _book(done)
-    values = run_measures(kept, extremes, book, drive, last)
+    span = kept.time[-1] - kept.time[0]
+    work = float(np.trapezoid(kept.force, kept.slide)) * drive.period / span if span > 0 else 0.0
+    spent = book["friction"]
+    values = measures_of(seen(model, patch, kept, extremes[-last:], book, n, loop=sampled_loop(kept, drive, work),
+                              ledger=np.array([[spent], [0.0], [spent], [0.0]])))
     stuck, own = False, {}
-    if model.friction is None:
-        values.pop("friction_force_peak")
-    else:
-        values |= _rubbing(model, kept, drive, n, bears) | other_measures(kept, drive, n)
-        values |= {"friction_work": book["friction"], "energy_dissipated": book["friction"], "energy_created": 0.0}
+    if model.friction is not None:
+        values |= other_measures(kept, drive, n)
         stuck = run_events.all_stick(kept, 0.0) and model.friction.law != "tanh"
         rings, own = run_events.rings(kept, modes, drive)
         values |= rings
     outcome = _outcome(model, done, response)
     ends = window_ends(extremes, phasors, window)
-    return Raw(values, response, kept, window_amplitudes(extremes, window),
+    return Solution(values, response, kept, window_amplitudes(extremes, window),
                steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
                perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
 
@@ -146,22 +147,6 @@ def _book(done) -> dict:
     book = {name: float(done.ledger[name]) for name in ("work_in", "viscous", "friction", "stored")}
     return book | {"power": abs(book["work_in"]) + abs(book["friction"]), "peak_stored": abs(book["stored"]),
                    "iterations": float(done.iterations.sum())}
-
-
-def _rubbing(model, window, drive, n: int, load: float) -> dict:
-    """Measures of the first interface over the window; loops by the trapezoidal rule."""
-    values = slip_measures(window, drive, n) | {"normal_load": load}
-    if not sinusoidal(drive):
-        values.pop("slip_start_phase", None)
-    span = window.time[-1] - window.time[0]
-    if whole(span, drive):
-        weight = np.full(window.time.size, 1.0)
-        weight[[0, -1]] = 0.5
-        omega = omega_of(drive)
-        q, f = (harmonic(window.time, weight, y, omega) for y in (window.slide - window.slide.mean(), window.force))
-        work = float(np.trapezoid(window.force, window.slide)) * drive.period / span
-        values |= interface_loop(window.slide, q, f, work, model.rig.stiffness)
-    return values
 
 
 def _outcome(model, done, response):

@@ -8,54 +8,38 @@ import numpy as np
 from ...core import BaseSine, Outcome, Start
 from ...response import run_events
 from ...response.levels import Level
-from ...response.measures import (
-    circular_mean,
-    harmonic,
-    interface_loop,
-    ledger_measures,
-    run_measures,
-    swing,
-    window_amplitudes,
-    window_ends,
-)
+from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
 from ...response.outcome import steady_of
+from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 from ..patch.strips import strip_loads
 from . import levels as rig_levels
+from .solution import Solution, borne, seen
 from .strips import as_one, other_measures
 
 
 def run_exact(model, numerics, patch, share: float = 1.0, say=None, progress=None):
-    """march.Raw of a Coulomb rig, or of a structure without friction.
+    """Solution of a Coulomb rig, or of a structure without friction.
 
     patch: the solved Patch, or None under [normal] or between masses; share: of mu N that the law keeps.
     """
-    from .march import Raw
-
     rig, drive, modes = model.rig, model.rig.drive, model.rig.modes
     begin, forces = perf_counter(), forces_of(model, patch, share)
     if rig.levels:
-        done, levels, slips = _levels(model, numerics, forces, progress, say)
+        done, levels, slips = _levels(model, numerics, patch, forces, progress, say)
     else:
         done = _go(rig, drive, forces, numerics.cycles, numerics.window, rig.start, progress, say)
         levels, slips = (), None
         done = _whole(_over_strips(done, patch) if rig.strips_slide_apart else done)
-    values, stuck = _values(model, numerics, drive, done, _borne(model, patch))
+    values, stuck = _values(model, numerics, patch, drive, done)
     rubs = model.friction is not None
     rings, own = run_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
     values |= rings
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     ends = window_ends(done.amplitudes, done.phasors, numerics.window)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
+    return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
                steady_of(drive, *ends), outcome, [], done.ledger, perf_counter() - begin,
                levels=levels, slips=slips, log=done.log, own=own)
-
-
-def _borne(model, patch) -> float:
-    """Normal load [N] of the patch or the point, 0 without either."""
-    if patch is not None:
-        return patch.pressure.load
-    return model.point.load if model.point is not None else 0.0
 
 
 def forces_of(model, patch, share: float = 1.0) -> tuple:
@@ -68,7 +52,7 @@ def forces_of(model, patch, share: float = 1.0) -> tuple:
     if rig.names:
         pairs = [one.limits(one.load) for one in rig.interfaces]
     else:
-        static, kinetic = model.limits(_borne(model, patch))
+        static, kinetic = model.limits(borne(model, patch))
         pairs = [(static * share, kinetic if model.friction.kinetic is not None else static * share)]
     return tuple(np.array(column) for column in zip(*pairs))
 
@@ -101,37 +85,46 @@ def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
     return simulate(modes, drive, *forces, cycles, window, travel, progress, start)
 
 
-def _values(model, numerics, drive, done, load: float) -> tuple:
-    """(measures, whether nothing slipped) of the window of an event-driven run."""
-    last = min(numerics.window, len(done.amplitudes))
-    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
-    span = done.window.time[-1] - done.window.time[0]
+def _values(model, numerics, patch, drive, done) -> tuple:
+    """(measures, whether nothing slipped) of the window of an event-driven run: what the events tell comes before what
+    the samples tell."""
+    window, apart, known = done.window, model.rig.strips_slide_apart, {}
+    extremes, ledger, loop = done.amplitudes[-min(numerics.window, len(done.amplitudes)):], None, None
+    span = window.time[-1] - window.time[0]
+    if done.acceleration is not None:
+        known["absolute_acceleration_peak"] = done.acceleration
     if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
-        values["relative_displacement_amplitude"] = swing(done.window)
+        known["relative_displacement_amplitude"] = swing(window)
+    if model.friction is not None:
+        lost, starts = done.ledger["friction"], done.starts
+        ledger = np.array([[lost], [0.0], [lost], [0.0]])
+        known |= {"slip_amplitude": float(window.slip.max() - window.slip.min()) / 2,
+                  "stick_fraction": min(done.stick / span, 1.0),
+                  "slip_start_phase": circular_mean(starts) if starts.size and sinusoidal(drive) else None}
+        loop = _loop(done, drive, span, apart)
+    values = measures_of(seen(model, patch, window, extremes, done.ledger, 400, drive=drive, loop=loop, ledger=ledger,
+                              known=known))
     if model.friction is None:
-        values.pop("friction_force_peak")
         return values, False
-    slip, lost = done.window.slip, done.ledger["friction"]
-    ledger = ledger_measures(np.array([[lost], [0.0], [lost], [0.0]]))
-    ledger.pop("energy_stored")
-    values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
-               "normal_load": load, **ledger}
-    if done.starts.size and sinusoidal(drive):
-        values["slip_start_phase"] = circular_mean(done.starts)
+    if not apart:
+        values |= other_measures(window, drive, 400, done.log)
+        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
+    others = any(run_events.moving(window, drive, done.log)[1:])
+    return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _loop(done, drive, span: float, apart: bool) -> tuple | None:
+    """(slide, first harmonics of slide and force, work per cycle [J]) by the quadrature of the run; None where its
+    window holds no whole cycle. apart: of every strip, as a yaw works besides the mean slide."""
+    if not whole(span, drive):
+        return None
     time, weight, slide, rate, force = done.loop
     power = force * rate
-    if model.rig.strips_slide_apart:  # of every strip: a yaw works besides the mean slide
+    if apart:
         power = (done.window.extra["forces"] * done.window.extra["slide_rates"]).sum(axis=1)
-    work = float(weight @ power) * drive.period / span
-    if whole(span, drive):
-        omega = omega_of(drive)
-        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, model.rig.stiffness)
-    if not model.rig.strips_slide_apart:
-        values |= other_measures(done.window, drive, 400, done.log)
-        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
-    others = any(run_events.moving(done.window, drive, done.log)[1:])
-    return values, done.stick >= span * (1 - 1e-12) and not others
+    omega, work = omega_of(drive), float(weight @ power) * drive.period / span
+    q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
+    return slide, q, part, work
 
 
 def _whole(done):
@@ -142,7 +135,7 @@ def _whole(done):
     return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
 
 
-def _levels(model, numerics, forces, progress, say) -> tuple:
+def _levels(model, numerics, patch, forces, progress, say) -> tuple:
     """(EventRun of all levels one after the other, their Levels, slips as `rig_levels.onset` asks)."""
     rig = model.rig
     drive, cycles, states, parts, levels = rig.drive, rig.level_cycles, [rig.start], [], []
@@ -154,7 +147,7 @@ def _levels(model, numerics, forces, progress, say) -> tuple:
     for k, level in enumerate(rig.levels):
         share = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
         done, sine = go(level, states[-1], share)
-        values, stuck = _values(model, numerics, sine, done, 0.0)
+        values, stuck = _values(model, numerics, patch, sine, done)
         kept = {name: values[name] for name in rig_levels.KEPT if name in values}
         levels.append(Level(level, stuck, kept, {name: 1e-9 * abs(value) for name, value in kept.items()}))
         parts.append(done)
@@ -163,7 +156,7 @@ def _levels(model, numerics, forces, progress, say) -> tuple:
             break
 
     def slips(number, level):
-        return not _values(model, numerics, *go(level, states[number + 1])[::-1], 0.0)[1]
+        return not _values(model, numerics, patch, *go(level, states[number + 1])[::-1])[1]
 
     return _joined(parts, cycles * drive.period), tuple(levels), slips
 

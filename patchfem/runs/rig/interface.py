@@ -92,8 +92,6 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     from ...dynamics.march import march as hub
 
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
-    if found.engine == "exponential":
-        return hub.place_model(law, limit, found.tail, found.nodes, found.width, found.ripe)
     if found.engine != "recursion":
         from ...friction.bonds.quadrature import cutoff
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 from ...core import Measure
 from ...response.levels import KEPT, Level, bracket, hysteresis, jump
-from ...response.measures import run_measures
 
 MOST = 40  # halvings of the bracket of an onset
 
@@ -14,16 +13,14 @@ def ends(rig) -> tuple:
     return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
 
 
-def rows(sizes, marks, drive, held: float, rubbing) -> tuple:
-    """A Level per size [m s-2] and Mark of a march; held [m]: slip amplitude below which a level sticks;
-    rubbing(mark): its measures of the interface."""
+def rows(sizes, marks, values, held: float | None) -> tuple:
+    """A Level per size [m s-2] and Mark of a march; values(mark) -> its measures; held [m]: slip amplitude below which
+    a level sticks, None where nothing rubs."""
     out = []
     for size, mark in zip(sizes, marks):
-        values = run_measures(mark.window, mark.amplitudes, mark.ledger, drive, len(mark.amplitudes))
-        if rubbing is not None:
-            values |= rubbing(mark)
-        kept = {name: values[name] for name in KEPT if name in values}
-        out.append(Level(size, rubbing is not None and values["slip_amplitude"] < held, kept, {}))
+        found = values(mark)
+        kept = {name: found[name] for name in KEPT if name in found}
+        out.append(Level(size, held is not None and found["slip_amplitude"] < held, kept, {}))
     return tuple(out)
 
 

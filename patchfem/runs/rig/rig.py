@@ -77,7 +77,7 @@ def _said(model, patch, raw, outcome, found) -> list:
     if patch is not None and model.rig.load_varies:
         from .varying_load import shear_note
 
-        out = [*out, *shear_note(model, raw.model)]
+        out = [*out, *shear_note(model, raw.contact)]
     return out
 
 
@@ -169,7 +169,7 @@ def _space_errors(model, numerics, patch, coarse, quarter, seconds) -> list:
         rough = run_march(model, few, coarse[0])
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
-    shape = getattr(getattr(quarter.model, "reduction", None), "stiffness", None)
+    shape = getattr(getattr(quarter.contact, "reduction", None), "stiffness", None)
     if shape is not None and (model.rig.load_varies or (coarse[0] is not None and model.friction.law == "nonlocal")):
         fewer = run_march(model, replace(few, shear_modes=max(1, shape.size // 2)), patch)
         out.append(change(quarter.values, fewer.values))
@@ -199,11 +199,11 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
     if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or numerics.per_point):
-        tau, local = point_fields(patch, model.bonds, raw.model.reduction, [(s["slide"], s["bonds"]) for s in shots])
+        tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
         length = f.bond_length if f.law == "elastic-plastic" else 0.0
         states = [(s["slide"], s["stretch"]) for s in shots]
-        tau, local = element_fields(patch, raw.model.reduction, states, length)
+        tau, local = element_fields(patch, raw.contact.reduction, states, length)
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])

@@ -11,7 +11,8 @@ import numpy as np
 
 from ...core import BaseSine, Measure, Outcome, PatchfemError
 from ...model.engine import no_closed_form
-from ...response.measures import harmonic, interface_loop, run_measures, slip_measures
+from ...response.rows import measures_of
+from .solution import Solution, sampled_loop, seen
 from .strips import other_measures
 
 SAMPLES = 1024  # of the cycle that measures are read off
@@ -29,7 +30,7 @@ def refuse(rig) -> None:
 
 
 def steady(model, numerics, patch, say=None):
-    """(march.Raw, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on a curve
+    """(Solution, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on a curve
     over a sweep or over levels, whose sine is extra["at"]."""
     drive = model.rig.drive
     refuse(model.rig)
@@ -143,7 +144,6 @@ class _Balance:
         from ...dynamics.harmonic.balance import regime
         from ...dynamics.harmonic.point import point
         from ...dynamics.harmonic.stability import with_stability
-        from .march import Raw
 
         begin = perf_counter()
         found = point(self.modes, drive, self.group, self.harmonics, self.tolerance,
@@ -162,8 +162,8 @@ class _Balance:
         extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
                  "residual": found.residual, "harmonics": found.harmonics}
         amplitude = np.array([values["relative_displacement_amplitude"]])
-        raw = Raw(values, response, response, amplitude, (None, None), Outcome.STUCK if held else Outcome.STEADY, [],
-                  book, perf_counter() - begin)
+        outcome = Outcome.STUCK if held else Outcome.STEADY
+        raw = Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin)
         return raw, errors, extra
 
     def _measured(self, found, drive) -> tuple:
@@ -178,18 +178,12 @@ class _Balance:
         top = found.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        values = run_measures(response, extremes, book, drive, 1)
-        values["drift_per_cycle"] = 0.0
-        if self.model.friction is None:
-            values.pop("friction_force_peak")
-            return values, response, book
-        values |= slip_measures(response, drive, SAMPLES) | other_measures(response, drive, SAMPLES)
-        weight = np.full(response.time.size, 1.0)
-        weight[[0, -1]] = 0.5
-        q, f = (harmonic(response.time, weight, y, drive.omega) for y in (response.slide, response.force))
-        bears = self.patch.pressure.load if self.patch is not None else self.model.point.load
-        values |= interface_loop(response.slide, q, f, book["friction"], self.model.rig.stiffness)
-        return values | {"normal_load": bears}, response, book
+        known = {"drift_per_cycle": 0.0}
+        values = measures_of(seen(self.model, self.patch, response, extremes, book, SAMPLES, drive=drive, known=known,
+                                  loop=sampled_loop(response, drive, book["friction"])))
+        if self.model.friction is not None:
+            values |= other_measures(response, drive, SAMPLES)
+        return values, response, book
 
     def curve(self, drive) -> tuple:
         """(curve as arrays by name through its folds, the sine of its largest amplitude, the point there)."""

@@ -47,7 +47,7 @@ def shear_note(model: Model, contact) -> list:
 
 def frames_of(model: Model, patch, raw) -> dict:
     """Interface frames (f, x) of a run, the pressed state first; status 0 open, 1 stick, 2 slip."""
-    law, atlas, weight = raw.model.law, raw.model.atlas, patch.pieces.interface.weight
+    law, atlas, weight = raw.contact.law, raw.contact.atlas, patch.pieces.interface.weight
     shots = raw.snapshots
     time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
     nodal = np.stack([patch.pressure.sigma_n * weight] + [shot["nodal"] for shot in shots])

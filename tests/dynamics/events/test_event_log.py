@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import BaseSine, ModalBasis, Start
 from patchfem.dynamics.events import event_list, histories, sdof
@@ -13,19 +14,7 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 from patchfem.structure.drives import Piecewise, levels
 
-RIG = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "coulomb"
-static = 0.3
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+RIG = POINT + COULOMB + MODE + """\
 [drive]
 kind = "base"
 waveform = "levels"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from harmonic_cases import five, many, march, plain_jenkins, sdof
-from scene_texts import STRUCTURE
+from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged
 from patchfem.dynamics.harmonic.balance import periodic_response, regime
@@ -15,7 +15,7 @@ from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-SCENE = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "20 um"\n' + STRUCTURE + \
+SCENE = POINT + NONLOCAL.replace("nonlocal", "{law}").replace("1 um", "20 um") + STRUCTURE + \
     '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
 LOAD = 26 * 4.4482216152605
 DRIVE = BaseSine(1.0, 1.0)

@@ -7,7 +7,7 @@ import pytest
 from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_texts import POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
+from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
 from scipy.integrate import quad
 from scipy.special import gamma, gammainc
 
@@ -25,7 +25,6 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
-COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 FLAT = SMALL_PATCH.split("[contact.tilt]")[0]
 CROWN = "[contact.crown]\nradius = \"20 m\"\n"
 
