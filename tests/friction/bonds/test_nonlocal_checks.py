@@ -27,6 +27,7 @@ from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import BondState, Recursion
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
@@ -329,7 +330,7 @@ bond_length = "2 um"
 [slide]
 {slide}
 """
-    return law_bench.run(scene.loads(text, "bench.toml"), None, steps).values
+    return law_bench.run(build(scene.loads(text, "bench.toml")), None, steps).values
 
 
 @pytest.mark.parametrize("keys, steps, area", [

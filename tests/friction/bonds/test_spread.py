@@ -45,7 +45,7 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
     share = pad_factor(12.7e-3, 4e-3)
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
     for text in (point, SMALL_PATCH):
-        whole, less = (bench.run(loads(text + LONGER + law + TRIANGLE, sets=sets), patch_of(text), 80)
+        whole, less = (bench.run(build(loads(text + LONGER + law + TRIANGLE, sets=sets)), patch_of(text), 80)
                        for sets in ([], SPREAD))
         assert less.force == pytest.approx(share * whole.force, rel=1e-12, abs=1e-12 * np.abs(whole.force).max())
         assert less.values["loop_area"] == pytest.approx(share * whole.values["loop_area"], rel=1e-12)

@@ -104,7 +104,7 @@ def test_always_the_growth_per_point_is_that_of_one_point(dq, dt, eps):
 def test_exact_a_surface_at_its_reference_is_the_scene_without_the_table():
     text, cold = POINT + GROWING, ["friction.temperature.surface=293.15 K"]
     plain, warm = loads(text + TRIANGLE), loads(text + WARM + TRIANGLE, sets=cold)
-    one, two = (bench.run(scene, None, 200) for scene in (plain, warm))
+    one, two = (bench.run(build(scene), None, 200) for scene in (plain, warm))
     assert (one.force == two.force).all() and one.values == two.values
     assert plan(plain).groups == plan(warm).groups
 
@@ -113,7 +113,7 @@ def test_exact_steady_friction_of_a_warm_bench():
     """mu(v) of 2.18 with the rates of 2.13; the warm surface is the stronger one at this speed."""
     rest, slip = 10 * np.exp(2500 * (1 / 293.15 - 1 / 393.15)), 2e-7 * np.exp(1500 * (1 / 393.15 - 1 / 293.15))
     scene = loads(POINT + GROWING + WARM + SLIDE)
-    found = bench.run(scene, None, 2000).values["friction_ratio_end"]
+    found = bench.run(build(scene), None, 2000).values["friction_ratio_end"]
     truth = 0.6 * closed_forms.steady_bond_length(5e-3, 2e-6, 0.7, rest, slip) / 2e-6
     assert found == pytest.approx(truth, rel=1e-6)
     cold = 0.6 * closed_forms.steady_bond_length(5e-3, 2e-6, 0.7, 10.0, 2e-7) / 2e-6
