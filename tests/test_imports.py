@@ -55,7 +55,7 @@ def test_exact_a_rubbing_point_needs_no_patch(scene):
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled")
-    assert {"patchfem.dynamics.events.events", "patchfem.structure.modes"} <= modules
+    assert {"patchfem.dynamics.events.sdof", "patchfem.structure.modes"} <= modules
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
@@ -90,7 +90,7 @@ def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled")
-    assert "patchfem.dynamics.events.events" in modules
+    assert "patchfem.dynamics.events.sdof" in modules
 
 
 def test_exact_a_bench_needs_no_structure(scene):

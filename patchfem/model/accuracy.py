@@ -14,7 +14,6 @@ MOST_STEPS = 6400  # finest automatic march, steps per cycle
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 LEAST_KEPT = 100  # samples of a run that has no cycles
 LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
-CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ from math import ceil, sqrt
 
 from ..core import PatchfemError
 from .model import Model
-from .patch import nominal_load
 
 COMPARED = ("duhamel", "newmark", "euler")
 
@@ -67,7 +66,7 @@ def unique_steps(model: Model) -> int:
     f, modes = model.friction, model.rig.modes
     if f is None or f.law != "nonlocal" or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
         return 0
-    load = nominal_load(model.patch) if model.patch is not None else model.point.load
+    load = model.nominal_load
     stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
     return 2 * ceil(0.55 * model.rig.drive.period * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass)))
 

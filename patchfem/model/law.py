@@ -1,9 +1,14 @@
 """The numbers of a friction law as they act: at its surface temperature (2.13) and spread over its pad (2.15)."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..core import PatchfemError
-from ..friction.bonds.parameters import Bonds
+
+if TYPE_CHECKING:
+    from ..friction.bonds.parameters import Bonds
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,6 +59,8 @@ def acting(f, width: float | None, where):
 
 def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
     """Bond parameters of the keys of a law; v_h defaults to 1e-3 of the peak speed [m/s], but not below `least`."""
+    from ..friction.bonds.parameters import Bonds
+
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)

@@ -1,17 +1,21 @@
 """build(scene) -> Model: everything a scene means, made once; the last module that sees a Scene."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from ..effects import absent
 from ..scene.scene import Scene
 from ..scene.tables import Accuracy, Friction, Temperature
-from .interfaces import pad_width
-from .law import acting, bonds_of
-from .load import PointLoad, point_asked
-from .patch import PatchModel, patch_asked
-from .rig import Rig, rig_asked
-from .slide import SlidePath, slide_asked
 from .source import Source
+
+if TYPE_CHECKING:
+    from ..friction.bonds.parameters import Bonds
+    from .load import PointLoad
+    from .patch import PatchModel
+    from .rig import Rig
+    from .slide import SlidePath
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,13 +58,22 @@ class Model:
         return self.point is not None and bool(self.point.amplitude)
 
     @property
+    def nominal_load(self) -> float:
+        """Load [N] of the patch, estimated for a prescribed approach, or of the point; 0 without either."""
+        if self.patch is not None:
+            return self.patch.nominal_load
+        return self.point.load if self.point is not None else 0.0
+
+    @property
     def speed(self) -> float:
         """Size of the speeds to expect [m/s]."""
         return self.slide.peak_speed if self.rig is None else self.rig.speed
 
     @property
-    def bonds(self):
+    def bonds(self) -> Bonds:
         """Bonds of law 'nonlocal', the floor of the speed by default 1e-3 of the speeds to expect."""
+        from .law import bonds_of
+
         return bonds_of(self.friction, self.speed, 0.0 if self.rig is None else 1e-12)
 
     def limits(self, load: float) -> tuple:
@@ -69,27 +82,48 @@ class Model:
 
 
 def build(scene: Scene) -> Model:
-    """The model of a valid scene; files that it names are read. PatchfemError with the place of the key at fault."""
-    friction, heat, spread = _law(scene)
-    measured = scene.measured
-    rig = rig_asked(scene) if scene.kind in ("rig", "linear") else None
-    slide = slide_asked(scene) if scene.slide is not None else None
-    patch = patch_asked(scene.contact, scene.kind, scene.beside) if scene.contact is not None else None
-    named = tuple(scene.named())
-    found = Model(None, scene.kind, patch, point_asked(scene), friction, heat, spread, pad_width(scene), slide, rig,
-                  scene.accuracy, (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
+    """The model of a valid scene; files that it names are read. PatchfemError with the place of the key at fault.
+
+    Only what the scene names is imported.
+    """
+    patch = point = slide = rig = None
+    if scene.contact is not None:
+        from .patch import patch_asked
+
+        patch = patch_asked(scene.contact, scene.kind, scene.beside)
+    if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
+        from .load import point_asked
+
+        point = point_asked(scene)
+    if scene.slide is not None:
+        from .slide import slide_asked
+
+        slide = slide_asked(scene)
+    if scene.structure is not None:
+        from .rig import rig_asked
+
+        rig = rig_asked(scene)
+    friction, heat, spread, pad = _law(scene)
+    named, measured = tuple(scene.named()), scene.measured
+    found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
+                  (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
                   tuple(absent(named)))
     source = Source(scene.path, scene.title, scene.text, resolved(scene, found), named, tuple(scene.remarks))
     return replace(found, source=source)
 
 
 def _law(scene: Scene) -> tuple:
-    """(keys of the law as they act, its surface temperature table, its spread) of the first interface."""
+    """(keys of the law as they act, its surface temperature table, its spread [m], width of the pad [m]) of the first
+    interface."""
     given = scene.structure.interface[0] if scene.structure is not None and scene.structure.interface else \
         scene.friction
     if given is None:
-        return None, None, None
-    return acting(given, pad_width(scene), scene.where), given.temperature, given.spread
+        return None, None, None, None
+    from .interfaces import pad_width
+    from .law import acting
+
+    pad = pad_width(scene)
+    return acting(given, pad, scene.where), given.temperature, given.spread, pad
 
 
 def resolved(scene: Scene, model: Model) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from ..scene.tables import Asperities, Coating, Contact, Material
 from .gap import Gap, gap_asked
 
+CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance
 AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
 
 
@@ -69,6 +70,13 @@ class PatchModel:
         """Element size [m] of an even interface."""
         return self.element_size or self.length / AUTOMATIC_CELLS
 
+    @property
+    def nominal_load(self) -> float:
+        """The load [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
+        if self.load is not None:
+            return self.load
+        return self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
+
     def sized(self, size: float | None, kind: str = "") -> "PatchModel":
         """The patch with another element size [m]; None: of the tolerance in a run of kind "patch", else automatic."""
         chosen = size is None and kind == "patch" and self.mesh is None and self.gap.profile is None
@@ -121,13 +129,6 @@ def bars(patch: PatchModel, softness) -> float:
         total += (piece.height - piece.thickness) * softness(piece.substrate)
         total += piece.thickness * softness(piece.coating.material) if piece.coating else 0.0
     return total / (patch.pairs * patch.length * patch.width)
-
-
-def nominal_load(patch: PatchModel) -> float:
-    """The load of a patch [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
-    if patch.load is not None:
-        return patch.load
-    return patch.approach / bars(patch, lambda m: (1 - m.poisson**2) / m.young)
 
 
 def block_shear(patch: PatchModel) -> float:

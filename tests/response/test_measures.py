@@ -1,5 +1,6 @@
 """Measures on signals whose answers are known by hand."""
 
+from dataclasses import replace
 from math import acos, asin, cos, pi, sin
 
 import numpy as np
@@ -11,6 +12,7 @@ from patchfem import closed_forms
 from patchfem.core import G_N, BaseSine, Outcome, Response
 from patchfem.dynamics.march.march import hermite_extremes
 from patchfem.response import measures
+from patchfem.response.rows import ROWS, TABLE, Seen, measures_of
 
 OMEGA = 2 * pi * 143
 DRIVE = BaseSine(5 * G_N, OMEGA)
@@ -197,13 +199,16 @@ def test_exact_run_measures():
     window = response(time, slide=slide, force=3 * np.cos(phase), acceleration=8 * np.sin(phase))
     book = {"work_in": 1.0, "stored": 0.0, "friction": 1.0, "viscous": 0.0, "power": 1.0, "peak_stored": 0.0}
     extremes = np.array([[-9.0, 9.0], [-1e-6, 2e-6], [-1e-6, 1e-6], [-3e-6, 1e-6]])
-    found = measures.run_measures(window, extremes, book, DRIVE, 3)
+    seen = Seen(window, DRIVE, 100, extremes[-3:], book, 10.0, 0.0, True)
+    found = measures_of(seen)
     assert found["relative_displacement_amplitude"] == pytest.approx(2.5e-6, rel=1e-15)
     assert found["absolute_acceleration_peak"] == pytest.approx(8.0, rel=1e-6)
     assert found["friction_force_peak"] == 3.0 and found["energy_balance"] == 0.0
     assert found["drift_per_cycle"] == pytest.approx(0.0, abs=1e-20)
-    assert measures.run_measures(window, extremes, book, DRIVE, 3, 9.5)["absolute_acceleration_peak"] == 9.5
-    assert set(found) <= set(measures.UNITS) and set(found) <= set(measures.FLOORS)
+    known = measures_of(replace(seen, known={"absolute_acceleration_peak": 9.5, "slip_amplitude": None}))
+    assert known["absolute_acceleration_peak"] == 9.5 and "slip_amplitude" not in known
+    assert "friction_force_peak" not in measures_of(replace(seen, load=None))  # where nothing rubs
+    assert set(known) < set(found) <= set(TABLE)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.123, 0.5, 0.77])
@@ -286,5 +291,7 @@ def test_exact_short_and_odd_runs():
     assert measures.classify(5 - 0.5 * np.arange(6), 1e-3) is Outcome.TRANSIENT
 
 
-def test_exact_every_measure_has_a_unit():
-    assert set(measures.FLOORS) <= set(measures.UNITS)
+def test_exact_every_row_says_what_it_is():
+    assert len(TABLE) == len(ROWS)
+    for row in ROWS:
+        assert row.unit and row.floor >= 0 and row.text[0].islower() and not row.text.endswith("."), row.name

@@ -73,8 +73,3 @@ def strip_values(patch, peak_of) -> dict:
     out["rotational_stiffness"] = rotational_stiffness(state, pieces.normal * count, patch.x, weight)
     out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state, ratio)
     return out
-
-
-def strip_loads(patch) -> np.ndarray:
-    """Normal load of every strip of a solved patch (s,) [N]."""
-    return patch.strips.force.sum(axis=1)

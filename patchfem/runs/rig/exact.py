@@ -12,10 +12,9 @@ from ...response.measures import circular_mean, harmonic, swing, window_amplitud
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
-from ..patch.strips import strip_loads
 from . import levels as rig_levels
 from .solution import Solution, borne, seen
-from .strips import as_one, other_measures
+from .strips import as_one, other_measures, strip_loads
 
 
 def run_exact(model, numerics, patch, share: float = 1.0, say=None, progress=None):

@@ -9,7 +9,7 @@ from ...model.accuracy import Numerics, quadrature_of
 from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
 from ...structure.drive_sizes import omega_of
-from ..patch.strips import strip_loads
+from .strips import strip_loads
 
 
 def model_of(model: Model, numerics: Numerics, patch):
