@@ -21,8 +21,7 @@ from scene_texts import (
 )
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.model import model as models
-from patchfem.model import rig as rigs
+from patchfem.model import law, load, patch, rig, slide
 from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -90,8 +89,8 @@ def test_exact_the_resolved_text_has_what_follows_from_other_keys():
 def test_exact_a_run_makes_nothing_of_the_model_again(text, sets, monkeypatch):
     """Every maker is called at most once, and none once the model stands."""
     calls = []
-    for place, names in ((models, ("patch_asked", "slide_asked", "point_asked", "rig_asked", "acting")),
-                         (rigs, ("modes_of", "drive_of", "start_of", "rubbings_of"))):
+    for place, names in ((patch, ("patch_asked",)), (slide, ("slide_asked",)), (load, ("point_asked",)),
+                         (law, ("acting",)), (rig, ("rig_asked", "modes_of", "drive_of", "start_of", "rubbings_of"))):
         for name in names:
             made = getattr(place, name)
             monkeypatch.setattr(place, name, lambda *words, name=name, made=made: calls.append(name) or made(*words))
@@ -113,11 +112,11 @@ def test_exact_the_run_of_a_model_is_the_run_of_its_scene(text, sets):
     assert ours.plan.model is model and ours.measures
 
 
-def with_load(model, load: float):
+def with_load(model, size: float):
     """The model under another load [N]."""
     if model.patch is not None:
-        return replace(model, patch=replace(model.patch, load=load))
-    return replace(model, point=replace(model.point, load=load))
+        return replace(model, patch=replace(model.patch, load=size))
+    return replace(model, point=replace(model.point, load=size))
 
 
 def with_tilt(model, angle: float):
@@ -161,9 +160,9 @@ def test_exact_another_law_is_the_scene_with_that_set():
     """The first interface of the rig and the law of the model are one law in two places: both are exchanged."""
     text, sets = SMALL_PATCH + SHEAR + COULOMB + SHORT, ["accuracy.steps_per_cycle=100"]
     before = build(loads(text, sets=sets))
-    law = before.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
-    rig = replace(before.rig, interfaces=(replace(before.rig.interfaces[0], numbers=law),))
-    ours = run(replace(before, friction=law, rig=rig))
+    less = before.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
+    other = replace(before.rig, interfaces=(replace(before.rig.interfaces[0], numbers=less),))
+    ours = run(replace(before, friction=less, rig=other))
     assert seen(ours) == seen(run(loads(text, sets=[*sets, "friction.static=0.2", "friction.kinetic=0.2"])))
 
 
