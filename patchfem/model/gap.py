@@ -29,6 +29,11 @@ class Gap:
     rough: bool
     side: str
 
+    @property
+    def angle(self) -> float:
+        """Angle [rad] at which a tilted upper piece is held."""
+        return next((part.angle for name, part in self.shapes if name == "tilt" and self.side == "upper"), 0.0)
+
     def at(self, x) -> tuple:
         """((m,) gap of the unloaded surfaces [m] at x (m,) [m], notes, seconds by shape)."""
         gap, seconds, notes = np.zeros(x.size), {}, ()

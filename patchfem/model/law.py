@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbing:
     """One interface and its law. key: of its table, for messages; numbers: keys of the law as they act; load: normal
-    load [N], None where a patch carries it."""
+    load [N] of an interface between masses, None where the patch or the point of the model carries it."""
 
     key: str
     numbers: object
@@ -73,8 +73,7 @@ def rubbings_of(scene) -> tuple:
                      for k, one in enumerate(scene.structure.interface))
     if scene.friction is None:
         return ()
-    load = scene.normal.load if scene.normal is not None else None
-    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), load),)
+    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), None),)
 
 
 def pad_width(scene) -> float | None:

@@ -32,9 +32,8 @@ class PatchModel:
     "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface, None lets
     the tolerance choose where `chosen`, else length/AUTOMATIC_CELLS; mesh: file of the two pieces. load [N] or approach
     [m], the other None. offset [m] and line_moment [N m] of a load line; rotates: the upper piece is free to turn;
-    spring [N m/rad] and slide_spring [N/m, None rigid] of the holder; angle [rad] held where the upper piece does not
-    turn. skin: asperities; strips: (count, roll [rad]); shear: the pieces give way tangentially; gives_way: what lets
-    the patch slip part by part, as the scene writes it.
+    spring [N m/rad] and slide_spring [N/m, None rigid] of the holder. skin: asperities; strips: (count, roll [rad]);
+    shear: the pieces give way tangentially; gives_way: what lets the patch slip part by part, as the scene writes it.
     """
 
     length: float
@@ -56,7 +55,6 @@ class PatchModel:
     rotates: bool
     spring: float
     slide_spring: float | None
-    angle: float
     skin: Asperities | None
     strips: tuple | None
     shear: bool
@@ -102,7 +100,6 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
     size = None if contact.mesh is not None else contact.element_size or contact.length / AUTOMATIC_CELLS
     line, holder, strips = contact.load_line, contact.holder, contact.strips
     chosen = kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None)
-    held = contact.tilt is not None and contact.tilt.on == "upper"
     return PatchModel(
         contact.length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate,
         _piece(contact, contact.lower),
@@ -112,8 +109,8 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
         (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         (holder.tangential_stiffness or None) if holder is not None else None,
-        contact.tilt.angle if held else 0.0, contact.asperities,
-        (strips.count, strips.roll) if strips is not None else None, contact.shear is not None, contact.gives_way)
+        contact.asperities, (strips.count, strips.roll) if strips is not None else None, contact.shear is not None,
+        contact.gives_way)
 
 
 def _piece(contact: Contact, own) -> OnePiece:

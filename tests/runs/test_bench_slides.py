@@ -60,8 +60,8 @@ def steps_of(model) -> int:
 
 
 def sliding(text, *sets, patch=None, steps=None):
-    scene = loads(text, sets=sets)
-    return bench.run(build(scene), patch, steps or steps_of(build(scene)))
+    model = build(loads(text, sets=sets))
+    return bench.run(model, patch, steps or steps_of(model))
 
 
 @pytest.fixture
@@ -180,11 +180,11 @@ def test_exact_points_behind_the_shear_see_the_true_hold():
 
 def test_exact_a_table_of_the_corners_is_the_triangle(table):
     rows = "time [ms],displacement [um]\n0,0\n2,10\n6,-10\n8,0\n"
-    found = table(rows, ELASTIC)
-    one = bench.run(build(found), None, 400)
+    found = build(table(rows, ELASTIC))
+    one = bench.run(found, None, 400)
     other = sliding(POINT + ELASTIC + SLIDE, steps=400)
     top = one.slide.argmax()
-    assert build(found).slide.peak_speed == pytest.approx(5e-3) and one.time[top] == pytest.approx(2e-3)
+    assert found.slide.peak_speed == pytest.approx(5e-3) and one.time[top] == pytest.approx(2e-3)
     up = np.minimum(one.slide[:top + 1] / 2e-6, 1)
     back = np.maximum(1 - (10e-6 - one.slide[top:one.slide.argmin() + 1]) / 2e-6, -1)
     assert one.force[:top + 1] == pytest.approx(0.3 * one.load[0] * up, rel=1e-9)
@@ -195,8 +195,9 @@ def test_exact_a_table_of_the_corners_is_the_triangle(table):
 
 
 def test_exact_a_table_with_a_rest_is_the_dwell(table):
-    rows = "displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n"
-    found = bench.run(build(table(rows, NONLOCAL, "accuracy.steps_per_cycle=600")), None, 600)
+    scene = table("displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n", NONLOCAL,
+                  "accuracy.steps_per_cycle=600")
+    found = bench.run(build(scene), None, 600)
     other = sliding(POINT + NONLOCAL + DWELL, steps=600)
     assert found.force == pytest.approx(other.force, rel=1e-9)
     assert found.values == pytest.approx(other.values, rel=1e-9, abs=1e-12)

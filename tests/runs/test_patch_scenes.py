@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import cli
 from scene_texts import COATED, COULOMB, PIECE, SLIDE
 
 from patchfem import closed_forms
@@ -172,7 +173,7 @@ def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
 def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
-    with pytest.raises(PatchfemError, match=r"scene\.toml:10: contact\.profile\.file: .* % of its height below 2 "
+    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .* % of its height below 2 "
                                             "elem.*element_size"):
         run(scene(tables, path=tmp_path / "scene.toml"))
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
@@ -230,8 +231,13 @@ def test_refuses_a_mesh_whose_pieces_are_not_those_of_the_scene(tmp_path):
     with pytest.raises(PatchfemError, match=r"^0\.009 m, the upper piece of the mesh") as caught:
         bodies_of(build(found).patch)
     assert caught.value.key == "contact.height"
-    with pytest.raises(PatchfemError, match=r"scene\.toml:5: contact\.height: 0\.009 m, the upper piece of the mesh"):
+    with pytest.raises(PatchfemError, match=r"scene\.toml:4: contact\.height: 0\.009 m, the upper piece of the mesh"):
         run(found)
+    found.path.write_text(found.text, "utf-8")
+    for words in (["plan", found.path, "--probe"], ["mesh", found.path, "-o", tmp_path / "other.msh"],
+                  ["cost", found.path, "--over", "element_size", "-q"]):
+        said = cli(*words).err
+        assert f"{found.path}:4: contact.height: 0.009 m" in said and said.count("scene.toml") == 1, words
 
 
 def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_path):

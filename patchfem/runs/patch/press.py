@@ -81,7 +81,7 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
 def _under(asked, pieces: Compliance, gap) -> tuple:
     """(Compliance with its skin, Pressure, skin, strips) under the load, or the approach with the rotation held."""
     strips = skin = None
-    angle, moment, spring = asked.angle, asked.moment, asked.spring
+    angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
         from .strips import in_strips
 

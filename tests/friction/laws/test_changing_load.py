@@ -111,13 +111,13 @@ CONSTANT = 'kind = "constant"\nspeed = "1 mm/s"\ndistance = "20 um"'
 
 @pytest.mark.parametrize("amplitude", ["40 N", "150 N"])
 def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
-    scene = bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", amplitude))
+    model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", amplitude)))
     height = float(amplitude.split()[0])
     load = lambda t: max(100 + height * np.cos(2 * np.pi * 300 * t + 0.5), 0.0)  # noqa: E731
     wanted = 0.3e-3 * quad(load, 0, 0.02, limit=500, epsabs=1e-12)[0]
-    errors = [abs(law_bench.run(build(scene), None, steps).values["friction_work"] / wanted - 1) for steps in (40, 80)]
+    errors = [abs(law_bench.run(model, None, steps).values["friction_work"] / wanted - 1) for steps in (40, 80)]
     assert errors[1] <= 3e-4 and errors[1] < errors[0] / 3
-    found = law_bench.run(build(scene), None, 40)
+    found = law_bench.run(model, None, 40)
     assert found.force == pytest.approx(0.3 * found.load * (found.slide > 0), abs=1e-12)
     if height > 100:
         assert (found.load == 0).any() and found.values["friction_ratio_peak"] == pytest.approx(0.3)
@@ -125,9 +125,9 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
 
 def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
     """At v: m = N, z' = v (N - z/eps), s2' = v (2 z - s2/eps), the rule for a falling N in between: order 1."""
-    scene = bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING)
+    model = build(bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING))
     time = np.linspace(0, 0.02, 400_001)
-    load, z, s2 = build(scene).point.at(time), np.zeros(time.size), 0.0
+    load, z, s2 = model.point.at(time), np.zeros(time.size), 0.0
     x = 1e-3 * 0.5e-7 / 2e-6  # v dt/eps; lengths in eps, loads in N
     for k in range(1, time.size):
         mean, last = (load[k] + load[k - 1]) / 2, z[k - 1]
@@ -139,7 +139,7 @@ def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
             z[k], s2 = keep * z[k], keep * s2
     errors = []
     for steps in (50, 100, 200):
-        found = law_bench.run(build(scene), None, steps)
+        found = law_bench.run(model, None, steps)
         errors.append(np.abs(found.force / 0.3 - np.interp(found.time, time, z)).max() / 100)
         assert found.values["energy_balance"] <= 1e-13 and found.values["energy_created"] == 0
     assert errors[2] <= 3e-3 and 1.8 <= errors[0] / errors[1] <= 2.2 and 1.8 <= errors[1] / errors[2] <= 2.2

@@ -190,9 +190,9 @@ def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edge
 # ---- scenes
 
 def bench_of(text, *sets, steps=64):
-    scene = loads(text, sets=sets)
-    patch = solve_all(build(scene).patch, 1e-3, False)[0] if scene.contact is not None else None
-    return patch, bench.run(build(scene), patch, steps, 4)
+    model = build(loads(text, sets=sets))
+    patch = solve_all(model.patch, 1e-3, False)[0] if model.patch is not None else None
+    return patch, bench.run(model, patch, steps, 4)
 
 
 def test_exact_one_point_is_coulomb():
