@@ -32,6 +32,7 @@ from .point_kernels import bond_mean, grow
 PIECE = 0.25  # longest strip in bond lengths
 GROWN = 0.5  # most growth J of one strip of growing bonds
 MOST_GROWN = 16
+TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
 LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies is no better than the force
 
 
@@ -150,14 +151,18 @@ def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     Stretch reading of order 1: closed. Of another order: what damage takes, the share dR/eps of the stored energy, and
     the gain of that energy, so that no step creates any (twin: `quadrature.Quadrature.step`). Printed law: the mean of
     the force. Integrals by Simpson's rule where the increment is short (its first value is known), by five Gauss points
-    up to half a bond length, beyond it by such panels that double.
+    up to half a bond length, beyond it by such panels that double. An increment that touches the place of the first
+    bonds takes Gauss points as well: their force may jump there, and its value at the place itself is that of neither
+    side.
     """
     if dq == 0:
         return tally[5]
     if law[1] == MOMENTS:
         return list_slope(dq, bonds, tally, now, law, growth, v0, dt)[0]
     size = abs(dq) / now[4]
-    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0
+    low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
+    touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
+    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
     if law[1] == POWER and size > LEAST_BALANCED:
         gain = list_energy(dq, bonds, tally, now, law, growth, table, v0, dt) - tally[4]
         middle = _after(dq, now, growth, v0, v0, dt)[5]
