@@ -105,12 +105,14 @@ def test_exact_steady_loop_of_order_two_creates_energy():
     assert contact.tally[6] > 0
 
 
-@pytest.mark.parametrize("order", [0.0, 0.5, 2.0, 3.0])
-def test_always_the_stretch_reading_creates_next_to_nothing(order):
-    """Orders p >= 0 never create energy; what the sums' own errors look like stays below 1e-5 of the work."""
-    path = random_walk(8, 400, 0.2)
-    _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=0.0), 1.0, np.inf, 0.0), path, 1.0)
-    assert bad == 0 and contact.tally[6] <= 1e-5 * contact.tally[7]
+@pytest.mark.parametrize("order, initial, size", [(0.0, 0.0, 0.2), (0.5, 0.0, 0.2), (2.0, 0.0, 0.2), (3.0, 0.0, 0.2),
+                                                  (0.0, 1.0, 0.1), (0.0, 1.0, 0.01), (0.5, 1.0, 0.004)])
+def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size):
+    """Orders p >= 0 never create energy. The path mean of the force by Simpson's rule or Gauss points created up to 5 %
+    of the work in the last rows, where the force jumps or has a cusp inside a step; the mean from the energy none."""
+    path = random_walk(8, 400, size)
+    _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0)
+    assert bad == 0 and contact.tally[6] <= 1e-7 * contact.tally[7]
 
 
 @pytest.mark.parametrize("order", [-0.5, -0.9])
