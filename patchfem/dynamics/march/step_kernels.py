@@ -28,8 +28,8 @@ class Contact(NamedTuple):
     stiffness, limit (t,), now (3,) = force, energy, mean stretch. Points: weight (m,) = mu_s area/eps_0, bonds (4, m)
     = m, z, s2, local slide, and play (5, m) where bonds stretch freely over the share growth[5] of their length;
     source (m,), shear modes psi (r, m), kappa (r,), b (r,).
-    List: bondlist (10, capacity), now (6,), tally (12,), law (24,), table (k,) as in friction.bond_kernels, or
-    summed over place, as in dynamics.march.bond_list_kernels. growth of eq. 2.10.
+    List: bondlist (10, capacity), now (6,), tally (12,), law (24,), table (k,) as in friction.bonds.bond_kernels.
+    growth of eq. 2.10.
     Pressure that stays on the lower piece: place (m,), x, sigma.
     """
 
