@@ -33,6 +33,8 @@ class Model:
     def __call__(self, values) -> np.ndarray:
         """(k,) reading at the rows; PatchfemError where the values make no scene."""
         from ..runs.bench import bench as law_bench
+        from ..runs.bench.engine import smooth_sum_of
+        from ..runs.bench.watch import Watch
 
         scene = self.scene_at(values)
         self.made += 1
@@ -40,7 +42,7 @@ class Model:
         corner = np.arange(self.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
         path = np.interp(number, corner, self.time), np.interp(number, corner, self.loop.displacement), 0, 0.0
-        run = law_bench.run(scene, patch, 4, 0, self.say, path)
+        run = law_bench.run(scene, patch, 4, 0, path, Watch(smooth_sum_of(scene, path[1]), self.say))
         if not run.load[0] > 0:
             raise PatchfemError(f"{scene.path}: no load presses the pieces")
         out = run.force[corner]

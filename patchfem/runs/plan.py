@@ -57,15 +57,21 @@ def plan(scene, per_point: bool = False) -> Plan:
     elif scene.kind == "bench":
         from ..model.load import refined, varies
         from ..model.slide import lateral_corners, path_of, steps_of
+        from .bench.engine import engine_of
 
         if lateral_corners(scene) is not None:
             from .bench.two_directions import refuse
 
             refuse(scene)
-        engine, per_cycle = "bench", steps_of(scene)
+        per_cycle = steps_of(scene)
         time, slide = path_of(scene, per_cycle)[:2]
-        steps = 2 * (refined(scene, time, slide, per_cycle)[0] if varies(scene) else time).size
-        seconds += steps * _bench_step(scene, slide, unknowns.get("interface_points", 1), varies(scene))
+        if varies(scene):
+            time, slide = refined(scene, time, slide, per_cycle)
+        runs = engine_of(scene, slide, unknowns.get("interface_points", 1))
+        engine, steps = runs.name, 2 * time.size  # half and a quarter of the steps and what checks the sum beside them
+        seconds += steps * runs.seconds
+        if runs.choice is not None and runs.choice.strips:
+            unknowns["bond_list_about"] = int(runs.choice.strips)
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
     groups = _groups(acted, chain)
@@ -75,18 +81,6 @@ def plan(scene, per_point: bool = False) -> Plan:
         groups["share_of_the_spread"] = pad_factor(pad_width(scene), scene.friction.spread)
     return Plan(scene, scene.kind, named, tuple(absent(named)), engine, unknowns, steps, round(seconds, 2), size, chain,
                 groups, tuple(_verdict(scene, groups, size)))
-
-
-def _bench_step(scene, slide, points: int, changing: bool) -> float:
-    """Seconds of one step of a bench: laws of the last increment, or a sum over the strips of the path."""
-    f = scene.friction
-    if f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
-        return 6e-5
-    import numpy as np
-
-    moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
-    return (3 if changing else 1) * (1.2e-3 + 2e-6 * strips + 8e-9 * strips * points)
 
 
 def free_bytes() -> float:

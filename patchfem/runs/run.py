@@ -126,8 +126,10 @@ def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
 def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     from ..model.law import bonds_of
     from ..model.slide import peak_speed, steps_of
-    from ..response.errors import change, step_error, with_errors
+    from ..response.errors import with_errors
     from .bench import bench
+    from .bench.errors import errors_of
+    from .bench.watch import Watch
 
     scene = what.scene
     if scene.friction.law == "nonlocal" and scene.friction.order < 0 and scene.friction.initial_bonds > 0:
@@ -140,21 +142,14 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
                         "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
     steps = steps_of(scene)
     frames = FRAMES if patch is not None else 0
-    fine = bench.run(scene, patch, steps, frames, say)
+    fine = bench.run(scene, patch, steps, frames, watch=Watch(None, say, progress))
     seconds["bench"] = fine.seconds
     others = []
     if estimate:
-        half, quarter = (bench.run(scene, patch, max(4, steps // (4 * k) * 4), 0, say) for k in (2, 4))
-        seconds["error"] = half.seconds + quarter.seconds
-        first_order = bench.varies(scene)  # twice the change, as of few steps
-        others.append(step_error(fine.values, half.values, quarter.values, min(steps, 399) if first_order else steps))
-        if coarse[0] is not None:
-            rough = bench.run(scene, coarse[0], max(4, steps // 16 * 4), 0, say)
-            others.append(change(quarter.values, rough.values))
-            seconds["error"] += rough.seconds
+        others, seconds["error"] = errors_of(scene, patch, coarse[0], fine, steps, say)
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
-    if created > 1e-6 * power:
+    if scene.friction.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
                     "that went to and fro: reading = \"stretch\" creates none"]
     warnings = [*warnings, *warming(scene, patch, fine)]
@@ -165,7 +160,7 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
         warnings = warnings + _overhang(scene, fine)
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
     return Result(what, Outcome.DONE, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
-                  {"engine": "bench", "steps": steps})
+                  {"engine": fine.engine.name, "steps": steps})
 
 
 def _coupled(*words) -> Result:

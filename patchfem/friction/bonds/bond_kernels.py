@@ -32,6 +32,7 @@ from .point_kernels import bond_mean, grow
 PIECE = 0.25  # longest strip in bond lengths
 GROWN = 0.5  # most growth J of one strip of growing bonds
 MOST_GROWN = 16
+TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
 
 
 @njit(error_model="numpy", **LEAN)
@@ -136,14 +137,18 @@ def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     """Path-mean weight over the increment.
 
     Closed for the stretch reading of order 1. Else Simpson's rule where the increment is short (its first force is
-    known), five Gauss points up to half a bond length, beyond it such panels that double.
+    known), five Gauss points up to half a bond length, beyond it such panels that double. An increment that touches the
+    place of the first bonds takes Gauss points as well: their force may jump there, and its value at the place itself
+    is that of neither side.
     """
     if dq == 0:
         return tally[5]
     if law[1] == MOMENTS:
         return list_slope(dq, bonds, tally, now, law, growth, v0, dt)[0]
     size = abs(dq) / now[4]
-    if tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0:
+    low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
+    touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
+    if tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched:
         half = list_force(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
         return (tally[5] + 4 * half + list_force(dq, bonds, tally, now, law, growth, table, v0, dt)) / 6
     if size <= 0.5:

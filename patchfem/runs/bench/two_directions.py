@@ -6,7 +6,9 @@ from ...core import PatchfemError
 from ...model.gap import shape_side
 from ...model.law import bonds_of
 from ...model.slide import lateral_corners
-from .ledger import _frame_numbers, _refuse_costly, _split, ledger_of
+from .ledger import Slid, frame_numbers, ledger_of, split
+from .stepped import refuse_costly
+from .watch import BLOCK, Watch
 
 
 def refuse(scene) -> None:
@@ -30,16 +32,15 @@ def refuse(scene) -> None:
                             "not yet built")
 
 
-def run_plane(scene, patch, time, slide, frames: int) -> tuple:
-    """((force, load, slip, ledger, frames, tau, local) as the bench has them along x, histories of the other direction
-    by name).
+def run_plane(scene, patch, time, slide, frames: int, watch: Watch) -> tuple:
+    """(Slid along x, histories of the other direction by name; `pairs` are the (slide, force) of that direction).
 
     Pressure that rides on a rigid mover is constant at every point and the law is linear in it, so every point has the
     traction of one point under unit pressure times its own. yaw_moment [N m]: sum of y f_x - x f_y, about +z of the
     friction on the upper piece, f positive against its slip; strips have their places y over the width.
     """
     law = law_for(scene)
-    _refuse_costly(scene, law, time.size, 1, slide)
+    refuse_costly(scene, law, time.size, 1, slide)
     across = np.interp(time, *lateral_corners(scene))
     q, one = np.stack([slide, across], axis=1), np.ones(1)
     state, unit = law.start(one), np.zeros((time.size, 2))
@@ -49,18 +50,20 @@ def run_plane(scene, patch, time, slide, frames: int) -> tuple:
         state = step.state
         unit[k], stored[k] = law.traction(state)[:, 0], law.stored(state)[0]
         work[k] = work[k - 1] + (q[k] - q[k - 1]) @ step.mean[:, 0]
-        losses[k] = _split(step.dissipated)
+        losses[k] = split(step.dissipated)
+        if k % BLOCK == 0 or k == time.size - 1:
+            watch.tell(k / (time.size - 1))
     load, moment, roll = _pressed(scene, patch)
-    at = _frame_numbers(time.size, frames)
+    at = frame_numbers(time.size, frames)
     sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
     give = law.law.length / law.law.static if law.law.static > 0 else 0.0
     slip = slide - give * unit[:, 0]
     local = np.where(sigma > 0, slip[at, None], slide[at, None])
-    more = {"lateral": across, "lateral_force": load * unit[:, 1]}
+    more = {"lateral": across, "lateral_force": load * unit[:, 1], "pairs": [(across, load * unit[:, 1])]}
     if patch is not None:
         more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
-    return (load * unit[:, 0], np.full(time.size, load), slip, load * ledger_of(work, stored, losses), at,
-            np.outer(unit[at, 0], sigma), local), more
+    return Slid(load * unit[:, 0], np.full(time.size, load), slip, load * ledger_of(work, stored, losses), at,
+                np.outer(unit[at, 0], sigma), local), more
 
 
 def law_for(scene):

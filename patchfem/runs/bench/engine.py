@@ -1,0 +1,134 @@
+"""Which engine slides the interface of a bench, what it loses and what it costs.
+
+The recursion, the list of bonds and the elements are the compiled ones that rigs march with. A law without memory needs
+no loop. Where the pressure of a point changes on the way, a law is stepped sample by sample.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...core import Missing, PatchfemError
+from ...friction.bonds.engines import Choice
+from ...friction.bonds.engines import choose as choose_sum
+from ...model.accuracy import LONGEST
+from ...model.law import acting, bonds_of
+from ...model.load import varies
+from ...model.slide import lateral_corners
+
+CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
+NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
+         STEPPED: "law step by step", PLANE: "two directions"}
+PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide needs no search for the increment
+WITHOUT_MEMORY = ("coulomb", "tanh", "convolution")
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """kind: one of the numbers above; choice: how bonds are summed, None without a sum; seconds: per sample."""
+
+    kind: int
+    seconds: float
+    choice: Choice | None = None
+
+    @property
+    def name(self) -> str:
+        """As summaries and plans have it."""
+        return "bench, " + (f"{self.choice.engine} bond list" if self.kind == LIST else NAMES[self.kind])
+
+
+def engine_of(scene, slide, points: int = 1, choice: Choice | None = None) -> Engine:
+    """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
+    summed where that is known already.
+
+    PatchfemError for a pinned engine that cannot sum such a bench, Missing where the sum would take too long.
+    """
+    f, soft = acting(scene).friction, scene.contact is not None and bool(scene.contact.gives_way)
+    if lateral_corners(scene) is not None:
+        return Engine(PLANE, _stepped_seconds(scene, slide, 1))
+    if soft and f.law == "nonlocal":
+        from ...slip.shear_modes import SHEAR_MODES
+
+        modes = scene.accuracy.shear_modes or SHEAR_MODES
+        return Engine(POINTS, 4e-8 * points * (1 + modes / 4))
+    if soft:
+        return Engine(ELEMENTS, 3e-9 * points + 1e-7)
+    if changes(scene):
+        return _stepped(scene, slide, points)
+    if f.law in WITHOUT_MEMORY:
+        return Engine(CLOSED, 1e-7)
+    if f.law == "elastic-plastic":
+        return Engine(ELEMENTS, 1e-7)
+    return _summed(scene, slide, points, choice or sum_of(scene, slide))
+
+
+def changes(scene) -> bool:
+    """Whether the pressure of a point changes during the slide: with the load, or as it slides over the other piece."""
+    if scene.contact is None:
+        return varies(scene)
+    from ...model.gap import shape_side
+
+    return shape_side(scene.contact) == "lower"
+
+
+def sum_of(scene, slide) -> Choice:
+    """How the bonds of a rigid slide along the samples slide (k,) [m] are summed: as in a rig, but the error is held
+    against the force that is reached, which is small where the stroke is short against the bond length."""
+    law, accuracy = bonds_of(scene), scene.accuracy
+    stroke, steps = strokes(slide)
+    stroke = max(stroke / law.length, 1e-9)
+    goal = accuracy.tolerance * min(1.0, stroke)
+    tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
+    return choose_sum(law, goal, stroke, steps, accuracy.quadrature, tail, accuracy.merge)
+
+
+def smooth_sum_of(scene, slide) -> Choice | None:
+    """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
+    fit. None of a law that is no sum, or where the scene names the engine."""
+    if scene.friction.law != "nonlocal" or scene.accuracy.quadrature != "auto" or scene.accuracy.merge is not None:
+        return None
+    found = sum_of(scene, slide)
+    return replace(found, engine="truncated", merge=0.0, error=found.tail) if found.engine == "merged" else found
+
+
+def strokes(slide) -> tuple:
+    """(mean path [m], mean number of moving steps) between two reversals of the samples slide (k,) [m]."""
+    move = np.diff(slide)
+    way = np.sign(move[move != 0])
+    count = 1 + np.count_nonzero(way[1:] != way[:-1])
+    return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
+
+
+def _summed(scene, slide, points: int, found: Choice) -> Engine:
+    law = bonds_of(scene)
+    if found.engine == "recursion":
+        return Engine(RECURSION, 3e-8, found)
+    if law.breakaway:  # a list has no elastic range
+        return _stepped(scene, slide, points)
+    size = slide.size
+    strips = min(found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length))
+    seconds = PASSES * found.seconds * (strips / found.strips if found.strips else 1.0)
+    if size * seconds > LONGEST:
+        raise Missing(f"{scene.path}: the bond list (about {strips:.0f} entries) would take about {size * seconds:.0f} "
+                      f"s, more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle or slide.cycles, or loosen "
+                      "accuracy.tail or accuracy.merge")
+    return Engine(LIST, seconds, found)
+
+
+def _stepped(scene, slide, points: int) -> Engine:
+    f, pinned = scene.friction, scene.accuracy.quadrature
+    if f.law == "nonlocal" and pinned == "merged":
+        raise PatchfemError(f"{scene.where('accuracy.quadrature')}: 'merged' where the pressure of a point changes "
+                            "during the slide, or beside friction.breakaway: use 'auto', 'direct' or 'truncated'; not "
+                            "yet built")
+    return Engine(STEPPED, _stepped_seconds(scene, slide, points))
+
+
+def _stepped_seconds(scene, slide, points: int) -> float:
+    """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
+    f = scene.friction
+    if f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
+        return 6e-5
+    moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
+    strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
+    return (3 if varies(scene) else 1) * (1.2e-3 + 2e-6 * strips + 8e-9 * strips * points)

@@ -1,0 +1,40 @@
+"""A rigid slide under a pressure that rides on the upper piece, by the compiled engines.
+
+Every point shares the slide and the laws are linear in the pressure, so all points have the traction of one that
+carries the load, times their own share of it.
+"""
+
+import numpy as np
+
+from ...dynamics.march.models import ContactModel, jenkins_model, list_model, points_model
+from ...friction.bonds.quadrature import cutoff
+from ...model.law import bonds_of
+from .engine import ELEMENTS, Engine
+from .follow import follow
+from .law import pressed
+from .ledger import Slid, elastic_slip, local_slip
+from .watch import Watch
+
+
+def rigid(scene, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> Slid:
+    """Slide the interface along path = (time [s], slide [m]), both (k,), with `frames` frames of its tractions."""
+    time, slide = path
+    sigma, weight = pressed(scene, patch)
+    load = float(weight @ sigma)
+    done = follow(one_point(scene, load, engine), time, slide, frames, watch, scene.friction.rest_growth is not None)
+    tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
+    loads = np.full(time.size, load)
+    return Slid(done.force, loads, elastic_slip(scene, slide, done.force, loads), done.ledger, done.at, tau,
+                local_slip(scene, slide[done.at], tau, sigma))
+
+
+def one_point(scene, load: float, engine: Engine) -> ContactModel:
+    """One point that carries the whole load [N], as a contact of the compiled loops."""
+    f = scene.friction
+    if engine.kind == ELEMENTS:
+        return jenkins_model([f.static * load / f.bond_length], [f.bond_length])
+    law, found = bonds_of(scene), engine.choice
+    if found.engine == "recursion":
+        return points_model(law, [1.0], [load])
+    reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
+    return list_model(law, f.static * load, reach, found.merge)

@@ -1,0 +1,54 @@
+"""A slide behind the pieces' own shear: the exact set of elements, or bond points behind the shear modes."""
+
+import numpy as np
+
+from ...core import NotConverged, PatchfemError
+from ...dynamics.march.models import jenkins_model, points_model
+from ...model.gap import shape_side
+from ...model.law import bonds_of
+from ...slip.shear_modes import jenkins_set
+from ..fields import element_fields, point_fields
+from ..patch.press import shear_of
+from .follow import follow
+from .ledger import Slid
+from .watch import Watch
+
+
+def with_shear(scene, patch, time, slide, frames: int, watch: Watch) -> Slid:
+    """Slide the holders along the samples time [s], slide [m] (k,). PatchfemError for what is not built, NotConverged
+    where a step misses its residual."""
+    if shape_side(scene.contact) == "lower":
+        raise PatchfemError(f"{scene.path}: {scene.contact.gives_way} with the pressure on the lower piece: not "
+                            "yet built; put the shapes on the upper piece")
+    if scene.friction.law == "nonlocal":
+        return _points(scene, patch, time, slide, frames, watch)
+    return _elements(scene, patch, time, slide, frames, watch)
+
+
+def _elements(scene, patch, time, slide, frames, watch) -> Slid:
+    """Coulomb and elastic-plastic points: parallel elements."""
+    f = scene.friction
+    if f.law == "coulomb" and f.kinetic < f.static:
+        raise PatchfemError(f"{scene.path}: friction.kinetic below static with {scene.contact.gives_way}: not yet "
+                            "built")
+    length = f.bond_length if f.law == "elastic-plastic" else 0.0
+    found = jenkins_set(patch.giving, f.static * patch.pressure.sigma_n * patch.pieces.interface.weight, length)
+    done = follow(jenkins_model(found.stiffness, found.yield_slide), time, slide, frames, watch)
+    tau, local = element_fields(patch, found, done.states, length)
+    return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
+
+
+def _points(scene, patch, time, slide, frames, watch) -> Slid:
+    """Bond points behind the shear modes."""
+    law = bonds_of(scene)
+    if law.reading != "stretch" or law.order != 1:
+        raise PatchfemError(f"{scene.path}: {scene.contact.gives_way} with order = {law.order:g}: not yet built; "
+                            "use order = 1")
+    weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
+    shear = shear_of(patch, law, scene.accuracy.shear_modes, scene.accuracy.tolerance)
+    done = follow(points_model(law, weight, sigma, shear), time, slide, frames, watch, law.grows)
+    if done.missed:
+        raise NotConverged(f"{scene.path}: {done.missed} steps of the bench missed the force residual; raise "
+                           "accuracy.steps_per_cycle")
+    tau, local = point_fields(patch, law, shear, done.states)
+    return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
