@@ -41,13 +41,14 @@ class BenchModel:
 
     def _reading(self, model: Model) -> np.ndarray:
         from ..runs.bench import bench as law_bench
-        from ..runs.bench.follow import Watch
+        from ..runs.bench.engine import smooth_sum_of
+        from ..runs.bench.watch import Watch
 
         patch = self._patch(model)
         corner = np.arange(self.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
         path = np.interp(number, corner, self.time), np.interp(number, corner, self.loop.displacement), 0, 0.0
-        run = law_bench.run(model, patch, 4, 0, path, Watch(say=self.say))
+        run = law_bench.run(model, patch, 4, 0, path, Watch(smooth_sum_of(model, path[1]), self.say))
         if not run.load[0] > 0:
             raise PatchfemError("no load presses the pieces", "")
         out = run.force[corner]

@@ -132,7 +132,7 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     from ..response.errors import with_errors
     from .bench import bench
     from .bench.errors import errors_of
-    from .bench.follow import Watch
+    from .bench.watch import Watch
 
     model, f = what.model, what.model.friction
     if f.law == "nonlocal" and f.order < 0 and f.initial_bonds > 0:
@@ -152,7 +152,7 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
         others, seconds["error"] = errors_of(model, patch, coarse[0], fine, steps, say)
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
-    if created > 1e-6 * power:
+    if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
                     "that went to and fro: reading = \"stretch\" creates none"]
     warnings = [*warnings, *warming(model, patch, fine)]

@@ -120,7 +120,7 @@ MEASURES = {
     "patch": "normal_load contact_fraction pressure_peak pressure_centre approach rotation moment normal_stiffness "
              "tangential_stiffness contact_half_width",
     "bench": "friction_force_peak friction_ratio_end friction_ratio_peak slip_amplitude loop_area energy_balance "
-             "equivalent_stiffness normal_load",
+             "equivalent_stiffness normal_load work_check",
     "linear": "relative_displacement_amplitude absolute_acceleration_peak energy_balance drift_per_cycle",
     "rig": "relative_displacement_amplitude absolute_acceleration_peak slip_amplitude stick_fraction normal_load "
            "friction_force_peak loop_area equivalent_stiffness equivalent_damping energy_balance drift_per_cycle "

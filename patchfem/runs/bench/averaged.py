@@ -13,6 +13,7 @@ def law_on(model, patch) -> Convolution:
     f = model.friction
     if patch is None:
         return Convolution(f.static, f.bond_length, f.order)
+
     pattern = patch.pressure.sigma_n if model.side == "lower" else None
     return Convolution(f.static, f.bond_length, f.order, patch.x, pattern)
 
@@ -25,8 +26,8 @@ def limit_share(model, patch) -> float:
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
-        raise PatchfemError("'convolution' on a pressure that is not symmetric: the limit is "
-                            f"{forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
+        raise PatchfemError(f"'convolution' on a pressure that is not symmetric: the "
+                            f"limit is {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
                             "patch symmetric or use a bench, [slide]; not yet built", "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 

@@ -6,10 +6,8 @@ from time import perf_counter
 import numpy as np
 
 from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
-from .engine import STEPPED, WITHOUT_MEMORY, Engine, engine_of
-from .follow import UNWATCHED, Watch
-from .rigid import rigid
-from .stepped import stepped
+from .engine import CLOSED, STEPPED, WITHOUT_MEMORY, Engine, engine_of
+from .watch import UNWATCHED, Watch
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -73,7 +71,15 @@ def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
 
         return with_shear(model, patch, *path, frames, watch), {}
     if engine.kind == STEPPED:
+        from .stepped import stepped
+
         return stepped(model, patch, *path, frames, watch), {}
+    if engine.kind == CLOSED:
+        from .closed import closed
+
+        return closed(model, patch, path, frames, watch), {}
+    from .rigid import rigid
+
     return rigid(model, patch, path, frames, engine, watch), {}
 
 

@@ -4,7 +4,7 @@ The recursion, the list of bonds and the elements are the compiled ones that rig
 no loop. Where the pressure of a point changes on the way, a law is stepped sample by sample.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from ...core import Missing, PatchfemError
 from ...friction.bonds.engines import Choice
 from ...friction.bonds.engines import choose as choose_sum
 from ...model.accuracy import LONGEST
-from ...slip.shear_modes import SHEAR_MODES
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
@@ -45,6 +44,8 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
     if model.slide.across is not None:
         return Engine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and f.law == "nonlocal":
+        from ...slip.shear_modes import SHEAR_MODES
+
         modes = model.accuracy.shear_modes or SHEAR_MODES
         return Engine(POINTS, 4e-8 * points * (1 + modes / 4))
     if soft:
@@ -72,6 +73,15 @@ def sum_of(model, slide) -> Choice:
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return choose_sum(law, goal, stroke, steps, accuracy.quadrature, tail, accuracy.merge)
+
+
+def smooth_sum_of(model, slide) -> Choice | None:
+    """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
+    fit. None of a law that is no sum, or where the scene names the engine."""
+    if model.friction.law != "nonlocal" or model.accuracy.quadrature != "auto" or model.accuracy.merge is not None:
+        return None
+    found = sum_of(model, slide)
+    return replace(found, engine="truncated", merge=0.0, error=found.tail) if found.engine == "merged" else found
 
 
 def strokes(slide) -> tuple:

@@ -8,7 +8,7 @@ import numpy as np
 from ...response.errors import change, step_error
 from . import bench
 from .engine import LIST
-from .follow import Watch
+from .watch import Watch
 
 FINER = 0.5  # merge width of the run that shows what merging does
 MERGED = 2.0  # times its change: where merging is of second order 4/3 would do

@@ -10,24 +10,9 @@ from ...core import Missing
 from ...dynamics.march.march import GOAL, MOST_STRIPS
 from ...dynamics.march.models import load_kernels
 from .ledger import frame_numbers, ledger_of
+from .watch import BLOCK, Watch
 
-BLOCK = 4096  # samples between two words of progress; what it costs to enter compiled code is lost in it
 AGED_PIECES = 17  # strips that a step of growing bonds may add besides those of its length
-
-
-@dataclass(frozen=True, slots=True)
-class Watch:
-    """What a pass is told from outside. choice: how bonds are summed, None to choose; say: called with one line when
-    something compiles; progress: called with the done share."""
-
-    choice: object = None
-    say: object = None
-    progress: object = None
-
-    def tell(self, share: float) -> None:
-        """Pass on the done share."""
-        if self.progress is not None:
-            self.progress(share)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,9 +38,6 @@ class Followed:
         losses = np.zeros((self.slide.size, 2))
         losses[1:, 0], losses[1:, 1] = -np.minimum(self.lost, 0.0), np.maximum(self.lost, 0.0)
         return ledger_of(work, self.stored, losses)
-
-
-UNWATCHED = Watch()
 
 
 def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -> Followed:

@@ -1,5 +1,6 @@
-"""The law object that a bench steps: one per value of friction.law."""
+"""The law object that a bench steps, one per value of friction.law, and the pressure it rubs under."""
 
+import numpy as np
 
 
 def law_for(model, patch=None):
@@ -29,3 +30,21 @@ def law_for(model, patch=None):
         return Quadrature(law, 0.0)
     tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
     return Quadrature(law, tail)
+
+
+def pressed(model, patch) -> tuple:
+    """(pressure (m,) [Pa], nodal area (m,) [m2]) of the points; one point that carries the load without a patch."""
+    if patch is None:
+        return np.array([model.point.load]), np.ones(1)
+    return patch.pressure.sigma_n, patch.pieces.interface.weight
+
+
+def ends_of_rest(model, slide) -> dict:
+    """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
+    the first sample of a slide and the last of every rest."""
+    f = model.friction
+    if f.law != "coulomb" or not f.kinetic < f.static:
+        return {}
+    moves = np.sign(np.diff(slide))
+    ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))
+    return {int(k): float(moves[k]) for k in ends}

@@ -7,8 +7,9 @@ from ...dynamics.march.models import jenkins_model, points_model
 from ...slip.shear_modes import jenkins_set
 from ..fields import element_fields, point_fields
 from ..patch.press import shear_of
-from .follow import Watch, follow
+from .follow import follow
 from .ledger import Slid
+from .watch import Watch
 
 
 def with_shear(model, patch, time, slide, frames: int, watch: Watch) -> Slid:

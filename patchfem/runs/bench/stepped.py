@@ -6,9 +6,9 @@ The twin of the compiled engines: it takes every law and every bench with a rigi
 import numpy as np
 
 from ...core import Missing
-from .follow import BLOCK, Watch
-from .law import law_for
+from .law import ends_of_rest, law_for, pressed
 from .ledger import Slid, elastic_slip, frame_numbers, ledger_of, local_slip, split
+from .watch import BLOCK, Watch
 
 MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
 
@@ -16,7 +16,7 @@ MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a b
 def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     """Slide every point along the samples time [s], slide [m] (k,); the pressure rides on the upper piece or stays on
     the lower one, or the load changes in time. Missing where the sum over bonds would take too long."""
-    law, (weight, pressure) = law_for(model, patch), _pressed(model, patch, time, slide)
+    law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
     refuse_costly(model, law, time.size, weight.size, slide)
     move = _under_load if model.load_varies else _along
     s0 = pressure(0)
@@ -41,17 +41,6 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
                 np.array(tau), local_slip(model, slide[at], np.array(tau), np.array(under)))
 
 
-def ends_of_rest(model, slide) -> dict:
-    """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
-    the first sample of a slide and the last of every rest."""
-    f = model.friction
-    if f.law != "coulomb" or not f.kinetic < f.static:
-        return {}
-    moves = np.sign(np.diff(slide))
-    ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))
-    return {int(k): float(moves[k]) for k in ends}
-
-
 def refuse_costly(model, law, samples: int, points: int, slide) -> None:
     """Missing where the NumPy sum over bonds would form more products than MOST_WORK."""
     if not hasattr(law, "weights"):
@@ -64,18 +53,15 @@ def refuse_costly(model, law, samples: int, points: int, slide) -> None:
                       f"more than {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles", "")
 
 
-def _pressed(model, patch, time, slide) -> tuple:
+def _pressures(model, patch, time, slide) -> tuple:
     """(weights (m,) [m2], function from the number of a sample to the pressure (m,) [Pa] there)."""
     if model.load_varies:
         loads = model.point.at(time)
         return np.ones(1), lambda k: loads[k:k + 1]
-    if patch is None:
-        load = np.array([model.point.load])
-        return np.ones(1), lambda k: load
-    x, weight, sigma = patch.x, patch.pieces.interface.weight, patch.pressure.sigma_n
-    if model.side == "lower":
-        return weight, lambda k: np.interp(x + slide[k], x, sigma, left=0.0, right=0.0)
-    return weight, lambda k: sigma
+    sigma, weight = pressed(model, patch)
+    if patch is None or model.side != "lower":
+        return weight, lambda k: sigma
+    return weight, lambda k: np.interp(patch.x + slide[k], patch.x, sigma, left=0.0, right=0.0)
 
 
 def _along(law, state, dq: float, s0, s1, dt: float) -> tuple:

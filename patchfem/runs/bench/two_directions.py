@@ -3,9 +3,9 @@
 import numpy as np
 
 from ...core import PatchfemError
-from .follow import BLOCK, Watch
 from .ledger import Slid, frame_numbers, ledger_of, split
 from .stepped import refuse_costly
+from .watch import BLOCK, Watch
 
 
 def refuse(model) -> None:
