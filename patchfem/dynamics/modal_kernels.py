@@ -113,6 +113,29 @@ def safe_point(low, high, guess):
     return 0.5 * (low + high)
 
 
+@njit(error_model="numpy", **LEAN)
+def narrowed(low, high, here, miss, gain, count):
+    """(low, high, next place) of a search for the root of a function that grows, by Newton's steps in a bracket.
+
+    miss: its value at `here`, gain: its slope or what stands for one; low, high: infinite where nothing is known yet;
+    count: of the evaluations so far. The bracket closes on `here`; a step that leaves it is replaced by its middle, and
+    from 40 evaluations on every other one is, as kinks can throw Newton's steps to and fro. Without a bracket the steps
+    grow from 8 evaluations on until one is found.
+    """
+    if miss > 0:
+        high = here
+    else:
+        low = here
+    new = here - miss / gain
+    if low > -np.inf and high < np.inf:
+        new = safe_point(low, high, new)
+        if count > 40 and count % 2:
+            new = 0.5 * (low + high)
+    elif count > 8:
+        new = here - miss * 2.0 ** min(count - 8, 60)
+    return low, high, new
+
+
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def sample(row, state, slide, output):
     """(slide, its speed, output) of the modes, written with them into the first 2 n + 2 entries of a row."""
