@@ -3,9 +3,11 @@ nothing. The examples of the property tests are the same in every run, so that a
 PATCHFEM_SEARCH=1 draws new ones."""
 
 import os
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, here and in child processes
 
+import pytest
 from hypothesis import settings
 
 from patchfem.compiled import cache_folder
@@ -14,3 +16,13 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited 
 
 settings.register_profile("patchfem", deadline=None, derandomize="PATCHFEM_SEARCH" not in os.environ)
 settings.load_profile("patchfem")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """One worker a core for folders; none for files, single tests, -k and --lf, which are done before workers start."""
+    chosen = config.option.keyword or config.option.lf or config.option.collectonly
+    if chosen or not all(Path(word).is_dir() for word in config.args):
+        config.option.dist = "no"
+        return 0
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()

@@ -1,13 +1,12 @@
 """What a scene does not name is not imported, and the command line answers at once."""
 
-import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 from time import perf_counter
 
 import pytest
+from command_line import FROM_PYTHON, MODULES, absent, loaded
 from scene_texts import STRUCTURE
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
@@ -38,16 +37,6 @@ kind = "triangle"
 amplitude = "10 um"
 speed = "5 mm/s"
 """
-MODULES = "import json, sys; print(json.dumps(sorted(sys.modules)))"
-FROM_PYTHON = f"""\
-import sys
-from patchfem.scene.scene import load
-from patchfem.runs.plan import plan
-from patchfem.runs.run import run
-result = run(plan(load(sys.argv[1])))
-assert result.measures
-{MODULES}
-"""
 FROM_SHELL = f"""\
 import sys
 from patchfem.__main__ import main
@@ -57,22 +46,6 @@ except SystemExit as end:
     assert not end.code, end.code
 {MODULES}
 """
-ALWAYS = {"pyvista", "meshio", "numba"}
-
-
-def loaded(code: str, *words) -> set:
-    """Names in sys.modules after `code` ran in a fresh interpreter."""
-    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True,
-                          env=os.environ | {"MPLBACKEND": "svg"}, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return set(json.loads(done.stdout.splitlines()[-1]))
-
-
-def absent(modules: set, *stages) -> None:
-    """None of the packages of ALWAYS and none of these stages (and packages) are among the modules."""
-    for name in {*ALWAYS, *stages}:
-        here = name if name in ("skfem", *ALWAYS) else f"patchfem.{name}"
-        assert not {m for m in modules if m == here or m.startswith(here + ".")}, name
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from any_mesh_cases import FORMATS, GRID, drawn, interface_node, move, stored
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_any_mesh import FORMATS, GRID, drawn, interface_node, move, stored
 
 from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import halved

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from test_studies import study
+from study_module import study
 
 
 def check_speeds(rows):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from test_studies import study
+from study_module import study
 
 from patchfem import closed_forms as exact
 from patchfem.dynamics.march.models import growth_numbers

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from test_studies import study
+from study_module import study
 
 from patchfem.core import Missing
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_studies import study
+from study_module import study
 
 
 @pytest.fixture(scope="module")

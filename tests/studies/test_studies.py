@@ -1,20 +1,8 @@
 """The sentences of the studies, checked by running them."""
 
-import importlib.util
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[2] / "studies"
-
-
-def study(name):
-    """The module of a study by its path below studies/."""
-    path = ROOT / name
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from study_module import ROOT, study
 
 
 def test_table_1_scores_of_the_rigid_coulomb_block(capsys):

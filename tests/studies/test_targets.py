@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_studies import study
+from study_module import study
 
 from patchfem import closed_forms as exact
 

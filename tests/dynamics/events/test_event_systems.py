@@ -5,11 +5,11 @@ from math import atan, cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from event_reference import march_reference, run_reference
+from event_reference import basis_of, march_reference, random_basis, run_reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
+from patchfem.core import BaseSine, Outcome, PatchfemError, Segment, Start
 from patchfem.dynamics.events.engine import Engine
 from patchfem.dynamics.events.event_list import BORDER, RELEASE, REVERSAL, STOP
 from patchfem.dynamics.events.events import run
@@ -18,22 +18,6 @@ from patchfem.dynamics.events.signals import combine
 from patchfem.dynamics.events.stick_sets import Entry, System, settle
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
-
-
-def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
-    omega = np.atleast_1d(np.asarray(omega, float))
-    n, faces = omega.size, np.atleast_2d(np.asarray(faces, float))
-    base, output = (np.asarray(faces[0] if x is None else x, float) for x in (base, output))
-    return ModalBasis(tuple(f"m{k}" for k in range(n)), omega, np.broadcast_to(np.asarray(zeta, float), (n,)).copy(),
-                      faces[0], base, output, mass, damping, faces)
-
-
-def random_basis(rng, n, faces, coupled=True, rigid=False):
-    omega, root = rng.uniform(0.3, 3, n), rng.normal(size=(n, n)) * 0.15
-    if rigid:
-        omega[0] = 0.0
-    return basis_of(omega, 0.01, rng.normal(size=(faces, n)), rng.normal(size=n), rng.normal(size=n), 1.3,
-                    root @ root.T + 0.02 * np.eye(n) if coupled else None)
 
 
 def start_of(rng, n):

@@ -1,6 +1,6 @@
 """The error of every static measure against the same scene on meshes twice as fine, twice over.
 
-`python tests/test_error_bars.py graded 0 40` prints the coverage and the widths of forty random scenes.
+`python tests/runs/test_error_bars.py graded 0 40` prints the coverage and the widths of forty random scenes.
 """
 
 import sys

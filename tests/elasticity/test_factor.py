@@ -6,13 +6,13 @@ import importlib.util
 
 import numpy as np
 import pytest
+from any_mesh_cases import of_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import COATED, COATING
 from scipy.sparse import coo_matrix, csc_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
-from test_substructure import of_grid
 
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.elasticity import factor, fronts

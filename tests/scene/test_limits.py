@@ -159,7 +159,7 @@ def test_exact_a_hash_reads_the_same_in_a_set_and_in_the_file():
     assert loads(RIG, sets=['measured={file = "a#b.csv"}']).measured.file == "a#b.csv"
 
 
-STUDIES = sorted((Path(__file__).parent.parent / "studies").rglob("*.toml"))
+STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import GROWING, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.integrate import dblquad
-from test_run import PATCH, POINT, SHEAR
-from test_temperature import GROWING, RIG, TRIANGLE
 
 from patchfem.friction.bonds.spread import pad_factor
 from patchfem.model.law import acting, bonds_of
@@ -44,7 +43,7 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
     """12.7 mm of contact.width and the same normal.width give the same factor; kinetic keeps its ratio."""
     share = pad_factor(12.7e-3, 4e-3)
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
-    for text in (point, PATCH):
+    for text in (point, SMALL_PATCH):
         whole, less = (bench.run(loads(text + NONLOCAL + law + TRIANGLE, sets=sets), patch_of(text), 80)
                        for sets in ([], SPREAD))
         assert less.force == pytest.approx(share * whole.force, rel=1e-12, abs=1e-12 * np.abs(whole.force).max())
@@ -53,16 +52,16 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
 
 
 def patch_of(text):
-    if text != PATCH:
+    if text != SMALL_PATCH:
         return None
     from patchfem.runs.patch.ladder import solve_all
 
-    return solve_all(loads(PATCH + NONLOCAL + TRIANGLE), False)[0]
+    return solve_all(loads(SMALL_PATCH + NONLOCAL + TRIANGLE), False)[0]
 
 
 def test_exact_a_growing_law_keeps_its_ratio_of_lengths():
-    scene = loads(PATCH + GROWING + TRIANGLE, sets=SPREAD)
-    before, after = bonds_of(loads(PATCH + GROWING + TRIANGLE)), bonds_of(scene)
+    scene = loads(SMALL_PATCH + GROWING + TRIANGLE, sets=SPREAD)
+    before, after = bonds_of(loads(SMALL_PATCH + GROWING + TRIANGLE)), bonds_of(scene)
     assert after.ratio == pytest.approx(before.ratio, rel=1e-15) and after.length == before.length
     assert after.static == pytest.approx(pad_factor(12.7e-3, 4e-3) * before.static, rel=1e-15)
     assert acting(acting(scene)).friction == acting(scene).friction
@@ -70,14 +69,14 @@ def test_exact_a_growing_law_keeps_its_ratio_of_lengths():
 
 def test_exact_strips_share_the_whole_width():
     sets = ["contact.strips.count=4"]
-    one, four = (acting(loads(PATCH + NONLOCAL + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
+    one, four = (acting(loads(SMALL_PATCH + NONLOCAL + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
     assert one.static == four.static == pytest.approx(0.3 * pad_factor(12.7e-3, 4e-3), rel=1e-15)
 
 
 @pytest.mark.parametrize("more", ["", SHEAR])
 def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
     share = pad_factor(12.7e-3, 4e-3)
-    text = PATCH + more + NONLOCAL + RIG
+    text = SMALL_PATCH + more + NONLOCAL + SHORT
     one, two = (run(plan(loads(text, sets=[*sets, "accuracy.steps_per_cycle=400"])), estimate=False).measures
                 for sets in (SPREAD, [f"friction.static={0.3 * share!r}"]))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
@@ -91,7 +90,7 @@ def test_refuses_spread_without_a_width_and_for_laws_without_bonds():
         loads(POINT + NONLOCAL + TRIANGLE, sets=SPREAD)
     for law in ("coulomb", "tanh", "elastic-plastic"):
         with pytest.raises(SceneError, match=f"friction.spread: law '{law}' has no bonds to spread") as caught:
-            loads(PATCH + NONLOCAL + TRIANGLE, sets=[*SPREAD, f"friction.law={law}",
+            loads(SMALL_PATCH + NONLOCAL + TRIANGLE, sets=[*SPREAD, f"friction.law={law}",
                                                      "friction.reference_speed=1 mm/s"])
         assert len(caught.value.mistakes) == 1
 

@@ -7,10 +7,9 @@ import pytest
 from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
 from scipy.integrate import quad
 from scipy.special import gamma, gammainc
-from test_run import PATCH, POINT, SHEAR, SLIDE
-from test_temperature import RIG
 
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
@@ -26,7 +25,7 @@ from patchfem.scene.scene import SceneError, loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
 COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-FLAT = PATCH.split("[contact.tilt]")[0]
+FLAT = SMALL_PATCH.split("[contact.tilt]")[0]
 CROWN = "[contact.crown]\nradius = \"20 m\"\n"
 
 
@@ -214,7 +213,7 @@ def test_exact_one_point_under_a_changing_load_is_coulomb():
 @pytest.mark.parametrize("order", [0, 1])
 def test_exact_force_of_a_patch_bench_is_the_resultant_of_the_average(order):
     """Forward and back by the definition, with the pressure on the mover: different, as the patch is tilted."""
-    patch, found = bench_of(PATCH + AVERAGED + SLIDE, "contact.tilt.angle=0.1 mrad", f"friction.order={order}")
+    patch, found = bench_of(SMALL_PATCH + AVERAGED + SLIDE, "contact.tilt.angle=0.1 mrad", f"friction.order={order}")
     x, sigma, weight = patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight
     for way, force in ((1, found.force.max()), (-1, -found.force.min())):
         truth = sum(w * by_quadrature(y, x, sigma, way, 1e-3, order) for y, s, w in zip(x, sigma, weight) if s > 0)
@@ -228,21 +227,21 @@ def test_exact_a_long_nonlocal_bench_over_a_pressure_below_ends_at_the_average()
     """Two laws of the same scene: after ten bond lengths 2.17 and the average agree but for steps and edges."""
     slide = '[slide]\nkind = "constant"\nspeed = "1 mm/s"\ndistance = "1 mm"\n'
     sets = ["contact.tilt.on=lower", "contact.tilt.angle=0.1 mrad", "friction.bond_length=80 um"]
-    patch, one = bench_of(PATCH + AVERAGED + slide, *sets, steps=4000)
-    _, two = bench_of(PATCH + AVERAGED.replace("convolution", "nonlocal") + slide, *sets, steps=4000)
+    patch, one = bench_of(SMALL_PATCH + AVERAGED + slide, *sets, steps=4000)
+    _, two = bench_of(SMALL_PATCH + AVERAGED.replace("convolution", "nonlocal") + slide, *sets, steps=4000)
     assert one.force[-1] == pytest.approx(two.force[-1], rel=2e-4)
     limit = 0.3 * patch.pressure.load
     assert np.abs(one.tau[-1] - two.tau[-1]).max() < 5e-3 * one.tau[-1].max() and one.force[-1] < 0.99 * limit
 
 
 def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_average():
-    text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + RIG
+    text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + SHORT
     scene = loads(text)
     found = run(plan(scene), estimate=False)
     patch = found.patch
     forward, back = limits(patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight, 3e-4, 1.0)
     assert forward == pytest.approx(back, rel=1e-9) and 0.5 < forward / patch.pressure.load < 0.9
-    plain = run(plan(loads(FLAT + CROWN + COULOMB + RIG, sets=[
+    plain = run(plan(loads(FLAT + CROWN + COULOMB + SHORT, sets=[
         f"friction.static={0.3 * forward / patch.pressure.load!r}"])), estimate=False)
     for name, m in plain.measures.items():
         assert found.measures[name].value == pytest.approx(m.value, rel=1e-6, abs=1e-12), name
@@ -257,7 +256,7 @@ def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_avera
 
 def test_exact_the_mesh_of_the_limit_stands_in_the_errors_of_the_motion():
     """A mesh four times as fine moves the block otherwise, by no more than the error that is given."""
-    text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + RIG
+    text = FLAT + CROWN + AVERAGED.replace("1 mm", "300 um") + SHORT
     found = run(plan(loads(text))).measures
     fine = run(plan(loads(text, sets=["contact.element_size=0.125 mm"])), estimate=False).measures
     for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
@@ -266,20 +265,20 @@ def test_exact_the_mesh_of_the_limit_stands_in_the_errors_of_the_motion():
 
 
 def test_exact_a_block_of_one_point_on_a_rig_is_coulomb():
-    one, two = (run(plan(loads(POINT + text + RIG)), estimate=False).measures for text in (AVERAGED, COULOMB))
+    one, two = (run(plan(loads(POINT + text + SHORT)), estimate=False).measures for text in (AVERAGED, COULOMB))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
-    assert "bonds" in plan(loads(POINT + AVERAGED + RIG)).chain
+    assert "bonds" in plan(loads(POINT + AVERAGED + SHORT)).chain
 
 
 def test_exact_the_plan_names_the_law():
-    what = plan(loads(PATCH + AVERAGED + SLIDE))
+    what = plan(loads(SMALL_PATCH + AVERAGED + SLIDE))
     assert "friction.law=convolution" in what.effects and "friction.law=convolution" not in what.not_in_scene
     assert not any("reading" in name for name in what.effects)
-    assert "friction.law=convolution" in plan(loads(PATCH + COULOMB + SLIDE)).not_in_scene
+    assert "friction.law=convolution" in plan(loads(SMALL_PATCH + COULOMB + SLIDE)).not_in_scene
 
 
 def test_refuses_an_uneven_pressure_on_a_rig():
-    scene = loads(PATCH + AVERAGED + RIG, sets=["contact.tilt.angle=0.1 mrad"])
+    scene = loads(SMALL_PATCH + AVERAGED + SHORT, sets=["contact.tilt.angle=0.1 mrad"])
     with pytest.raises(PatchfemError, match=r"friction.law: 'convolution' on a pressure that is not symmetric: the "
                                             r"limit is .* N forward and .* N back; .*not yet built"):
         run(plan(scene), estimate=False)
@@ -287,18 +286,18 @@ def test_refuses_an_uneven_pressure_on_a_rig():
 
 @pytest.mark.parametrize("text, sets, says", [
     (SLIDE, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
-    (RIG, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
-    (RIG, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
+    (SHORT, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
+    (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
     (SLIDE, ["contact.strips.count=4"], "contact.strips: beside law 'convolution'"),
     (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
     (SLIDE, ["friction.kinetic=0.2"], "kinetic belongs to coulomb and nonlocal")])
 def test_refuses_what_the_averaged_law_cannot_do(text, sets, says):
     more = [one.replace(SHEAR, "contact.shear={}") for one in sets]
     with pytest.raises(SceneError, match=says):
-        loads(PATCH + AVERAGED + text, sets=more)
+        loads(SMALL_PATCH + AVERAGED + text, sets=more)
 
 
 def test_exact_any_order_above_minus_one_is_let_through():
-    assert loads(PATCH + AVERAGED + SLIDE, sets=["friction.order=-0.5"]).friction.order == -0.5
-    assert loads(PATCH + AVERAGED + SLIDE, sets=["friction.initial_bonds=0"]).remarks == [
+    assert loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.order=-0.5"]).friction.order == -0.5
+    assert loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.initial_bonds=0"]).remarks == [
         "friction.initial_bonds has no meaning for law 'convolution' and is not used"]

@@ -23,7 +23,7 @@ from pieces import (
     refined_middle,
     rough,
 )
-from test_partial_slip import elements, histories
+from slip_paths import elements, histories
 from two_bodies import unlike_pair
 
 from patchfem.closed_forms.contact import cattaneo_shear, cattaneo_stick_half_width

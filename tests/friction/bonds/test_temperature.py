@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from command_line import FROM_PYTHON, absent, loaded
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_texts import STRUCTURE
+from scene_texts import BENCH, GROWING, POINT, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.special import erfc
-from test_imports import BENCH, FROM_PYTHON, absent, loaded
-from test_run import PATCH, POINT
 
 from patchfem import closed_forms
 from patchfem.core import PatchfemError
@@ -20,14 +19,6 @@ from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
 
-GROWING = """[friction]
-law = "nonlocal"
-static = 0.6
-kinetic = 0.42
-bond_length = "2 um"
-rest_growth = "10 m/s^2"
-slip_growth = "0.2 um"
-"""
 WARM = """[friction.temperature]
 surface = "393.15 K"
 reference = "293.15 K"
@@ -35,8 +26,6 @@ rest_activation = "2500 K"
 slip_activation = "1500 K"
 """
 SLIDE = '[slide]\nkind = "constant"\nspeed = "5 mm/s"\ndistance = "60 um"\n'
-TRIANGLE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\ncycles = 2\n'
-RIG = STRUCTURE.replace("cycles = 30", "cycles = 20")
 SUBSTRATE = 'substrate = "Ti-8Al-1Mo-1V"'
 
 
@@ -133,13 +122,13 @@ def test_exact_steady_friction_of_a_warm_bench():
 
 def test_exact_a_warm_rig_is_a_rig_with_the_rates_of_the_warm_surface():
     rest, slip = growth_at(10.0, 2e-7, 393.15, 293.15, 2500.0, 1500.0)
-    warm = loads(POINT + GROWING + WARM + RIG, sets=["friction.rest_speed=10 um/s"])
-    same = loads(POINT + GROWING + RIG, sets=["friction.rest_speed=10 um/s", f"friction.rest_growth={rest!r} m/s^2",
+    warm = loads(POINT + GROWING + WARM + SHORT, sets=["friction.rest_speed=10 um/s"])
+    same = loads(POINT + GROWING + SHORT, sets=["friction.rest_speed=10 um/s", f"friction.rest_growth={rest!r} m/s^2",
                                               f"friction.slip_growth={slip!r} m"])
     assert law_of(warm, 1.0) == law_of(same, 1.0)
     one, two = (run(plan(scene), estimate=False).measures for scene in (warm, same))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
-    assert one != run(plan(loads(POINT + GROWING + RIG)), estimate=False).measures
+    assert one != run(plan(loads(POINT + GROWING + SHORT)), estimate=False).measures
 
 
 def test_exact_the_plan_names_the_temperature():
@@ -191,14 +180,14 @@ def test_exact_rise_of_a_half_space_under_constant_heat(time, printed, within):
 
 
 def test_exact_the_rise_is_reported_beside_the_table_only():
-    text = PATCH + GROWING + WARM + TRIANGLE
+    text = SMALL_PATCH + GROWING + WARM + TRIANGLE
     lines = [w for w in run(plan(loads(text)), estimate=False).warnings if "warms the face" in w]
     assert len(lines) == 1 and "in a cycle" in lines[0] and "stays as given" in lines[0]
-    found = run(plan(loads(PATCH + GROWING + TRIANGLE)), estimate=False)
+    found = run(plan(loads(SMALL_PATCH + GROWING + TRIANGLE)), estimate=False)
     assert not any("warm" in w for w in found.warnings)
     power = np.trapezoid(found.response.force, found.response.slide) / found.response.time[-1]
     assert f"friction of {power:.1g}"[:14] in lines[0]
-    rig = run(plan(loads(PATCH + GROWING + WARM + RIG, sets=["accuracy.steps_per_cycle=100"])), estimate=False)
+    rig = run(plan(loads(SMALL_PATCH + GROWING + WARM + SHORT, sets=["accuracy.steps_per_cycle=100"])), estimate=False)
     power = rig.extra["book"]["friction"] / rig.response.time[-1]
     assert any(f"friction of {power:.2g} W" in w and "in a cycle" in w for w in rig.warnings) and power > 0
     none = run(plan(loads(POINT + GROWING + WARM + TRIANGLE)), estimate=False).warnings

@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from any_mesh_cases import cloud, of_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, bare
 from scipy.sparse.linalg import spsolve
-from scipy.spatial import Delaunay
 
 from patchfem.closed_forms.contact import layered_compliance
 from patchfem.contact.gaps import crown
@@ -20,58 +20,11 @@ from patchfem.core import Compliance, Interface
 from patchfem.elasticity import elasticity
 from patchfem.elasticity.elasticity import Layers, lame
 from patchfem.elasticity.substructure import assemble, cell_stress, condense, displacement, joined
-from patchfem.mesh.anymesh import PieceMesh, halved
+from patchfem.mesh.anymesh import halved
 from patchfem.mesh.tensor import graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))
 planes = st.sampled_from(["strain", "stress"])
-NO_TRIANGLES, NO_QUADS = np.empty((0, 3), np.int64), np.empty((0, 4), np.int64)
-
-
-def of_grid(grid, split=0.0, seed=None):
-    """The tensor grid as an unstructured piece, a share of its quads cut in two; nodes renumbered by `seed`."""
-    nx, ny = grid.x.size, grid.depth.size
-    points = np.stack([np.repeat(grid.x, ny), np.tile(grid.depth, nx)], axis=1)
-    node = np.arange(nx * ny)
-    if seed is not None:
-        node = np.random.default_rng(seed).permutation(nx * ny)
-    place = np.empty_like(points)
-    place[node] = points
-    node = node.reshape(nx, ny)
-    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
-    coat = grid.cell_is_coating().ravel()
-    cut = np.random.default_rng(1).random(len(quads)) < split
-    triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return PieceMesh(place, triangles, quads[~cut], np.concatenate([np.repeat(coat[cut], 2), coat[~cut]]),
-                     node[:, 0], node[:, -1])
-
-
-def cloud(half_length, height, size, coating=0.0):
-    """Triangles of Delaunay on rows of points whose spacing is size(x, depth); rows on the coating's lower face."""
-    levels, depth = [0.0], 0.0
-    while depth < height:
-        step = size(0.0, depth)
-        below = coating if depth < coating * (1 - 1e-9) else height
-        rest = max(1, round((below - depth) / step))
-        depth = below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
-        levels.append(depth)
-    rows, fine = [], np.linspace(-half_length, half_length, 20001)
-    for k, y in enumerate(levels):
-        number = np.concatenate([[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))])
-        count = max(4, round(number[-1] / 2) * 2)
-        want = np.linspace(0, number[-1], count + 1)
-        if k % 2:
-            want = np.concatenate([[0.0], (want[1:] + want[:-1]) / 2, want[-1:]])
-        x = np.interp(want, number, fine)
-        rows.append(np.stack([(x - x[::-1]) / 2, np.full(x.size, y)], axis=1))
-    points = np.concatenate(rows)
-    cells = Delaunay(points).simplices
-    a, b, c = points[cells].transpose(1, 0, 2)
-    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)[np.abs(area) > 1e-9 * np.abs(area).max() * 1e-6]
-    middle = points[cells][:, :, 1].mean(axis=1)
-    order = np.argsort(rows[0][:, 0])
-    return PieceMesh(points, cells, NO_QUADS, middle < coating, order, np.flatnonzero(points[:, 1] == height))
 
 
 @pytest.mark.parametrize("cells, plane", [(3, "strain"), (40, "strain"), (40, "stress"), (200, "strain")])

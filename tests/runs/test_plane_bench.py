@@ -4,7 +4,8 @@ against the law stepped point by point."""
 import numpy as np
 import pytest
 import xarray as xr
-from test_run import PATCH, POINT, cli
+from command_line import cli
+from scene_texts import POINT, SMALL_PATCH
 
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
@@ -94,7 +95,7 @@ def test_exact_the_resting_turn_of_a_right_angle(table):
 @pytest.mark.parametrize("strips", ["", STRIPS])
 def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     """Resultants and yaw moment from the law at every node of every strip, with that strip's own pressure."""
-    scene = table(L_SHAPE, PATCH + strips + NONLOCAL)
+    scene = table(L_SHAPE, SMALL_PATCH + strips + NONLOCAL)
     patch = solve_all(scene, False)[0]
     found = law_bench.run(scene, patch, 60, 6)
     count = 4 if strips else 1
@@ -123,7 +124,7 @@ def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
 
 
 def test_exact_histories_of_both_directions_are_written(table, tmp_path):
-    scene = table(L_SHAPE, PATCH + STRIPS + NONLOCAL)
+    scene = table(L_SHAPE, SMALL_PATCH + STRIPS + NONLOCAL)
     answer = cli("run", scene.path, "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     result = run(plan(scene), estimate=False)
@@ -134,7 +135,7 @@ def test_exact_histories_of_both_directions_are_written(table, tmp_path):
         assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
     wide = L_SHAPE.replace("24", "2400")
     assert any("0.189 of the width" in w or "0.19 of the width" in w for w in
-               run(plan(table(wide, PATCH + NONLOCAL)), estimate=False).warnings)
+               run(plan(table(wide, SMALL_PATCH + NONLOCAL)), estimate=False).warnings)
 
 
 def test_exact_the_table_is_read_in_any_order_of_columns(tmp_path):
@@ -164,7 +165,8 @@ def test_refuses_a_broken_lateral_column(table, text, says):
     (POINT, ["normal.width=1 mm", "friction.spread=1 um"], "friction.spread"),
     (POINT, ["friction.breakaway=0.2"], "friction.breakaway"),
     (POINT, ["normal.amplitude=1 N", "normal.frequency=50 Hz"], "normal.amplitude"),
-    (PATCH, ["contact.shear={}"], "[contact.shear]"), (PATCH, ["contact.tilt.on=lower"], "pressure on the lower piece"),
+    (SMALL_PATCH, ["contact.shear={}"], "[contact.shear]"),
+    (SMALL_PATCH, ["contact.tilt.on=lower"], "pressure on the lower piece"),
 ])
 def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):
     found = table(L_SHAPE, scene + NONLOCAL, *sets)
@@ -181,7 +183,7 @@ def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):
                                  '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"\n'])
 def test_exact_strips_carry_the_resultant_of_one_point(law):
     """Pressure on the upper piece, rolled strips: the force is that of the load on one point."""
-    one, two = bench_of(POINT + law), bench_of(PATCH + STRIPS + law)
+    one, two = bench_of(POINT + law), bench_of(SMALL_PATCH + STRIPS + law)
     assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
     assert two.slip == pytest.approx(one.slip, rel=1e-9, abs=1e-15)
 
@@ -191,7 +193,7 @@ def test_exact_level_strips_are_the_patch(side):
     """Four level strips of a crown press as one: the bench is that of the patch without them, on either piece, and its
     resultant that of one point, but for the edges of a contact that moves over the lower piece."""
     level = STRIPS.replace('roll = "0.02 mrad"\n', "")
-    crown = PATCH.split("[contact.tilt]")[0] + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
+    crown = SMALL_PATCH.split("[contact.tilt]")[0] + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
     one, two = (bench_of(crown + more + NONLOCAL) for more in ("", level))
     assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
     assert two.tau == pytest.approx(one.tau, rel=1e-6, abs=1e-6 * one.tau.max())

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import root
-from test_wrench import LAWS, LOAD, MASS, balance, crowned, modes
+from varying_load_cases import LAWS, LOAD, MASS, balance, crowned, modes
 
 from patchfem.core import BaseSine, PatchfemError, Start
 from patchfem.dynamics.march import march as plain

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import LOAD, TILTS, coated_pair, rough
 from scipy.optimize import lsq_linear
+from slip_paths import elements, histories
 
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
@@ -63,25 +64,6 @@ def point_by_point(c, limit, path):
         settled = settled + moved
         out.append(force.sum())
     return np.array(out)
-
-
-def elements(group, path):
-    """The same of parallel elements, each a spring in series with a slider."""
-    settled, out = np.zeros(group.stiffness.size), []
-    for q in path:
-        stretch = np.clip(q - settled, -group.yield_slide, group.yield_slide)
-        settled = q - stretch
-        out.append(group.stiffness @ stretch)
-    return np.array(out)
-
-
-def histories(count, reach, seed=7):
-    """Random paths of 40 reversals, from micro-slip to gross sliding."""
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        size = reach * 10 ** rng.uniform(-1, 0.3)
-        swing = rng.uniform(0.0, 1.0, 40) * (-1.0) ** np.arange(40)
-        yield size * (swing + 0.2 * rng.normal())
 
 
 @pytest.mark.parametrize("cells", [100, 200])

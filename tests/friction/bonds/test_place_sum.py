@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from friction_paths import random_walk, triangle, upper_pressure, walk
 from list_paths import follow_list
-from test_friction_hub import OMEGA, one_mode
+from march_paths import OMEGA, one_mode
 
 from patchfem.core import BaseSine
 from patchfem.dynamics.march.march import march

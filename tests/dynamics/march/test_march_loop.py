@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from friction_paths import random_walk, upper_pressure, walk
+from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
 from patchfem.compiled import load_kernels
@@ -15,23 +16,7 @@ from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion, advance
 from patchfem.slip.shear_modes import jenkins_set, shear_modes
 
-OMEGA = 2 * np.pi * 143
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
-
-
-def one_mode(omega, zeta, mass):
-    one = np.ones(1)
-    return ModalBasis(("axial",), omega * one, zeta * one, one, one, one, mass)
-
-
-def follow(model, path, dt=0.3):
-    """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of hub.follow_path."""
-    hub = load_kernels()
-    contact, work = model.build(hub)
-    burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    bad = hub.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, work, GOAL * model.limit, burnt,
-                          forces)
-    return forces, burnt, bad, contact
 
 
 def half_plane(count, scale=1.0):

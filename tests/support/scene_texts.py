@@ -41,17 +41,11 @@ frequency = "143 Hz"
 acceleration = "5 g"
 cycles = 200
 """
-BENCH = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "coulomb"
-static = 0.3
-[slide]
-kind = "triangle"
-amplitude = "10 um"
-speed = "5 mm/s"
-"""
+POINT = '[normal]\nload = "26 lbf"\n'
+COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
+TRIANGLE = SLIDE + "cycles = 2\n"
+BENCH = POINT + COULOMB + SLIDE
 STRUCTURE = """\
 [structure]
 moving_mass = "0.884 kg"
@@ -66,6 +60,32 @@ frequency = "143 Hz"
 acceleration = "5 g"
 cycles = 30
 """
+SHORT = STRUCTURE.replace("cycles = 30", "cycles = 20")
+GROWING = """\
+[friction]
+law = "nonlocal"
+static = 0.6
+kinetic = 0.42
+bond_length = "2 um"
+rest_growth = "10 m/s^2"
+slip_growth = "0.2 um"
+"""
+SMALL_PATCH = """\
+title = "a small patch"
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+element_size = "0.5 mm"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.coating]
+material = "WC-Co"
+thickness = "6 mil"
+[contact.tilt]
+angle = "0.02 mrad"
+"""
+SHEAR = "[contact.shear]\n"
 LINEAR = RIG[RIG.index("[structure]") :]
 PATCH = RIG[RIG.index("[contact]") : RIG.index("[friction]")]
 

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from any_mesh_cases import cloud, of_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
-from test_substructure import cloud, of_grid
 
 from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from scene_texts import STRUCTURE
+from scene_texts import BENCH, COULOMB, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -26,33 +26,14 @@ from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import load, loads
 
-STUDIES = Path(__file__).parents[1] / "studies"
+STUDIES = Path(__file__).parents[2] / "studies"
 LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143
-PATCH = """\
-title = "a small patch"
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-element_size = "0.5 mm"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-[contact.tilt]
-angle = "0.02 mrad"
-"""
-SHEAR = "[contact.shear]\n"
-POINT = '[normal]\nload = "26 lbf"\n'
-COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
-SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
 STEPS = "[accuracy]\nsteps_per_cycle = 200\n"
 SCENES = {
-    "patch": PATCH, "bench": POINT + COULOMB + SLIDE, "bench patch": PATCH + SHEAR + COULOMB + SLIDE + STEPS,
+    "patch": SMALL_PATCH, "bench": BENCH, "bench patch": SMALL_PATCH + SHEAR + COULOMB + SLIDE + STEPS,
     "linear": STRUCTURE, "rig": POINT + COULOMB + STRUCTURE, "rig march": POINT + NONLOCAL + STRUCTURE + STEPS,
-    "rig patch": PATCH + SHEAR + NONLOCAL + STRUCTURE + STEPS,
+    "rig patch": SMALL_PATCH + SHEAR + NONLOCAL + STRUCTURE + STEPS,
 }  # fmt: skip
 WITH_FIELDS = ["patch", "bench patch", "rig patch"]
 
@@ -317,7 +298,7 @@ def test_exact_every_row_of_cells_carries_the_load(done, name):
 
 def test_exact_pressure_on_the_upper_piece_is_one_point():
     """Rigid slide, constant load: the path of every interface point gives the resultant of the lumped contact."""
-    text = PATCH + NONLOCAL + STRUCTURE + STEPS
+    text = SMALL_PATCH + NONLOCAL + STRUCTURE + STEPS
     each = run(plan(loads(text), True), per_point=True, estimate=False)
     point = run(plan(loads(POINT + NONLOCAL + STRUCTURE + STEPS)), estimate=False)
     for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
@@ -355,7 +336,7 @@ def test_exact_march_of_a_rigid_law_meets_the_event_engine():
 
 def test_exact_mesh_round_trip(written, tmp_path):
     """The patch on the mesh that was written is the patch on the mesh that was made."""
-    scene = written(PATCH)
+    scene = written(SMALL_PATCH)
     answer = cli("mesh", scene, "-o", tmp_path / "pair.msh")
     assert answer.code == 0 and "pair.msh" in answer.out
     made = run(plan(load(scene)), estimate=False).measures
@@ -367,7 +348,7 @@ def test_exact_mesh_round_trip(written, tmp_path):
 
 
 def test_exact_mesh_for_vtk(written, tmp_path):
-    assert cli("mesh", written(PATCH), "-o", tmp_path / "pair.vtu").code == 0
+    assert cli("mesh", written(SMALL_PATCH), "-o", tmp_path / "pair.vtu").code == 0
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(str(tmp_path / "pair.vtu"))
     reader.Update()
@@ -399,14 +380,14 @@ def test_exact_stuck_and_apart(written, tmp_path):
                 tmp_path / "a")
     assert json.loads(stuck.out)["outcome"] == "stuck"
     assert json.loads(stuck.out)["measures"]["relative_displacement_amplitude"]["value"] == 0.0
-    apart = cli("run", written(PATCH), "--set", "contact.load=0 N", "--json", "-o", tmp_path / "b")
+    apart = cli("run", written(SMALL_PATCH), "--set", "contact.load=0 N", "--json", "-o", tmp_path / "b")
     assert apart.code == 0 and json.loads(apart.out)["outcome"] == "no_contact"
 
 
 # exit codes
 
 def test_refuses_mistakes_with_one_line_each(written, tmp_path):
-    scene = written(PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
+    scene = written(SMALL_PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
     answer = cli("run", scene, "-o", tmp_path / "out")
     assert answer.code == 2 and answer.out == ""
     lines = answer.err.splitlines()
@@ -432,7 +413,7 @@ def test_refuses_verbs_not_yet_built(verb):
 ], ids=lambda sets: sets[0].split("=")[0])  # fmt: skip
 def test_refuses_keys_not_yet_built(written, tmp_path, sets):
     words = [word for one in sets for word in ("--set", one)]
-    answer = cli("run", written(PATCH + NONLOCAL + STRUCTURE), "-o", tmp_path / "out", *words)
+    answer = cli("run", written(SMALL_PATCH + NONLOCAL + STRUCTURE), "-o", tmp_path / "out", *words)
     assert answer.code == 2 and "not yet built" in answer.err
     assert not (tmp_path / "out").exists()
 

@@ -4,7 +4,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from test_event_systems import basis_of, random_basis
+from event_reference import basis_of, random_basis
 
 from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.core import BaseSine, PatchfemError, Start

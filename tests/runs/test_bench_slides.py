@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from command_line import cli
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import POINT, SHEAR, SMALL_PATCH
 from scipy.integrate import quad, solve_ivp
-from test_run import PATCH, POINT, SHEAR, cli
 
 from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.core import Missing, PatchfemError
@@ -162,7 +163,7 @@ def test_exact_points_behind_the_shear_see_the_true_hold():
     """Bonds a hundred times as long are soft against the pieces, so the resultant is that of one point."""
     soft = ["friction.bond_length=200 um", "friction.slip_growth=100 um", "slide.distance=4 mm",
             "slide.distance_after=2 mm", "accuracy.steps_per_cycle=1200"]
-    text = PATCH + SHEAR + NONLOCAL + DWELL
+    text = SMALL_PATCH + SHEAR + NONLOCAL + DWELL
     result = run(plan(loads(text, sets=soft)), estimate=False)
     found = result.response
     rest = np.flatnonzero(np.diff(found.slide) == 0)

@@ -5,7 +5,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from friction_paths import random_walk, triangle, upper_pressure, walk
-from test_friction_hub import OMEGA, follow, one_mode
+from march_paths import OMEGA, follow, one_mode
 
 from patchfem.core import BaseSine
 from patchfem.dynamics.march.march import march

@@ -1,0 +1,188 @@
+"""Pieces and pairs of any mesh, and the files they are stored in."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import meshio
+import numpy as np
+from scipy.spatial import Delaunay
+
+from patchfem.mesh.anymesh import PieceMesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_pieces
+from patchfem.mesh.tensor import graded_grid
+
+NO_QUADS = np.empty((0, 4), np.int64)
+
+
+def of_grid(grid, split=0.0, seed=None):
+    """The tensor grid as an unstructured piece, a share of its quads cut in two; nodes renumbered by `seed`."""
+    nx, ny = grid.x.size, grid.depth.size
+    points = np.stack([np.repeat(grid.x, ny), np.tile(grid.depth, nx)], axis=1)
+    node = np.arange(nx * ny)
+    if seed is not None:
+        node = np.random.default_rng(seed).permutation(nx * ny)
+    place = np.empty_like(points)
+    place[node] = points
+    node = node.reshape(nx, ny)
+    quads = np.stack([part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])], axis=1)
+    coat = grid.cell_is_coating().ravel()
+    cut = np.random.default_rng(1).random(len(quads)) < split
+    triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return PieceMesh(place, triangles, quads[~cut], np.concatenate([np.repeat(coat[cut], 2), coat[~cut]]),
+                     node[:, 0], node[:, -1])
+
+
+def cloud(half_length, height, size, coating=0.0):
+    """Triangles of Delaunay on rows of points whose spacing is size(x, depth); rows on the coating's lower face."""
+    levels, depth = [0.0], 0.0
+    while depth < height:
+        step = size(0.0, depth)
+        below = coating if depth < coating * (1 - 1e-9) else height
+        rest = max(1, round((below - depth) / step))
+        depth = below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
+        levels.append(depth)
+    rows, fine = [], np.linspace(-half_length, half_length, 20001)
+    for k, y in enumerate(levels):
+        number = np.concatenate([[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))])
+        count = max(4, round(number[-1] / 2) * 2)
+        want = np.linspace(0, number[-1], count + 1)
+        if k % 2:
+            want = np.concatenate([[0.0], (want[1:] + want[:-1]) / 2, want[-1:]])
+        x = np.interp(want, number, fine)
+        rows.append(np.stack([(x - x[::-1]) / 2, np.full(x.size, y)], axis=1))
+    points = np.concatenate(rows)
+    cells = Delaunay(points).simplices
+    a, b, c = points[cells].transpose(1, 0, 2)
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)[np.abs(area) > 1e-9 * np.abs(area).max() * 1e-6]
+    middle = points[cells][:, :, 1].mean(axis=1)
+    order = np.argsort(rows[0][:, 0])
+    return PieceMesh(points, cells, NO_QUADS, middle < coating, order, np.flatnonzero(points[:, 1] == height))
+
+GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
+NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
+
+
+def drawn(kind="mixed", grid=GRID):
+    """Points, triangles, quads, edges and their tags of a pair; 'mixed' splits every other quad."""
+    pair = pair_mesh(grid)
+    split = {"quads": np.zeros, "triangles": np.ones}.get(kind, lambda n, t: np.arange(n) % 2 == 0)
+    split = split(len(pair["quads"]), bool)
+    cut = pair["quads"][split]
+    return SimpleNamespace(
+        points=pair["points"].copy(), triangles=np.concatenate([cut[:, [0, 1, 2]], cut[:, [0, 2, 3]]]),
+        quads=pair["quads"][~split], triangle_tags=np.tile(pair["tags"][split], 2), quad_tags=pair["tags"][~split],
+        edges=pair["edges"], edge_tags=pair["edge_tags"])
+
+
+def blocks(m):
+    """(kind, cells, tags) of what a mesh has."""
+    every = [("triangle", m.triangles, m.triangle_tags), ("quad", m.quads, m.quad_tags), ("line", m.edges, m.edge_tags)]
+    return [block for block in every if len(block[1])]
+
+
+def write_msh22(m, path, binary=True):
+    """Gmsh 2.2 through meshio."""
+    mesh = meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)])
+    tags = [np.asarray(t, np.int32) for _, _, t in blocks(m)]
+    mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
+    mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
+    meshio.write(path, mesh, file_format="gmsh22", binary=binary)
+
+
+def write_msh41(m, path):
+    """Gmsh 4.1 in text, one entity per tag, as Gmsh itself writes it."""
+    parts = [(k, c[t == tag], int(tag)) for k, c, t in blocks(m) for tag in np.unique(t)]
+    dims = {"line": 1, "triangle": 2, "quad": 2}
+    curves, areas = (list(dict.fromkeys(p[2] for p in parts if dims[p[0]] == d)) for d in (1, 2))
+    text = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(NAMES))]
+    text += [f'{1 if tag > 10 else 2} {tag} "{name}"' for tag, name in NAMES.items()]
+    text += ["$EndPhysicalNames", "$Entities", f"0 {len(curves)} {len(areas)} 0"]
+    text += [f"{tag} 0 0 0 1 1 0 1 {tag} 0" for tag in curves + areas]
+    count, number, total = len(m.points), 0, sum(len(c) for _, c, _ in parts)
+    text += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 {areas[0]} 0 {count}"]
+    text += [str(k + 1) for k in range(count)] + [f"{x!r} {y!r} 0" for x, y in m.points.tolist()]
+    text += ["$EndNodes", "$Elements", f"{len(parts)} {total} 1 {total}"]
+    for kind, cells, tag in parts:
+        text.append(f"{dims[kind]} {tag} {dict(line=1, triangle=2, quad=3)[kind]} {len(cells)}")
+        for cell in cells + 1:
+            number += 1
+            text.append(" ".join(map(str, [number, *cell])))
+    path.write_text("\n".join([*text, "$EndElements", ""]))
+
+
+def write_vtu(m, path):
+    """VTK with the cell array `tag`."""
+    mesh = meshio.Mesh(np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)])
+    mesh.cell_data = {"tag": [np.asarray(t) for _, _, t in blocks(m)]}
+    meshio.write(path, mesh, file_format="vtu")
+
+
+def write_inp(m, path, lines=True, capitals=True):
+    """A deck; the edges as sets of line elements or as sets of nodes."""
+    text = ["*HEADING", "two pieces", "** a comment", "*NODE, NSET=ALL"]
+    text += [f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())]  # numbers with gaps
+    number = 0
+    for kind, cells, tags in blocks(m):
+        for tag in np.unique(tags):
+            name = NAMES[int(tag)].upper() if capitals else NAMES[int(tag)]
+            if kind == "line" and not lines:
+                nodes = [str(3 * n + 5) for n in np.unique(cells[tags == tag])]
+                text += [f"*NSET, NSET={name}", *(", ".join(nodes[k:k + 8]) + "," for k in range(0, len(nodes), 8))]
+                continue
+            first = number + 1
+            text.append(f"*Element, type={dict(line='T2D2', triangle='CPE3', quad='CPE4R')[kind]}")
+            for cell in cells[tags == tag]:
+                number += 1
+                text.append(", ".join(map(str, [number, *(3 * cell + 5)])))
+            text += [f"*ELSET, ELSET={name}, GENERATE", f"{first}, {number}, 1"]
+    path.write_text("\n".join([*text, "*STEP", "*STATIC", "*END STEP", ""]))
+
+
+def write_unv(m, path, unit=1.0):
+    """A universal file in metres, or in 1/unit of a metre where dataset 164 says so."""
+    text = ["    -1", "   164", f"         1  SI  {2:10d}", f"  {unit:.16E}  1.0  1.0".replace("E", "D"), "  2.73D+2"]
+    text += ["    -1", "    -1", "  2411"]
+    for k, (x, y) in enumerate(m.points.tolist()):
+        text += [f"{k + 1:10d}{1:10d}{1:10d}{11:10d}", f"  {x * unit:.16E}  {y * unit:.16E}  0.0".replace("E", "D")]
+    text += ["    -1", "    -1", "  2412"]
+    number, groups = 0, {}
+    for kind, cells, tags in blocks(m):
+        code = dict(line=11, triangle=41, quad=44)[kind]
+        for cell, tag in zip(cells, tags):
+            number += 1
+            groups.setdefault(NAMES[int(tag)], []).append(number)
+            text.append("".join(f"{v:10d}" for v in (number, code, 2, 1, 7, len(cell))))
+            text += ["         0         1         1"] * (kind == "line")
+            text.append("".join(f"{n + 1:10d}" for n in cell))
+    text += ["    -1"] * 2 + ["  2467"]
+    for k, (name, members) in enumerate(groups.items()):
+        text += ["".join(f"{v:10d}" for v in (k + 1, 0, 0, 0, 0, 0, 0, len(members))), name]
+        text += ["".join(f"{8:10d}{n:10d}{0:10d}{0:10d}" for n in members[j:j + 2]) for j in range(0, len(members), 2)]
+    path.write_text("\n".join([*text, "    -1", ""]))
+
+
+FORMATS = {
+    "gmsh 2.2 binary": (".msh", write_msh22), "gmsh 2.2 text": (".msh", lambda m, p: write_msh22(m, p, False)),
+    "gmsh 4.1": (".msh", write_msh41), "vtu": (".vtu", write_vtu), "inp lines": (".inp", write_inp),
+    "inp nodes": (".inp", lambda m, p: write_inp(m, p, False, False)), "unv": (".unv", write_unv),
+    "unv in mm": (".unv", lambda m, p: write_unv(m, p, 1e3)),
+}
+
+
+def stored(m, folder, form="gmsh 2.2 binary"):
+    """The pair after a trip through a file."""
+    path = folder / f"pair{FORMATS[form][0]}"
+    FORMATS[form][1](m, path)
+    return read_pieces(path)
+
+
+def move(m, at, by):
+    m.points[at] += by
+
+
+def interface_node(m, side="upper", k=3):
+    nodes = np.unique(m.edges[m.edge_tags == EDGE_TAGS[f"{side}_interface"]])
+    return nodes[np.argsort(m.points[nodes, 0])][k]

@@ -1,0 +1,58 @@
+"""The command line inside the test process, and code in a fresh interpreter."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import subprocess
+import sys
+from typing import NamedTuple
+
+import pytest
+
+from patchfem.__main__ import main
+
+MODULES = "import json, sys; print(json.dumps(sorted(sys.modules)))"
+FROM_PYTHON = f"""\
+import sys
+from patchfem.scene.scene import load
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+result = run(plan(load(sys.argv[1])))
+assert result.measures
+{MODULES}
+"""
+ALWAYS = {"pyvista", "meshio", "numba"}
+
+
+class Answer(NamedTuple):
+    """Exit code, stdout and stderr."""
+
+    code: int
+    out: str
+    err: str
+
+
+def cli(*words) -> Answer:
+    """What `patchfem WORDS` answers."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return Answer(end.value.code or 0, out.getvalue(), err.getvalue())
+
+
+def loaded(code: str, *words) -> set:
+    """Names in sys.modules after `code` ran in a fresh interpreter."""
+    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True,
+                          env=os.environ | {"MPLBACKEND": "svg"}, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def absent(modules: set, *stages) -> None:
+    """None of the packages of ALWAYS and none of these stages (and packages) are among the modules."""
+    for name in {*ALWAYS, *stages}:
+        here = name if name in ("skfem", *ALWAYS) else f"patchfem.{name}"
+        assert not {m for m in modules if m == here or m.startswith(here + ".")}, name

@@ -1,0 +1,24 @@
+"""A basis of one mode, and a prescribed path through the compiled loop of the march."""
+
+import numpy as np
+
+from patchfem.compiled import load_kernels
+from patchfem.core import ModalBasis
+from patchfem.dynamics.march.march import GOAL
+
+OMEGA = 2 * np.pi * 143
+
+
+def one_mode(omega, zeta, mass):
+    one = np.ones(1)
+    return ModalBasis(("axial",), omega * one, zeta * one, one, one, one, mass)
+
+
+def follow(model, path, dt=0.3):
+    """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of hub.follow_path."""
+    hub = load_kernels()
+    contact, work = model.build(hub)
+    burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    bad = hub.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, work, GOAL * model.limit, burnt,
+                          forces)
+    return forces, burnt, bad, contact

@@ -1,0 +1,15 @@
+"""A study as a module."""
+
+import importlib.util
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2] / "studies"
+
+
+def study(name):
+    """The module of a study by its path below studies/."""
+    path = ROOT / name
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,200 @@
+"""The shape of the package, read from its sources: a file imports its own rung of the reading order and those before.
+
+The reading order is the numbered list in the docstring of the package. Every import counts, inside functions too.
+`python tests/test_ladder.py [ROOT]` prints every breach in a checkout.
+"""
+
+import ast
+import re
+import sys
+from collections import Counter
+from fnmatch import fnmatch
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from house import DEFS, circles, folder_of, graph_of, imports, sources
+
+HERE = Path(__file__).parents[1]
+SCENE = ("", "__main__", "scene", "scene.*", "model", "model.*")  # may know a Scene
+SCENE_ALSO = ()  # and so may these, each named with its reason
+OUTSIDE = {"numba": ("*kernels", "compiled"), "pyvista": ("export.view",), "meshio": ("mesh.files", "export.*")}
+PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order
+MODULE_LINES, FUNCTION_LINES, FOLDER_FILES = 400, 90, 16
+
+
+def reading_order(tree: dict) -> list:
+    """(number, name) of each entry of the numbered list in the package's docstring."""
+    listed = ast.get_docstring(ast.parse(tree.get("", ""))) or ""
+    return [(int(number), name.rstrip("/")) for number, name in re.findall(r"^\s*(\d+)\.\s+`([\w/]+)`", listed, re.M)]
+
+
+def of_the_order(tree: dict) -> list:
+    """Where the reading order does not tell the truth: numbers 1, 2, 3, ..., every folder and flat module once."""
+    order = reading_order(tree)
+    named = Counter(name for _, name in order)
+    there = {name.split(".")[0] for name in tree} - {"", "__main__"}
+    out = [f"the reading order names {name}, which does not exist" for name in named if name not in there]
+    out += [f"the reading order names {name} {count} times" for name, count in named.items() if count > 1]
+    out += [f"the reading order does not name {name}" for name in sorted(there - set(named))]
+    numbers = [number for number, _ in order]
+    return out + ([f"the reading order is numbered {numbers}"] if numbers != [*range(1, len(order) + 1)] else [])
+
+
+def of_imports(name: str, found: list, rungs: dict) -> list:
+    """Imports of later rungs; what the order does not name is no rung, and `of_the_order` tells of such importers."""
+    own, out = rungs.get(name.split(".")[0]), set()
+    for one in found:
+        rung = rungs.get(one.target.split(".")[0])
+        if not one.ours or own is None or (one.target, one.taken) == ("", "__version__"):
+            continue
+        if rung is None:
+            out.add(f"{name} imports {one.target}, which the reading order does not name")
+        elif rung > own:
+            out.add(f"{name or '__init__'} imports {one.target or 'the top'} upward")
+    return sorted(out)
+
+
+def of_outside(found: dict) -> list:
+    """Packages of others imported where they have no place, and more than one exporter that writes meshes."""
+    out, exporters = [], []
+    for name, all_of_it in found.items():
+        used = {one.target for one in all_of_it if not one.ours}
+        out += [f"{name} imports {package}" for package, places in OUTSIDE.items()
+                if package in used and not any(fnmatch(name, place) for place in places)]  # fmt: skip
+        exporters += [name] if "meshio" in used and name.startswith("export.") else []
+    return out + ([f"meshio in {' and '.join(sorted(exporters))}"] if len(exporters) > 1 else [])
+
+
+def of_scene(name: str, parsed) -> list:
+    """The lines on which a file that should not knows a Scene: by its name, as a parameter, in an annotation."""
+    if any(fnmatch(name, place) for place in (*SCENE, *SCENE_ALSO)):
+        return []
+    lines = {node.lineno for node in ast.walk(parsed) if _knows(node)}
+    return [f"{name} knows a Scene (line {', '.join(map(str, sorted(lines)))})"] if lines else []
+
+
+def _knows(node) -> bool:
+    if isinstance(node, (ast.Name, ast.Attribute, ast.alias, ast.ClassDef)):
+        return "Scene" in [getattr(node, key, None) for key in ("id", "attr", "name")]
+    called = getattr(node, "arg" if isinstance(node, ast.arg) else "target", None)
+    if isinstance(node, (ast.arg, ast.AnnAssign)) and getattr(called, "id", called) == "scene":
+        return True
+    noted = getattr(node, "annotation", None) or getattr(node, "returns", None)  # a text too: "Scene | None"
+    return noted is not None and "Scene" in re.findall(r"\w+", ast.unparse(noted))
+
+
+def of_sizes(tree: dict, parsed: dict) -> list:
+    """Modules, functions and folders that have grown too large."""
+    lines = {name: text.count("\n") for name, text in tree.items()}
+    out = [f"{name} has {count} lines" for name, count in lines.items() if count > MODULE_LINES]
+    for name, module in parsed.items():
+        sizes = [(node.name, node.end_lineno - node.lineno + 1) for node in ast.walk(module) if isinstance(node, DEFS)]
+        out += [f"{name}.{function} has {count} lines" for function, count in sizes if count > FUNCTION_LINES]
+    held = Counter(folder_of(name, tree) for name in tree)
+    return out + [f"{name or 'the top'} holds {count} files" for name, count in held.items() if count > FOLDER_FILES]
+
+
+def of_effects(tree: dict) -> list:
+    """Modules that the table of effects names and that do not exist."""
+    nodes = ast.walk(ast.parse(tree.get("effects", "")))
+    texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    named = {text.removeprefix("patchfem.") for text in texts if re.fullmatch(r"patchfem(\.\w+)+", text)}
+    return [f"effects names {name}, which does not exist" for name in sorted(named - set(tree))]
+
+
+def faults(tree: dict) -> list:
+    """Every breach of the ladder in a dict {dotted name: source}, as sentences."""
+    parsed = {name: ast.parse(text) for name, text in tree.items()}
+    found = {name: imports(name, text, tree) for name, text in tree.items()}
+    order = reading_order(tree)
+    rungs = {name: number for number, name in order} | {"": len(order) + 1, "__main__": len(order) + 1}
+    out = of_the_order(tree) + [f"cycle of files: {', '.join(group)}" for group in circles(graph_of(tree))]
+    for name in tree:
+        out += of_imports(name, found[name], rungs) + of_scene(name, parsed[name])
+    return out + of_outside(found) + of_sizes(tree, parsed) + of_effects(tree)
+
+
+SMALL = {  # a house without a fault, into which the tests plant one each
+    "": '"""Read\n\n1. `core`  nouns\n2. `effects`\n3. `compiled`\n4. `scene`\n5. `mesh`\n6. `friction`\n'
+        '7. `dynamics`\n8. `model`\n9. `runs`\n10. `export`\n"""\ndef __getattr__(name):\n    from .runs import run',
+    "__main__": "from . import runs\nfrom .scene.reader import Scene\ndef check(scene: Scene): pass",
+    "core": "import numpy as np\nfrom . import __version__",
+    "effects": 'TABLE = {"friction.law=tanh": ("patchfem.friction.laws.tanh", "F = mu N tanh(v/v_0)")}',
+    "compiled": 'import numba\ndef load(module):\n    return import_module(f"patchfem.{module}")',
+    "scene": "", "scene.reader": "from ..core import Interface\nclass Scene: pass",
+    "mesh": "", "mesh.files": "import meshio\nimport numpy as np\nnp.load('grid.npz')", "mesh.grid": "",
+    "friction": "", "friction.bonds": "from .laws.tanh import f", "friction.laws.tanh": "from ...core import Step",
+    "dynamics": "", "dynamics.event_kernels": "import numba", "dynamics.drives": "from ..friction.laws import tanh",
+    "dynamics.events": "def f():\n    compiled.load('dynamics.event_kernels')\n    from .drives import Sine",
+    "model.build": "from ..scene.reader import Scene\ndef build(scene: Scene): pass",
+    "runs": "from . import run", "runs.run": "from ..model.build import build\nfrom ..dynamics import events",
+    "export.view": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
+}  # fmt: skip
+
+
+def test_exact_the_package_is_a_ladder():
+    tree = sources(HERE)
+    assert faults(tree) == []
+    assert [name for _, name in reading_order(tree) if name in PHYSICS] == PHYSICS
+
+
+def test_exact_the_checker_sees_what_there_is():
+    tree = sources(HERE)
+    found = [one for name, text in tree.items() for one in imports(name, text, tree)]
+    assert len(tree) > 100 and len(reading_order(tree)) > 10 and sum(one.ours for one in found) > 500
+    assert {"numpy", "core"} <= {one.target for one in found}
+    assert any(one.by_name and one.target.endswith("kernels") for one in found)
+    assert re.search(r"patchfem(\.\w+)+", tree["effects"])  # else `of_effects` looks at nothing
+
+
+def test_exact_a_small_house_has_no_fault_until_a_folder_is_too_full():
+    assert faults(SMALL) == []
+    assert faults(SMALL | {f"mesh.part_{i}": "" for i in range(14)}) == ["mesh holds 17 files"]
+
+
+@pytest.mark.parametrize("name, text, fault", [
+    ("friction.laws.tanh", "from ...dynamics.drives import Sine", "friction.laws.tanh imports dynamics.drives upward"),
+    ("dynamics.events", "def f():\n    from ..runs.run import solve", "dynamics.events imports runs.run upward"),
+    ("dynamics.events", "def f():\n    import patchfem.model.build", "dynamics.events imports model.build upward"),
+    ("dynamics.events", "from patchfem import runs", "dynamics.events imports runs upward"),
+    ("dynamics.events", "from .. import run", "dynamics.events imports the top upward"),
+    ("core", "if TYPE_CHECKING:\n    from .scene.reader import Raw", "core imports scene.reader upward"),
+    ("effects", "from . import scene", "effects imports scene upward"),
+    ("mesh.grid", "f = lambda: import_module('patchfem.model.build')", "mesh.grid imports model.build upward"),
+    ("mesh.grid", "import_module(f'patchfem.friction.laws.{law}_k')", "mesh.grid imports friction.laws upward"),
+    ("mesh.grid", "compiled.load('dynamics.event_kernels')", "mesh.grid imports dynamics.event_kernels upward"),
+    ("runs.run", "from ..wear.depth import worn", "runs.run imports wear.depth, which the reading order does not name"),
+    ("dynamics.drives", "def f():\n    from .events import g", "cycle of files: dynamics.drives, dynamics.events"),
+    ("friction.laws.tanh", "from .. import bonds", "cycle of files: friction.bonds, friction.laws.tanh"),
+    ("dynamics.events", "from ..scene.reader import Scene", "dynamics.events knows a Scene (line 1)"),
+    ("dynamics.events", "\ndef f(*, scene): pass", "dynamics.events knows a Scene (line 2)"),
+    ("dynamics.events", "def f(asked: 'Scene | None'): pass", "dynamics.events knows a Scene (line 1)"),
+    ("runs.run", "class Run:\n    scene: object", "runs.run knows a Scene (line 2)"),
+    ("wear", "", "the reading order does not name wear"),
+    ("", SMALL[""].replace("`mesh`", "`mash`"), "the reading order names mash, which does not exist"),
+    ("", SMALL[""].replace("`mesh`", "`scene`"), "the reading order names scene 2 times"),
+    ("", SMALL[""].replace("2. ", "3. "), "the reading order is numbered [1, 3, 3, 4, 5, 6, 7, 8, 9, 10]"),
+    ("runs.run", "def f():\n    import numba", "runs.run imports numba"),
+    ("export.page", "import pyvista as pv", "export.page imports pyvista"),
+    ("export.page", "import meshio", "meshio in export.page and export.vtk"),
+    ("runs.run", "a = 1\n" * 401, "runs.run has 401 lines"),
+    ("runs.run", "def f():" + "\n    a = 1" * 90, "runs.run.f has 91 lines"),
+    ("effects", "A = 'patchfem.friction.laws.tan'", "effects names friction.laws.tan, which does not exist"),
+])  # fmt: skip
+def test_refuses_a_breach(name, text, fault):
+    assert fault in faults(SMALL | {name: text})
+
+
+def test_exact_effects_name_modules_that_exist():
+    from patchfem.effects import EFFECTS, NOT_YET_BUILT
+
+    given = {thing for effect in EFFECTS.values() for thing in effect.gives}
+    for name, effect in EFFECTS.items():
+        assert not effect.module or find_spec(effect.module), name
+        assert set(effect.needs) <= given and name not in NOT_YET_BUILT, name
+
+
+if __name__ == "__main__":
+    found = faults(sources(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
+    print(*found, f"{len(found)} faults", sep="\n")
