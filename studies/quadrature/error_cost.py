@@ -6,10 +6,7 @@ amplitude (w = 0.02: 2e-4 at A = 0.1, 1e-5 at A = 3, 4e-6 at A = 50) with at mos
 keeping every bond takes 10,000 strips and six times the time at A = 0.1 and 50, two to four times between, in two to
 five cycles and ever more after. Where strokes are long (A = 50) cutting off alone is as fast. The steps of the path
 matter more: 400 a cycle still miss the force at reversals of growing bonds by about 1e-2 (A <= 10), a thousand times
-what w = 0.02 costs at A = 3. Sums of J exponentials over place cost 1.2 to 2.6 us a step up to A = 3, 4 to 6 at 10 and
-18 to 34 at 50 (merging to 0.02: 3 to 10 and 19), whatever the error asked for: it falls geometrically with the nodes
-(6e-3, 2.5e-4, 1e-5 of the friction limit with 4, 6, 8) down to what cells of 0.05 lose, 6e-7 to 6e-6, so from A = 0.1
-to 10 they beat merging.
+what w = 0.02 costs at A = 3.
 
 Path: q = A sin t, printed law of order 1, growing bonds (a_s = 0.3 A omega^2, l_k = 0.05, eps_k = 0.5, all in bond
 lengths), 200 steps a cycle, as long as bonds live. Error: largest of the run against every bond kept, over mu_s N.
@@ -29,7 +26,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import list_model, place_model
+from patchfem.dynamics.march.models import list_model
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff
@@ -38,8 +35,6 @@ HERE = Path(__file__).parent
 AMPLITUDES = (0.1, 1.0, 3.0, 10.0, 50.0)
 TAILS = (1e-2, 1e-3, 1e-4, 1e-6)
 WIDTHS = (0.2, 0.1, 0.05, 0.02, 0.01)
-NODES = (4, 6, 8, 10)  # of the exponentials, in cells of 0.05
-CELLS = (0.2, 0.1, 0.05, 0.025)  # widths, with 10 nodes
 STEPS = (50, 100, 200, 400)
 FINEST = 1600
 ROOM = 200_000
@@ -72,16 +67,6 @@ def along(law, path, dt, tail, merge, repeats=1) -> tuple:
     """(forces at the samples, microseconds per step, longest list) of one engine."""
     model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
     model.fields["bondlist"] = np.zeros((10, ROOM)) if not merge else model.fields["bondlist"]
-    return timed(model, path, dt, repeats)
-
-
-def over_place(law, path, dt, nodes, width, repeats=1) -> tuple:
-    """The same of sums of exponentials over place, with the cells in place of the strips."""
-    return timed(place_model(law, 1.0, 1e-9, nodes, width, 1e-6), path, dt, repeats)
-
-
-def timed(model, path, dt, repeats) -> tuple:
-    """(forces at the samples, microseconds per step, longest list) of a model."""
     hub, best = load_kernels(), np.inf
     for _ in range(repeats):
         contact, work = model.build(hub)
@@ -107,12 +92,6 @@ def main(amplitudes=AMPLITUDES, repeats=2) -> list:
         for width in WIDTHS:
             force, micro, strips = along(law, path, dt, 1e-6, width, repeats)
             rows.append(Row(amplitude, "merged", "width", width, float(np.abs(force - truth).max()), micro, strips))
-        for knob, values in (("nodes", NODES), ("width", CELLS)):
-            for value in values:
-                nodes, width = (value, 0.05) if knob == "nodes" else (10, value)
-                force, micro, cells = over_place(law, path, dt, nodes, width, repeats)
-                error = float(np.abs(force - truth).max())
-                rows.append(Row(amplitude, "exponential", knob, value, error, micro, cells))
         fine = along(law, *slide(amplitude, FINEST), 1e-6, 0.01)[0][::FINEST // 50]
         for steps in STEPS:
             force, micro, strips = along(law, *slide(amplitude, steps), 1e-6, 0.01)
@@ -138,9 +117,8 @@ def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
         axes = np.atleast_1d(figure.subplots(1, len(amplitudes), sharex=True, sharey=True))
         for ax, amplitude in zip(axes, amplitudes):
             for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"),
-                                        ("exponential", "black", "v"),
                                         ("steps", GREY, "^")):
-                part = [r for r in rows if r.amplitude == amplitude and r.engine == engine and r.knob != "nodes"]
+                part = [r for r in rows if r.amplitude == amplitude and r.engine == engine]
                 ax.loglog([r.micro for r in part], [max(r.error, 1e-12) for r in part], mark + "-", color=color, ms=3,
                           lw=0.8, label=engine)
             whole = next(r for r in rows if r.amplitude == amplitude and r.engine == "direct")

@@ -4,9 +4,8 @@ Strokes of 5 bond lengths, 2000 steps a cycle, one core of a machine shared with
 mean force along it (two passes or more over the list) and the force and energy at its end (one). The recursion takes 26
 ns a step, 2400 times less than its NumPy form, and 0.5 ns a point on a field of 2000 (84 times). Of the lists, merged
 to 0.02 (0.05) takes 1.1 (0.8) us for the stretch of order 2, 3.4 (2.1) us for order 0.5 and 3.2 (2.5) us for the
-growing bonds of the print; cutting off alone 5 to 22 us. Exponentials over place take 0.31 us with bonds of constant
-length, 1.1 us with growing ones (order 2: 1.7). A list costs 3 to 12 ns a strip and step, of two Gauss points each: 1
-ns for a power and an exponential.
+growing bonds of the print; cutting off alone 5 to 22 us. A list costs 3 to 12 ns a strip and step, of two Gauss
+points each: 1 ns for a power and an exponential.
 
 Run: OPENBLAS_NUM_THREADS=1 python studies/quadrature/speed.py
 """
@@ -17,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import list_model, place_model, points_model
+from patchfem.dynamics.march.models import list_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import Recursion
@@ -81,9 +80,6 @@ def main(cycles: int = CYCLES) -> list:
         for engine, merge in (("truncated", 0.0), ("merged .02", 0.02), ("merged .05", 0.05)):
             seconds, count = compiled(list_model(law, 1.0, cutoff(order, 1e-6), merge), path)
             rows.append(Speed(f"{engine}, {name}", 1e9 * seconds, 1e9 * seconds / count, slow / seconds))
-        if reading == "report":
-            seconds, count = compiled(place_model(law, 1.0, 1e-9, 10, 0.05, 1e-6), path)
-            rows.append(Speed(f"exponential, {name}", 1e9 * seconds, 1e9 * seconds / count, slow / seconds))
     law = Bonds(1.0, 1.0)
     for points in (1, 2000):
         seconds, _ = compiled(points_model(law, np.full(points, 1 / points), np.ones(points)), short)

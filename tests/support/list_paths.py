@@ -22,16 +22,22 @@ class Listed(NamedTuple):
     tally: np.ndarray
 
 
+def list_arrays(law, tail=0.0, merge=0.0, capacity=60_000):
+    """(bonds, tally, now, law, growth, table) of an empty list, as the functions of `bond_kernels` take them."""
+    numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
+    return (np.zeros((10, capacity)), np.zeros(12), np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0]), numbers,
+            growth_numbers(law), share_table(law))
+
+
 def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     """March the list over the knots `path`, times scalar or one per step."""
-    numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
-    bonds, tally, table, growth = np.zeros((10, capacity)), np.zeros(12), share_table(law), growth_numbers(law)
-    now, rows = np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0]), []
+    arrays, rows = list_arrays(law, tail, merge, capacity), []
+    tally = arrays[1]
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0
-        mean = bond_kernels.list_mean(dq, bonds, tally, now, numbers, growth, table, v, dt)
-        ahead = bond_kernels.list_force(dq, bonds, tally, now, numbers, growth, table, v, dt)
-        assert bond_kernels.list_step(dq, bonds, tally, now, numbers, growth, table, v, v, dt)
+        mean = bond_kernels.list_mean(dq, *arrays, v, dt)
+        ahead = bond_kernels.list_force(dq, *arrays, v, dt)
+        assert bond_kernels.list_step(dq, *arrays, v, v, dt)
         rows.append((mean, tally[5], ahead, tally[4]))
     return Listed(*np.array(rows).T, tally)
 

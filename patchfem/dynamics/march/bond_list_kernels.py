@@ -1,28 +1,18 @@
-"""The loop of a shared list of bonds: force, solve without a slope, commit, energy book.
-
-Where law[7] is set the bonds are summed over place: `bonds` are the cells, `bondlist` the strips, `table` all numbers
-of `friction.bonds.place_sum_kernels`.
-"""
+"""The loop of a shared list of bonds: force, solve without a slope, commit, energy book."""
 
 import numpy as np
 from numba import njit
 
 from ...friction.bonds.bond_kernels import list_mean, list_slope, list_step
 from ...friction.bonds.bond_sum_kernels import MOMENTS
-from ...friction.bonds.place_step_kernels import place_step
-from ...friction.bonds.place_sum_kernels import TALLY, place_mean
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
-
-PLACES = 7  # of law: whether the bonds are summed over place
 
 
 @njit(error_model="numpy", **LEAN)
 def list_scalar(dq, c, v0, dt):
     """Path-mean force [N] and slope [N/m] of a bond list; a slope of zero stands for an unknown one."""
     scale = c.force[0]
-    if c.law[PLACES] > 0:
-        return scale * place_mean(dq, c.bonds, c.bondlist, c.table, v0, dt), 0.0
     if c.law[1] == MOMENTS:
         force, slope = list_slope(dq, c.bondlist, c.tally, c.now, c.law, c.growth, v0, dt)
         return scale * force, scale * slope
@@ -69,11 +59,7 @@ def commit_list(dq, force, v0, v1, dt, c):
     That work is dissipated where positive; the printed law also creates energy, and both are summed apart.
     """
     before = c.tally[4]
-    if c.law[PLACES] > 0:
-        ok = place_step(dq, c.bonds, c.bondlist, c.table, v0, v1, dt)
-        c.tally[4], c.tally[5], c.tally[10] = c.table[TALLY + 4], c.table[TALLY + 5], c.table[TALLY + 10]
-    else:
-        ok = list_step(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, v1, dt)
+    ok = list_step(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, v1, dt)
     net = force * dq - c.force[0] * (c.tally[4] - before)
     if net < 0:
         c.tally[6] -= net

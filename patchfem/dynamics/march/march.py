@@ -14,13 +14,12 @@ from .models import (
     growth_numbers,
     jenkins_model,
     list_model,
-    place_model,
     points_model,
     rate_model,
 )
 
 __all__ = ["ContactModel", "MarchResult", "Run", "coulomb_model", "growth_numbers", "jenkins_model", "list_model",
-           "march", "place_model", "points_model", "rate_model", "warm_up"]
+           "march", "points_model", "rate_model", "warm_up"]
 
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
@@ -250,7 +249,7 @@ class Run:
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
         have = self.contact.bondlist.shape[1]
-        if not have or self.contact.law[7]:
+        if not have:
             return
         want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
         if want <= have or have >= MOST_STRIPS:

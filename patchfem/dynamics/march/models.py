@@ -101,16 +101,3 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
               "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
               "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law)}
     return ContactModel(3, limit, fields, False, law.length)
-
-
-def place_model(law, limit: float, tail: float, nodes: int, width: float, ripe: float) -> ContactModel:
-    """The printed law of order 0, 1 or 2 by sums of exponentials over place; numbers as in friction.place_sum."""
-    from ...friction.bonds.place_sum import place_sum
-
-    found = place_sum(law, tail, nodes, width, ripe)
-    flagged = found.numbers[:24].copy()
-    flagged[7] = 1.0
-    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bonds": found.cells, "bondlist": found.strips,
-              "now": found.numbers[30:36], "tally": np.zeros(12), "law": flagged, "table": found.numbers,
-              "growth": growth_numbers(law)}
-    return ContactModel(3, limit, fields, False, law.length)

@@ -2,26 +2,24 @@
 bounded way to be summed, and which is cheapest depends on the law, the strokes and the steps."""
 
 from dataclasses import dataclass
-from math import ceil, log, sqrt
+from math import ceil, sqrt
 
 from .bond_list import AGED, MOMENTS, POWER, SHARES, form_of
 from .parameters import Bonds
 
-ENGINES = ("direct", "truncated", "merged", "exponential", "recursion")
+ENGINES = ("direct", "truncated", "merged", "recursion")
 MERGING = (0.25, 0.75, 1.0)  # largest measured error over merge width squared: order >= 1, growing bonds, order < 1
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
 SHARES_ANY = 4e-8  # the same for the printed law at constant length with an order other than 0, 1, 2
 PASS, STEP = 1.5e-7, 5e-7  # seconds per pass over the list and per step besides
 PASSES = 9  # over the list in a step of the rig: three for each of the two or three trial increments
 RECURSION = 3e-8  # seconds per step
-PLACES, PER_CELL = 1.4e-7, 3e-8  # seconds per force of the sums over place, and per cell that a step passes and node
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """An engine and its parameters. tail: what the cut-off may lose, merge: width [eps_0], error: bound of all over the
-    friction limit, strips: expected length of the list, seconds: per step; of sums of exponentials over place: nodes,
-    width of a cell [eps_0] and ripe, the share of its length that a bond may lack there."""
+    friction limit, strips: expected length of the list, seconds: per step."""
 
     engine: str
     tail: float
@@ -29,15 +27,10 @@ class Choice:
     error: float
     strips: float
     seconds: float
-    nodes: int = 0
-    width: float = 0.0
-    ripe: float = 0.0
 
     def said(self) -> str:
         """One line for a plan."""
         parts = [f"{self.engine}: about {self.strips:.0f} strips of bonds, {1e6 * self.seconds:.2g} us per step"]
-        if self.engine == "exponential":
-            parts.append(f"{self.nodes} nodes, cells of {self.width:.2g} bond lengths, tail {self.tail:.1g}")
         if self.engine in ("truncated", "merged"):
             parts.append(f"tail {self.tail:.1g}")
         if self.engine == "merged":
@@ -49,8 +42,6 @@ def impossible(engine: str, reading: str, order: float) -> str:
     """Why an engine cannot sum such a law and what can; empty where it can."""
     if engine == "recursion" and (reading != "stretch" or order != 1):
         return "sums reading = \"stretch\" with order = 1 alone; use \"auto\" or \"merged\""
-    if engine == "exponential" and (reading != "report" or order not in (0, 1, 2)):
-        return "sums reading = \"report\" with order 0, 1 or 2 alone; use \"auto\" or \"merged\""
     return ""
 
 
@@ -71,12 +62,8 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
     found = [_priced(law, name, cut, width, stroke, steps) for name in ("truncated", "merged")]
     if engine == "direct":
         return _priced(law, "direct", 0.0, 0.0, stroke, steps)
-    if engine == "exponential":
-        return _over_place(law, tolerance, cut, stroke, steps)
     if engine != "auto":
         return found[0] if engine == "truncated" else found[1]
-    if merge is None and not impossible("exponential", law.reading, law.order):
-        found.append(_over_place(law, tolerance, cut, stroke, steps))
     if merge is not None:
         return found[1] if merge > 0 else found[0]
     fit = [choice for choice in found if choice.error <= 0.1 * tolerance] or found[:1]
@@ -85,23 +72,6 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
 
 def _merging(law) -> float:
     return MERGING[2 if law.order < 1 else 1 if form_of(law) == AGED else 0]
-
-
-def _over_place(law, tolerance, tail, stroke, steps) -> Choice:
-    """Sums of exponentials over place: nodes, cells and ripeness each lose at most a hundredth of the tolerance."""
-    from .place_sum import CELLS, node_error, nodes_for, width_for
-
-    goal = min(max(0.01 * tolerance, 1e-8), 1e-5)
-    nodes, width, each = nodes_for(law, goal), width_for(goal), stroke / max(steps, 1)
-    error = node_error(law, nodes) + CELLS * width**3 + tail + (goal if law.grows else 0.0)
-    strips = 1.0
-    if law.grows:
-        strips = min(2 * log(1 / goal), 745.0) * max(1.0, law.slip_growth / law.length / 0.125)
-    crossed = each / width * PER_CELL * nodes
-    force = 2.5 * PLACES + STRIP[AGED] * strips if law.grows else PLACES
-    seconds = STEP + PASSES * force + crossed
-    seconds *= 1 if each <= 0.1 else 5 / 2 * (1 if each <= 1 else 2 + ceil(each).bit_length())
-    return Choice("exponential", tail, 0.0, error, strips, seconds, nodes, width, goal)
 
 
 def _priced(law, name, tail, merge, stroke, steps) -> Choice:

@@ -95,8 +95,6 @@ def contact_model(scene, settings: Settings, patch, drive):
         return hub.rate_model(limit, f.reference_speed)
     law = law_of(scene, speed_of(scene, drive))
     found = quadrature_of(scene, settings, drive)
-    if found.engine == "exponential":
-        return hub.place_model(law, limit, found.tail, found.nodes, found.width, found.ripe)
     if found.engine != "recursion":
         from ...friction.bonds.quadrature import cutoff
 

@@ -54,10 +54,8 @@ def _quadrature(draft: Draft, kind: str) -> None:
         draft.say(key, "'recursion' sums reading 'stretch' with order = 1 alone; use 'auto' or 'merged'")
     elif engine != "recursion" and shear:
         draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
-    elif engine in ("merged", "exponential") and kind == "bench":
+    elif engine == "merged" and kind == "bench":
         draft.say(key, f"'{engine}' in a bench: use 'auto', 'direct' or 'truncated'; not yet built")
-    elif engine == "exponential" and (law.reading != "report" or law.order not in (0, 1, 2)):
-        draft.say(key, "'exponential' sums reading 'report' with order 0, 1 or 2 alone; use 'auto' or 'merged'")
 
 
 def method_unused(kind: str) -> tuple[str, ...]:

@@ -175,7 +175,7 @@ def test_exact_march_of_direct_stretch_is_the_recursion():
 def test_exact_engine_of_a_scene(tmp_path):
     for engine, order, reading, kind in (("auto", 1, "stretch", 2), ("direct", 1, "stretch", 3),
                                          ("merged", 2, "stretch", 3), ("truncated", 0, "report", 3),
-                                         ("exponential", 1, "report", 3), ("recursion", 1, "stretch", 2)):
+                                         ("recursion", 1, "stretch", 2)):
         found = rig(tmp_path, engine, reading, order)
         assert contact_model(found, settings_of(found), None, drive_of(found)).kind == kind
         used = quadrature_of(found, settings_of(found), drive_of(found)).engine
@@ -186,10 +186,8 @@ def test_exact_engine_of_a_scene(tmp_path):
 def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
     with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order = 1 alone"):
         rig(tmp_path, "recursion")
-    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order 0, 1 or 2 alone"):
-        rig(tmp_path, "exponential", "stretch")
-    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order 0, 1 or 2 alone"):
-        rig(tmp_path, "exponential", "report", 0.5)
+    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature: 'exponential' is gone.*use 'merged'"):
+        rig(tmp_path, "exponential")
 
 
 def test_exact_warning_of_energy_created(tmp_path):

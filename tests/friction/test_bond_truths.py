@@ -1,0 +1,88 @@
+"""Truths of the printed law that the compiled list must meet whether it keeps, cuts off or merges its strips: closed
+forms (checks C5, C6, C8), bounded memory, and trials that leave no trace."""
+
+import numpy as np
+import pytest
+from friction_paths import random_walk, triangle
+from list_paths import follow_list, list_arrays
+from test_friction_hub import OMEGA, one_mode
+
+from patchfem.core import BaseSine
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import list_model
+from patchfem.friction.bonds import bond_kernels
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import cutoff
+
+GROWS = {"ratio": 0.5, "rest_growth": 0.3, "slip_growth": 0.05, "rest_speed": 1e-2}
+WAYS = {"direct": {}, "truncated": {"tail": 1e-9}, "merged": {"tail": 1e-9, "merge": 0.01}}
+way = pytest.mark.parametrize("knobs", WAYS.values(), ids=WAYS)
+
+
+def printed(order, growth=None):
+    return Bonds(1.0, 1.0, float(order), "report", initial=0.0, **(growth or {}))
+
+
+@way
+@pytest.mark.parametrize("amplitude, area", [(0.1, 2.659583e-2), (1.0, 2.149259), (5.0, 18.0), (10.0, 38.0)])
+def test_exact_c5_triangle_loops_of_order_zero(amplitude, area, knobs):
+    path = triangle(amplitude, int(np.ceil(6 / amplitude)) + 2, max(20, int(40 * amplitude)))
+    mean = follow_list(printed(0), path, **knobs).mean
+    last = 2 * max(20, int(40 * amplitude))
+    assert mean[-last:] @ np.diff(path)[-last:] == pytest.approx(area, rel=3e-5)
+
+
+@way
+def test_exact_c6_reversal(knobs):
+    """p = 0 after a long slide: 2 exp(-2 d) - 1 a way d back."""
+    path = np.concatenate([np.linspace(0, 40, 801), 40 - np.linspace(0, 3, 121)[1:]])
+    got = follow_list(printed(0), path, **knobs).after[800:]
+    assert got == pytest.approx(2 * np.exp(-2 * np.linspace(0, 3, 121)[1:]) - 1, abs=1e-8)
+
+
+@way
+@pytest.mark.parametrize("order", [0, 1])
+def test_exact_c8_healing_under_load(order, knobs):
+    """l_k = 1e-3, eps_k = 0.5, slid slowly grown then held: 0.5, then 0.81606 and 0.93233 after one and two e-folds."""
+    law = printed(order, {"ratio": 0.5, "rest_growth": 10.0, "slip_growth": 1e-3, "rest_speed": 1.0})
+    path = np.append(40 - np.geomspace(40, 1e-5, 1500), [40 - 1e-5] * 2)
+    got = follow_list(law, path, np.append(np.full(1499, 1e-9), [0.1, 0.1]), **knobs).after[-3:]
+    assert got == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
+
+
+@pytest.mark.parametrize("growth", [{}, GROWS])
+def test_always_long_runs_stay_bounded_and_right(growth):
+    """1e5 random steps, then the force of the same bonds by the list that only knows the last of the path."""
+    steps = np.random.default_rng(3).normal(0, 0.05, 100_000)
+    steps[::1000] *= 400.0
+    law = printed(1, growth)
+    got = follow_list(law, np.concatenate([[0.0], np.cumsum(steps)]), tail=1e-9, merge=0.01)
+    tail = np.concatenate([[0.0], np.cumsum(steps[-1500:])])
+    assert got.tally[10] < 1500
+    assert got.after[-1] == pytest.approx(follow_list(law, tail).after[-1], abs=5e-5)
+
+
+@pytest.mark.parametrize("growth", [{}, GROWS])
+def test_always_a_trial_leaves_no_trace(growth):
+    law = printed(1, growth)
+    arrays = list_arrays(law, 1e-9, 0.01)
+    for dq in np.diff(random_walk(3, 200, 0.3)):
+        assert bond_kernels.list_step(dq, *arrays, dq / 0.1, dq / 0.1, 0.1)
+    before = [part.copy() for part in arrays]
+    for dq in (1e-4, -1e-4, 0.7, -0.7, 40.0, -40.0):
+        bond_kernels.list_mean(dq, *arrays, dq, 1.0)
+    assert all(np.array_equal(a, b) for a, b in zip(arrays, before))
+
+
+@pytest.mark.parametrize("order, growth", [(0, {}), (1, {"ratio": 0.6, "rest_growth": 10.0, "slip_growth": 5e-6,
+                                                         "rest_speed": 1e-4})])
+def test_exact_marches_of_every_list_agree(order, growth):
+    law = Bonds(0.4, 1e-4, float(order), "report", initial=0.0, **growth)
+    limit = 0.4 * 98.0665
+    runs = [march(one_mode(OMEGA, 0.01, 1.0), BaseSine(5 * 9.80665, OMEGA), list_model(law, limit, reach, merge), 3,
+                  200, window=3) for reach, merge in ((np.inf, 0.0), (cutoff(law.order, 1e-9), 0.005))]
+    size = np.ptp(runs[0].window.slide)
+    assert runs[1].window.slide == pytest.approx(runs[0].window.slide, abs=2e-6 * size)
+    assert runs[1].window.force == pytest.approx(runs[0].window.force, abs=3e-5 * limit)
+    for name in ("created", "dissipated", "friction"):
+        assert runs[1].ledger[name] == pytest.approx(runs[0].ledger[name], rel=1e-4, abs=1e-9)
