@@ -76,7 +76,12 @@ def instance(module: str, parts: dict, say=None):
         text, count = re.subn(rf"(?m)^from \.[\w.]* import \w+ as {part}$", f"import {name} as {part}", text)
         if count != 1:
             raise ValueError(f"patchfem.{module} imports its part {part} {count} times, not once")
-    return written(f"{module}_{hashlib.sha256(text.encode()).hexdigest()[:12]}", text, say)
+    return written(f"{module}_{digest(text)}", text, say)
+
+
+def digest(text: str) -> str:
+    """Short hash of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def written(module: str, text: str, say=None):

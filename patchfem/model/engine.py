@@ -3,6 +3,7 @@
 from math import ceil, sqrt
 
 from ..core import PatchfemError
+from ..effects import LAWS, has, listed
 from .interfaces import acts, yaws
 
 COMPARED = ("duhamel", "newmark", "euler")
@@ -36,7 +37,7 @@ def no_closed_form(scene, drive, shear: str) -> str:
     """Why a run has no exact solution; empty where it has one."""
     f, structure = scene.friction, scene.structure
     laws = [one.law for one in structure.interface] or ([f.law] if f is not None else [])
-    if odd := [law for law in laws if law not in ("coulomb", "convolution")]:
+    if odd := [law for law in laws if "exact" not in LAWS[law].carries.split()]:
         return f"for law '{odd[0]}'{f' with {shear}' if shear else ''}"
     if shear and laws:
         return f"with {shear}"
@@ -58,14 +59,14 @@ def set_valued(scene, settings) -> bool:
     f, contact = scene.friction, scene.contact
     laws = [one.law for one in scene.structure.interface] or ([f.law] if f is not None else [])
     gives = contact is not None and bool(contact.gives_way or (contact.holder and contact.holder.tangential_stiffness))
-    return settings.engine == "march" and not gives and ("coulomb" in laws or "convolution" in laws)
+    return settings.engine == "march" and not gives and any(has(law, "set-valued") for law in laws)
 
 
 def unique_steps(scene, drive) -> int:
     """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
     dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
     f = scene.friction
-    if f is None or f.law != "nonlocal" or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
+    if f is None or not has(f.law, "bonds") or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
         return 0
     from .pieces import nominal_load
     from .structure import modes_of
@@ -77,10 +78,10 @@ def unique_steps(scene, drive) -> int:
 
 def _refuse(scene, shear: str, side: str) -> None:
     f = scene.friction
-    recursion = f.law == "nonlocal" and f.reading == "stretch" and f.order == 1
+    recursion = has(f.law, "bonds") and not listed(f)
     if side == "lower" and (shear or not recursion):
         what = shear if shear else f"law '{f.law}' other than the stretch reading with order = 1"
         raise PatchfemError(f"{scene.path}: pressure on the lower piece with {what} in the rig: not yet built; "
                             "put the shapes on the upper piece")
-    if shear and f.law == "nonlocal" and not recursion:
+    if shear and listed(f):
         raise PatchfemError(f"{scene.path}: {shear} with order = {f.order:g}: not yet built; use order = 1")

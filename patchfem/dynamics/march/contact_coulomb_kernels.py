@@ -1,4 +1,4 @@
-"""A contact of set-valued Coulomb friction: it holds or slides, without a slope.
+"""A contact, `contacts.Element`, of set-valued Coulomb friction: it holds or slides, without a slope.
 
 The functions are those that `loop_kernels` asks of every contact.
 """
@@ -7,10 +7,8 @@ from numba import njit
 
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import coulomb_kernels as law
-from .contact_element_kernels import Element
 
 SET_VALUED = True
-Contact = Element
 
 
 @njit(error_model="numpy", **LEAN)

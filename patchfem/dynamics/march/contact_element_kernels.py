@@ -1,11 +1,8 @@
-"""A contact with one slide and one law on it: elements side by side, a law of the speed, points that slide alike.
+"""A contact, `contacts.Element`, with one slide and one law on it: elements side by side, a law of the speed, points that slide alike.
 
 The functions are those that `loop_kernels` asks of every contact.
 """
 
-from typing import NamedTuple
-
-import numpy as np
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
@@ -13,20 +10,6 @@ from ...friction.laws import elastic_plastic_kernels as law
 from . import element_solve_kernels as solver
 
 SET_VALUED = False
-
-
-class Element(NamedTuple):
-    """num (1, k), mem (1, l) as the law has them; last (2,): the last two slide increments [m]; eps (1,): bond length of
-    the step [m]; bound (1,): largest force [N], infinite where none is."""
-
-    num: np.ndarray
-    mem: np.ndarray
-    last: np.ndarray
-    eps: np.ndarray
-    bound: np.ndarray
-
-
-Contact = Element
 
 
 @njit(error_model="numpy", **LEAN)

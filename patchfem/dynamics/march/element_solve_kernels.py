@@ -11,7 +11,8 @@ from ..modal_kernels import narrowed
 def solve_element(free, beta, num, mem, e, q, eps, dt, guess, bound, goal):
     """(dq, mean force, iterations) with dq = free - beta F(dq), |F| <= bound [N], infinite where nothing bounds it;
     iterations < 0 when it failed. goal [N]: of the residual over beta, besides the last digit of the slide."""
-    low, high = free - beta * bound, free + beta * bound
+    reach = 1.001 * beta * bound  # a contact that slides all the way lies inside, not on the edge
+    low, high = free - reach, free + reach
     dq, force = min(max(guess, low), high), 0.0
     for count in range(1, 200):
         force, slope = law.mean(num, mem, e, q, dq, eps, dt)
@@ -19,7 +20,7 @@ def solve_element(free, beta, num, mem, e, q, eps, dt, guess, bound, goal):
         digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(force))
         if abs(miss) <= goal * beta + digit:
             return dq, force, count
-        low, high, dq = narrowed(low, high, dq, miss, max(1 + beta * slope, 0.1), count)
+        low, high, dq = narrowed(low, high, dq, miss, max(1 + beta * slope, 0.1), count - 40)
         if high - low <= digit:
             return dq, force, count
     return dq, force, -200

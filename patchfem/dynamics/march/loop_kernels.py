@@ -5,36 +5,11 @@ which does exactly the work of the law: the sum of all energies never rises by i
 `hub` makes an instance per contact, of a module with solve, given, commit, state and hold as those named here.
 """
 
-from typing import NamedTuple
-
-import numpy as np
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import accelerations, free_slide, move, note, push_back, sample, stored, tell
 from . import contact_element_kernels as contact
-
-
-class Plant(NamedTuple):
-    """The modes, omega, damp = 2 zeta omega, slide, base, output (n,), damping (n, n) where it couples, else (0, 0);
-    their steps, arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the interface; mass [kg]; room (3, n)."""
-
-    omega: np.ndarray
-    damp: np.ndarray
-    slide: np.ndarray
-    base: np.ndarray
-    output: np.ndarray
-    damping: np.ndarray
-    free: np.ndarray
-    push: np.ndarray
-    dense: np.ndarray
-    reach: np.ndarray
-    loss: np.ndarray
-    dense_loss: np.ndarray
-    dt: float
-    beta: float
-    mass: float
-    room: np.ndarray
 
 
 @njit(error_model="numpy", cache=True, **LEAN)

@@ -1,27 +1,23 @@
 """The law object that a bench steps: one per value of friction.law."""
 
+from ...effects import has
 from ...model.law import bonds_of
 
 
 def law_for(scene, patch=None):
     """The NumPy law object of a bench; only an averaged law looks at the patch."""
-    from ...friction.bonds.quadrature import Quadrature
-    from ...friction.bonds.recursion import Recursion
-    from ...friction.laws.coulomb import Coulomb
-    from ...friction.laws.elastic_plastic import ElasticPlastic
-    from ...friction.laws.tanh import Rate
-
     f = scene.friction
-    if f.law == "coulomb":
-        return Coulomb(f.kinetic, f.static)
-    if f.law == "elastic-plastic":
-        return ElasticPlastic(f.static, f.bond_length)
-    if f.law == "tanh":
-        return Rate(f.static, f.reference_speed)
-    if f.law == "convolution":
+    if has(f.law, "averaged"):
         from .averaged import law_on
 
         return law_on(scene, patch)
+    if not has(f.law, "bonds"):
+        from ...friction.record import law_from
+
+        return law_from(f, patch.pressure.load if patch is not None else scene.normal.load)
+    from ...friction.bonds.quadrature import Quadrature
+    from ...friction.bonds.recursion import Recursion
+
     law = bonds_of(scene)
     engine = scene.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):

@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import ModalBasis, Outcome, Response
+from ...effects import has
 from ...model.accuracy import Settings
 from ...model.interfaces import yaws
 from ...model.structure import mode_stiffness, start_of
@@ -90,14 +91,14 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     if scene.friction is None:
         values.pop("friction_force_peak")
     else:
-        length = model.length or model.limit / max(float(np.sum(model.fields.get("stiffness", [0.0]))), 1e-300)
-        held = 1e-3 * length if model.kind else 1e-15 * peak_speed(drive) * drive.period
-        held *= scene.friction.law != "tanh"  # a law of the speed never holds
+        held = 1e-15 * peak_speed(drive) * drive.period if model.set_valued else 1e-3 * model.length
+        creeps = has(scene.friction.law, "creeps")  # it never holds, nor sticks
+        held *= not creeps
 
         def rubbing(part):
             others = {} if yaws(scene) else other_measures(part.window, drive, settings.steps)
             found = _rubbing(scene, settings, modes, drive, patch, part) | others
-            rigid = not model.kind and found["slip_amplitude"] < held  # what moves is round-off
+            rigid = model.set_valued and found["slip_amplitude"] < held  # what moves is round-off
             return {name: v for name, v in found.items() if not (rigid and name.startswith("equivalent_"))}
 
         whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
@@ -105,8 +106,8 @@ def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, s
     rings, own, stuck = {}, {}, False
     if scene.friction is not None:
         rings, own = run_events.rings(done.window, modes, drive, None, held)
-        stuck = run_events.all_stick(done.window, held) and scene.friction.law != "tanh"
-        if stuck and not model.kind:  # what moves in round-off does not slide
+        stuck = run_events.all_stick(done.window, held) and not creeps
+        if stuck and model.set_valued:  # what moves in round-off does not slide
             values["stick_fraction"] = 1.0
             for name in ("slip_start_phase", "equivalent_stiffness", "equivalent_damping"):
                 values.pop(name, None)

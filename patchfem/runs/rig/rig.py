@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome
+from ...effects import has, listed
+from ...friction.record import law_from
 from ...model.accuracy import MOST_STEPS, choose, refuse_costly
 from ...model.drive import drive_of, refuse_rest, speed_of
 from ...model.engine import COMPARED, set_valued
@@ -28,7 +30,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if start_of(scene, modes) is None:
         refuse_rest(scene, modes)
     extra = {"engine": settings.engine, "cycles": settings.cycles, "window": settings.window}
-    lumps = scene.friction is not None and scene.friction.law != "convolution"
+    lumps = scene.friction is not None and not has(scene.friction.law, "averaged")
     moves = acts(scene) or yaws(scene)
     if patch is not None and lumps and not scene.contact.gives_way and not settings.per_point and not moves:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
@@ -80,10 +82,10 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         fields = _rig_fields(scene, settings, patch, raw, drive)
     extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *warming(scene, patch, raw.response, raw.book["friction"])]
-    if scene.friction is not None and scene.friction.law == "tanh":
-        warnings = [*warnings, "law 'tanh' never holds: under a steady half of the limit it creeps at "
+    if scene.friction is not None and has(scene.friction.law, "creeps"):
+        warnings = [*warnings, f"law '{scene.friction.law}' never holds: under a steady half of the limit it creeps at "
                     f"{0.5493 * scene.friction.reference_speed:.3g} m/s"]
-    if scene.friction is not None and scene.friction.law == "nonlocal":
+    if scene.friction is not None and has(scene.friction.law, "bonds"):
         law = law_of(scene, speed_of(scene, drive))
         warnings = [*warnings, *unripe(law, float(np.abs(raw.window.slide_rate).max())),
                     *creeping(law, outcome, found)]
@@ -98,7 +100,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 
 def _shares(scene, patch, coarse) -> tuple:
     """Shares of mu N that limit a rigid block, on the mesh of the patch and on the coarser one, None where it is 1."""
-    if scene.friction is None or scene.friction.law != "convolution":
+    if scene.friction is None or not has(scene.friction.law, "averaged"):
         return 1.0, None
     from ..bench.averaged import limit_share
 
@@ -168,7 +170,7 @@ def _space_errors(scene, settings, modes, drive, patch, coarse, quarter, seconds
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
     shape = getattr(getattr(quarter.model, "reduction", None), "stiffness", None)
-    if shape is not None and (acts(scene) or (coarse[0] is not None and scene.friction.law == "nonlocal")):
+    if shape is not None and (acts(scene) or (coarse[0] is not None and has(scene.friction.law, "bonds"))):
         fewer = rig.run_march(scene, replace(few, shear_modes=max(1, shape.size // 2)), modes, drive, patch)
         out.append(change(quarter.values, fewer.values))
         seconds["error"] += fewer.seconds
@@ -187,7 +189,7 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // settings.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
-        if f is not None and f.law == "convolution":
+        if f is not None and has(f.law, "averaged"):
             from ..bench.averaged import limit_tractions
 
             tau = limit_tractions(scene, patch, raw.window.force[at])
@@ -196,11 +198,11 @@ def _rig_fields(scene, settings, patch, raw, drive) -> dict:
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
     shear = bool(scene.contact.gives_way)
-    if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or settings.per_point):
+    if has(f.law, "bonds") and not listed(f) and (shear or settings.per_point):
         law = law_of(scene, speed_of(scene, drive))
         tau, local = point_fields(patch, law, raw.model.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
-        length = f.bond_length if f.law == "elastic-plastic" else 0.0
+        length = 0.0 if raw.model.reduction is None else law_from(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
         tau, local = element_fields(patch, raw.model.reduction, states, length)
     else:

@@ -7,7 +7,7 @@ point, (5, m).
 
 from numba import njit
 
-from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step, rigid_mean, rigid_step
+from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step, rigid_step
 from ..flags_kernels import FAST, LEAN
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
@@ -29,10 +29,16 @@ def points(num, mem, e):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]; 0.3 ns per point."""
-    weight, source, bonds = points(num, mem, e)
+    """Path-mean force [N] and slope [N/m]; 0.3 ns per point, as all bonds together move like one point."""
     if num[e, FREE] == 0:
-        return rigid_mean(dq, weight, bonds, source, eps)
+        row, past, m = num[e], mem[e], int(num[e, 1])
+        density, stretch, pressure = 0.0, 0.0, 0.0
+        for j in range(m):
+            density += row[WEIGHT + j] * past[1 + j]
+            stretch += row[WEIGHT + j] * past[1 + m + j]
+            pressure += row[WEIGHT + j] * row[WEIGHT + m + j]
+        return bond_mean(density, stretch, dq, pressure, eps)
+    weight, source, bonds = points(num, mem, e)
     force, slope = 0.0, 0.0
     for j in range(weight.size):
         f, s = loose_mean(bonds[0, j], bonds[1, j], bonds[4, j], num[e, FREE] * eps, dq, source[j], eps)
