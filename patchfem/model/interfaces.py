@@ -8,6 +8,7 @@ from ..core import ModalBasis
 from ..scene.tables import Normal
 from .load import varies
 
+
 def viewed(scene, number: int = 0):
     """The scene as one interface sees it: the law and load of [[structure.interface]] `number` as [friction] and
     [normal]; the scene itself where it names none."""

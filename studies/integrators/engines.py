@@ -82,7 +82,7 @@ def problem(name: str) -> Problem:
     modes, drive = modes_of(given), drive_of(given)
     contact = contact_model(given, choose(given),
                                          solve_all(given, False)[0], drive)
-    k, y = contact.fields["stiffness"], contact.fields["limit"]
+    k, y = contact.element.numbers[2:].reshape(2, -1)
     numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
                "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}
     made = Problem(name, modes, drive, contact.limit, 20,

@@ -230,8 +230,8 @@ def law_of_model(model):
     if form == "speed":
         return OfSpeed(one)
     if model.set_valued:
-        raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction, as of law = \"coulomb\"; "
-                            "use the event map, or law = \"elastic-plastic\" with a short bond_length")
+        raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
+                            "law = \"elastic-plastic\" with a short bond_length")
     if form == "points" and one.numbers[2] < 0 and not one.numbers[7] and not one.kernels.endswith("lower_kernels"):
         return Stretch(model.limit, model.length)
     raise PatchfemError("accuracy.method: \"harmonic\" takes the stretch reading with order = 1, a constant bond "

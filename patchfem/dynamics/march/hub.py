@@ -1,6 +1,6 @@
 """The compiled loops by the contact that they meet: an instance of one text per contact and law.
 
-`loop_kernels` runs with any contact, `contact_element_kernels` and its solver with any law. A law passed to a compiled
+`loop_kernels` runs with any contact, `contacts.element_kernels` and its solver with any law. A law passed to a compiled
 function as an argument is never found on disk again, so `compiled.instance` writes the loop once per law instead.
 """
 
@@ -17,10 +17,10 @@ def contact_of(kind: tuple):
     """The compiled contact of a ContactModel's kind (contact, law)."""
     contact, law = kind
     if not law:
-        return compiled.load(f"{HERE}.{contact}")
+        return compiled.load(contact)
     law = compiled.load(law)
-    solver = compiled.instance(f"{HERE}.element_solve_kernels", {"law": law})
-    return compiled.instance(f"{HERE}.{contact}", {"law": law, "solver": solver})
+    solver = compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law})
+    return compiled.instance(contact, {"law": law, "solver": solver})
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 from ... import compiled
 from ...core import Response
 from ...friction.protocol import Element
-from . import contacts
+from ..contacts import arrays
 from .hub import HERE, contact_of
 from .march import GOAL, Run
 from .models import SET_VALUED, ContactModel, coulomb_model
@@ -54,15 +54,17 @@ class Joint:
 
 def cubic(port: int, stiffness: float) -> Joint:
     """Restoring force k_3 q^3 [N], k_3 [N/m3]."""
-    return Joint(port, Element(f"{HERE}.cubic_kernels", np.array([0.0, stiffness]), np.zeros(0), 0.0, 0.0, False),
-                 lambda q: 0.25 * stiffness * q**4)
+    return _spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
 
 
 def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
     """Restoring force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks."""
-    numbers, turn = np.array([0.0, stiffness, wavelength]), 2 * np.pi / wavelength
-    return Joint(port, Element(f"{HERE}.interlock_kernels", numbers, np.zeros(0), 0.0, 0.0, False),
-                 lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
+    turn = 2 * np.pi / wavelength
+    return _spring(port, [0.0, 0.0, stiffness, wavelength], lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
+
+
+def _spring(port: int, numbers, potential) -> Joint:
+    return Joint(port, Element(f"{HERE}.spring_kernels", np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
 
 
 def number_of(laws: tuple) -> dict:
@@ -90,7 +92,7 @@ def loop_of(laws: tuple, patch: tuple):
     """The loop with these laws and the contact of the patch, of this kind."""
     law = law_of(laws)
     parts = {"law": law, "patch": contact_of(patch),
-             "solver": compiled.instance(f"{HERE}.element_solve_kernels", {"law": law}),
+             "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
              "together": compiled.instance(f"{HERE}.joints_solve_kernels", {"law": law})}
     return compiled.instance(f"{HERE}.joints_kernels", parts)
 
@@ -150,7 +152,7 @@ class JointsModel:
         """(contact, None) of the patch; an idle point where there is none."""
         return (self.patch or coulomb_model(0.0, 0.0)).build()
 
-    def arrays(self, beta, give) -> contacts.Joints:
+    def arrays(self, beta, give) -> arrays.Joints:
         """Fresh arrays; beta (p, p), give (n,) [m/N]."""
         e, (p, n), numbers = len(self.joints), self.rows.shape, number_of(self.laws)
         elements = [one.element for one in self.joints]
@@ -161,10 +163,11 @@ class JointsModel:
             num[k, 0] = numbers[one.kernels or COULOMB]
         goal = [self.patch.limit if self.patch is not None else 1.0,
                 *(one.limit or max(self.scale, 1e-300) for one in elements)]
-        return contacts.Joints(
+        ports, rubs = (np.array(part, np.int64) for part in zip(*(
+            (one.port, one.potential is None) for one in self.joints)))
+        return arrays.Joints(
             np.array([self.patch is not None], np.int64), np.array(beta, float), np.ascontiguousarray(self.rows, float),
-            np.array([one.port for one in self.joints], np.int64), np.array([one.potential is None for one in self.joints], np.int64),
-            num, mem, np.array([one.limit if one.bounded else np.inf for one in elements]), GOAL * np.array(goal), give,
+            ports, rubs, num, mem, np.array([one.limit if one.bounded else np.inf for one in elements]), GOAL * np.array(goal), give,
             np.zeros((e, 2)), np.zeros(e), np.zeros(2), np.zeros(p), *np.zeros((5, e)), np.zeros((e, e)),
             np.zeros((3, n)), np.zeros((n, n)))
 

@@ -12,9 +12,9 @@ from numba import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws.coulomb_kernels import stick
+from ..contacts import coulomb_kernels as patch
+from ..contacts import element_solve_kernels as solver
 from ..modal_kernels import free_slide, move, note, sample, stored, tell
-from . import contact_coulomb_kernels as patch
-from . import element_solve_kernels as solver
 from . import joints_solve_kernels as together
 
 TURNS = 1000  # of all elements in a step before it counts as failed
@@ -67,8 +67,8 @@ def turned(e, turn, j, dt):
         tries = 1
     else:
         guess = 2 * j.last[e, 0] - j.last[e, 1] if turn == 0 else j.dq[e]
-        j.dq[e], used, tries = solver.solve_element(mine, beta, j.num, j.mem, e, j.q[e], j.eps[e], dt, guess, j.bound[e],
-                                                    0.1 * j.goal[1 + e])
+        j.dq[e], used, tries = solver.solve_element(mine, beta, j.num, j.mem, e, j.q[e], j.eps[e], dt, guess,
+                                                    j.bound[e], 0.1 * j.goal[1 + e])
     used = (mine - j.dq[e]) / beta
     change = abs(used - j.forces[e]) / (j.goal[1 + e] + ROUND * (abs(mine) / beta + abs(used)))
     j.forces[e] = used
@@ -77,8 +77,8 @@ def turned(e, turn, j, dt):
 
 @njit(error_model="numpy", **LEAN)
 def agreed(there, smooth, q, v, dt, c, j):
-    """Forces of patch and elements over a step, in j.own, j.forces and j.dq: (slide of the patch, iterations), < 0 where
-    they do not agree."""
+    """Forces of patch and elements over a step, in j.own, j.forces and j.dq: (slide of the patch, iterations), < 0
+    where they do not agree."""
     count, iterations, last_worst, worst, dq = j.ports.size, 0, np.inf, 0.0, 0.0
     for turn in range(TURNS):
         worst = 0.0
@@ -107,7 +107,7 @@ def agreed(there, smooth, q, v, dt, c, j):
 
 @njit(error_model="numpy", **LEAN)
 def held(i, there, dq, force, j, rows):
-    """Forces at the sample of what is set-valued: between two steps of stick the mean of both, else that of the step."""
+    """Forces at the sample of what is set-valued: between steps of stick the mean of both, else that of the step."""
     n, m = j.room.shape[1], 2 * j.room.shape[1] + 7
     for e in range(j.ports.size):
         if j.num[e, 0] == HOLDS:
@@ -157,7 +157,7 @@ def committed(there, q, v, dq, motion, plant, c, j):
 def march(first, steps, motion, plant, table, c, j, travel, ledger, rows):
     """March `steps` steps; arguments as `loop_kernels.march`.
 
-    c: arrays of the patch, which j, a `contacts.Joints`, says whether there is one on port 0. rows as of `march`, for the patch or
+    j: `contacts.arrays.Joints`, c: arrays of the patch on port 0, where there is one. rows as of `march`, for the patch or
     else the first element, then the friction work of the step that follows [J], then slide, speed, force and slip of
     every element; the energy in them is that of the friction alone. Returns (steps done, status).
     """

@@ -11,7 +11,7 @@ from numba import njit
 
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
-from .contact_shear_kernels import cholesky_solve
+from ..contacts.shear_kernels import cholesky_solve
 
 HOLDS = 0  # of num: the law that holds without a stretch
 

@@ -8,8 +8,8 @@ which does exactly the work of the law: the sum of all energies never rises by i
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
+from ..contacts import element_kernels as contact
 from ..modal_kernels import accelerations, free_slide, move, note, push_back, sample, stored, tell
-from . import contact_element_kernels as contact
 
 
 @njit(error_model="numpy", cache=True, **LEAN)

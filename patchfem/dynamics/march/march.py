@@ -277,8 +277,9 @@ class Run:
 
     def strained(self) -> float:
         """Energy stored in the interface [J]."""
-        rows, table = np.empty((1, 2 * self.modes.omega.size + 6)), np.zeros((1, 8 * self.modes.omega.size + 4))
-        self.hub.march(self.model.kind, 0, 0, self.state, self.plant, table, self.contact, 1.0, np.inf, np.zeros(9), rows)
+        rows = np.empty((1, 2 * self.modes.omega.size + 6))
+        self.hub.march(self.model.kind, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, 1.0, np.inf,
+                       np.zeros(9), rows)
         return float(rows[0, -1])
 
     def book(self) -> dict:

@@ -1,6 +1,6 @@
 """From a law under its load to the arrays of a contact in the compiled loops."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,16 +9,17 @@ from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
 from ...friction.laws.tanh import Rate
 from ...friction.protocol import Element
-from . import contacts
+from ..contacts import arrays
 
-SET_VALUED = "contact_coulomb_kernels"  # the contact without a slope
+HERE = "dynamics.contacts"
+SET_VALUED = f"{HERE}.coulomb_kernels"  # the contact without a slope
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
     """What the hub needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
 
-    contact: module of the compiled contact in this folder; law: that of the compiled law in it, "" where the contact
+    contact: module of the compiled contact; law: that of the compiled law in it, "" where the contact
     has none to choose; limit: friction limit [N]; fields: arrays of `tuple_of`;
     length: bond length for the stick criterion [m]; reduction: the JenkinsSet or ShearModes behind the arrays; element:
     the law of an Element.
@@ -31,7 +32,7 @@ class ContactModel:
     law: str = ""
     reduction: object = None
     element: Element | None = None
-    tuple_of: type = contacts.Element
+    tuple_of: type = arrays.Element
 
     @property
     def kind(self) -> tuple:
@@ -63,7 +64,7 @@ def element_model(element: Element, reduction=None) -> ContactModel:
     bound = element.limit if element.bounded else np.inf
     fields = {"num": element.numbers[None], "mem": element.memory[None], "last": np.zeros(2), "eps": np.zeros(1),
               "bound": [bound]}
-    contact = "contact_element_kernels" if element.kernels else SET_VALUED
+    contact = f"{HERE}.element_kernels" if element.kernels else SET_VALUED
     return ContactModel(contact, element.limit, fields, element.length, element.kernels, reduction, element)
 
 
@@ -104,7 +105,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
               "y": np.zeros(size), "out": np.zeros(size), "trial": np.zeros(size), "other": np.zeros(size),
               "scale": scale, "hess": np.zeros((size, size)), "points": np.zeros((3, area.size)),
               "last": np.zeros((2, size))}
-    return ContactModel("contact_shear_kernels", limit, fields, law.length, "", shear, None, contacts.Sheared)
+    return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 
 
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
@@ -118,4 +119,4 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
               "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
               "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law),
               "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
-    return ContactModel("contact_list_kernels", limit, fields, law.length, tuple_of=contacts.BondList)
+    return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)

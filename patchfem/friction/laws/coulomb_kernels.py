@@ -1,6 +1,6 @@
-"""Compiled set-valued Coulomb friction: the loops ask `stick` for its step, as it has no slope. Twin: `coulomb.Coulomb`.
+"""Compiled set-valued Coulomb friction: the loops ask `stick` for its step, as it has no slope.
 
-num: static, kinetic force [N]; mem: the last force [N].
+Twin: `coulomb.Coulomb`. num: static, kinetic force [N]; mem: the last force [N].
 """
 
 from numba import njit

@@ -7,7 +7,7 @@ point, (5, m).
 
 from numba import njit
 
-from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step, rigid_step
+from ..bonds.point_kernels import bond_mean, grow, loose_mean, loose_step, rigid_step
 from ..flags_kernels import FAST, LEAN
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin

@@ -1,8 +1,8 @@
 """Compiled bonds as in `stretch_kernels` under a pressure that stays on the lower piece.
 
 num: as there, with room for the pressures of the points, then the size p of the pattern, the places of the points (m,)
-[m], room (m,), places (p,) [m] and pressures (p,) [Pa] of the pattern. What forms under a point in a step has the mean of the
-pressures at the ends of its way; where none is left the bonds are lost.
+[m], room (m,), places (p,) [m] and pressures (p,) [Pa] of the pattern. What forms under a point in a step has the mean
+of the pressures at the ends of its way; where none is left the bonds are lost.
 """
 
 import numpy as np

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..tables import Friction
 from ...effects import has, takes, using
+from ..tables import Friction
 from .draft import LAWS, Draft, _needs
 
 if TYPE_CHECKING:

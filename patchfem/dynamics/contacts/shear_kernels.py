@@ -1,6 +1,6 @@
-"""A contact, `contacts.Sheared`, of bond points behind the shear modes of the pieces: xi_j = dq - sum_k psi_kj db_k.
+"""A contact, `arrays.Sheared`, of bond points behind the shear modes of the pieces: xi_j = dq - sum_k psi_kj db_k.
 
-The functions are those that `loop_kernels` asks of every contact.
+The functions are those that `march.loop_kernels` asks of every contact.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""A contact, `contacts.Element`, with one slide and one law on it: elements side by side, a law of the speed, points that slide alike.
+"""A contact, `arrays.Element`, with one slide and one law on it.
 
-The functions are those that `loop_kernels` asks of every contact.
+Such are elements side by side, a law of the speed, points that slide alike. The functions are those that `march.loop_kernels` asks of every contact.
 """
 
 from numba import njit
@@ -16,7 +16,8 @@ SET_VALUED = False
 def solve(free, beta, q, v, dt, c, goal):
     """(dq, path-mean force, iterations) of a step with dq = free - beta force; the memory stays as it is."""
     c.eps[0] = law.middle(c.num, c.mem, 0, v, dt)
-    return solver.solve_element(free, beta, c.num, c.mem, 0, q, c.eps[0], dt, 2 * c.last[0] - c.last[1], c.bound[0], goal)
+    guess = 2 * c.last[0] - c.last[1]
+    return solver.solve_element(free, beta, c.num, c.mem, 0, q, c.eps[0], dt, guess, c.bound[0], goal)
 
 
 @njit(error_model="numpy", **LEAN)

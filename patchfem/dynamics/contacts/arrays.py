@@ -6,8 +6,8 @@ import numpy as np
 
 
 class Element(NamedTuple):
-    """num (1, k), mem (1, l) as the law has them; last (2,): the last two slide increments [m]; eps (1,): bond length of
-    the step [m]; bound (1,): largest force [N], infinite where none is."""
+    """num (1, k), mem (1, l) as the law has them; last (2,): the last two slide increments [m]; eps (1,): bond length
+    of the step [m]; bound (1,): largest force [N], infinite where none is."""
 
     num: np.ndarray
     mem: np.ndarray

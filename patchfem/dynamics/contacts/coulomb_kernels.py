@@ -1,6 +1,6 @@
-"""A contact, `contacts.Element`, of set-valued Coulomb friction: it holds or slides, without a slope.
+"""A contact, `arrays.Element`, of set-valued Coulomb friction: it holds or slides, without a slope.
 
-The functions are those that `loop_kernels` asks of every contact.
+The functions are those that `march.loop_kernels` asks of every contact.
 """
 
 from numba import njit

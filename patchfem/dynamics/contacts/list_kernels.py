@@ -1,6 +1,6 @@
-"""A contact, `contacts.BondList`, of one shared list of bonds: force, solve without a slope, commit, energy book.
+"""A contact, `arrays.BondList`, of one shared list of bonds: force, solve without a slope, commit, energy book.
 
-The functions are those that `loop_kernels` asks of every contact.
+The functions are those that `march.loop_kernels` asks of every contact.
 """
 
 import numpy as np
