@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from ..core import NotConverged, PatchfemError
+from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from ..runs.plan import plan
@@ -35,7 +36,7 @@ def knobs_of(model: Model) -> list:
         engine = plan(model).engine
         if engine in ("march", "bench"):
             out.append("steps_per_cycle")
-            if model.soft and model.friction.law == "nonlocal":
+            if model.soft and has(model.friction.law, "bonds"):
                 out.append("shear_modes")
     return out
 

@@ -6,6 +6,7 @@ from math import sqrt
 import numpy as np
 
 from ..core import Missing
+from ..effects import has
 from ..structure.drive_sizes import fastest, omega_of, sinusoidal
 from .engine import COMPARED, engine_of, unique_steps
 from .model import Model
@@ -74,7 +75,7 @@ def list_cost(model: Model, numerics: Numerics) -> tuple:
 def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
     """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = model.friction
-    if f is None or f.law != "nonlocal" or quadrature_of(model, numerics).engine == "recursion":
+    if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
         return
     entries, seconds = list_cost(model, numerics)
     if seconds > limit:

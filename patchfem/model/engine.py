@@ -3,6 +3,7 @@
 from math import ceil, sqrt
 
 from ..core import PatchfemError
+from ..effects import LAWS, has, listed
 from .model import Model
 
 COMPARED = ("duhamel", "newmark", "euler")
@@ -36,7 +37,7 @@ def no_closed_form(model: Model, steady: bool = False) -> str:
     waveform."""
     rig, soft = model.rig, model.soft
     laws = [one.numbers.law for one in rig.interfaces]
-    if odd := [law for law in laws if law not in ("coulomb", "convolution")]:
+    if odd := [law for law in laws if "exact" not in LAWS[law].carries.split()]:
         return f"for law '{odd[0]}'{f' with {soft}' if soft else ''}"
     if soft and laws:
         return f"with {soft}"
@@ -57,14 +58,14 @@ def set_valued(model: Model, numerics) -> bool:
     """Whether a march meets Coulomb's law as it stands: without the give of pieces, skin or holder."""
     laws, patch = [one.numbers.law for one in model.rig.interfaces], model.patch
     gives = patch is not None and bool(patch.gives_way or patch.slide_spring)
-    return numerics.engine == "march" and not gives and ("coulomb" in laws or "convolution" in laws)
+    return numerics.engine == "march" and not gives and any(has(law, "set-valued") for law in laws)
 
 
 def unique_steps(model: Model) -> int:
     """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
     dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
     f, modes = model.friction, model.rig.modes
-    if f is None or f.law != "nonlocal" or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
+    if f is None or not has(f.law, "bonds") or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
         return 0
     load = model.nominal_load
     stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
@@ -73,10 +74,10 @@ def unique_steps(model: Model) -> int:
 
 def _refuse(model: Model) -> None:
     f, soft, lower = model.friction, model.soft, model.side == "lower"
-    recursion = f.law == "nonlocal" and f.reading == "stretch" and f.order == 1
+    recursion = has(f.law, "bonds") and not listed(f)
     if lower and (soft or not recursion):
         what = soft if soft else f"law '{f.law}' other than the stretch reading with order = 1"
         raise PatchfemError(f"pressure on the lower piece with {what} in the rig: not yet built; put the shapes on the "
                             "upper piece", "")
-    if soft and f.law == "nonlocal" and not recursion:
+    if soft and listed(f):
         raise PatchfemError(f"{soft} with order = {f.order:g}: not yet built; use order = 1", "")

@@ -80,7 +80,7 @@ def problem(name: str) -> Problem:
     model = build(scene.load(HERE / "patch.toml"))
     modes, drive = model.rig.modes, model.rig.drive
     contact = contact_model(model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0])
-    k, y = contact.fields["stiffness"], contact.fields["limit"]
+    k, y = contact.element.numbers[2:].reshape(2, -1)
     numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
                "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}
     made = Problem(name, modes, drive, contact.limit, 20,

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome, PatchfemError
+from ...effects import has, listed
+from ...friction.record import law_from
 from ...model.accuracy import MOST_STEPS, choose, refuse_costly
 from ...model.engine import COMPARED, set_valued
 from ...response.errors import change, step_error, with_errors
@@ -24,7 +26,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         raise PatchfemError("the drive pushes no mode, so nothing moves; give a mode its share of it, base or output",
                             "drive.kind")
     extra = {"engine": numerics.engine, "cycles": numerics.cycles, "window": numerics.window}
-    lumps = f is not None and f.law != "convolution"
+    lumps = f is not None and not has(f.law, "averaged")
     moves = rig.load_varies or rig.strips_slide_apart
     if patch is not None and lumps and not model.soft and not numerics.per_point and not moves:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
@@ -67,10 +69,10 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 def _said(model, patch, raw, outcome, found) -> list:
     """Warnings of the law and of the load, in this run."""
     f, out = model.friction, warming(model, patch, raw.response, raw.book["friction"])
-    if f is not None and f.law == "tanh":
-        out = [*out, "law 'tanh' never holds: under a steady half of the limit it creeps at "
+    if f is not None and has(f.law, "creeps"):
+        out = [*out, f"law '{f.law}' never holds: under a steady half of the limit it creeps at "
                f"{0.5493 * f.reference_speed:.3g} m/s"]
-    if f is not None and f.law == "nonlocal":
+    if f is not None and has(f.law, "bonds"):
         law = model.bonds
         out = [*out, *unripe(law, float(np.abs(raw.window.slide_rate).max())), *creeping(law, outcome, found)]
     out = [*out, *created_warning(model, raw.book, model.rig.cycles)]
@@ -102,7 +104,7 @@ def _exact(model, numerics, patch, coarse, seconds, say, progress) -> tuple:
 
 def _shares(model, patch, coarse) -> tuple:
     """Shares of mu N that limit a rigid block, on the mesh of the patch and on the coarser one, None where it is 1."""
-    if model.friction is None or model.friction.law != "convolution":
+    if model.friction is None or not has(model.friction.law, "averaged"):
         return 1.0, None
     from ..bench.averaged import limit_share
 
@@ -170,7 +172,7 @@ def _space_errors(model, numerics, patch, coarse, quarter, seconds) -> list:
         out.append(change(quarter.values, rough.values))
         seconds["error"] += rough.seconds
     shape = getattr(getattr(quarter.contact, "reduction", None), "stiffness", None)
-    if shape is not None and (model.rig.load_varies or (coarse[0] is not None and model.friction.law == "nonlocal")):
+    if shape is not None and (model.rig.load_varies or (coarse[0] is not None and has(model.friction.law, "bonds"))):
         fewer = run_march(model, replace(few, shear_modes=max(1, shape.size // 2)), patch)
         out.append(change(quarter.values, fewer.values))
         seconds["error"] += fewer.seconds
@@ -189,7 +191,7 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
-        if f is not None and f.law == "convolution":
+        if f is not None and has(f.law, "averaged"):
             from ..bench.averaged import limit_tractions
 
             tau = limit_tractions(model, patch, raw.window.force[at])
@@ -198,10 +200,10 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
-    if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or numerics.per_point):
+    if has(f.law, "bonds") and not listed(f) and (shear or numerics.per_point):
         tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
-        length = f.bond_length if f.law == "elastic-plastic" else 0.0
+        length = 0.0 if raw.model.reduction is None else law_from(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
         tau, local = element_fields(patch, raw.contact.reduction, states, length)
     else:

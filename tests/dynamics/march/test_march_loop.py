@@ -7,7 +7,7 @@ from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome
-from patchfem.dynamics.march.march import GOAL, march, modes_arrays, steps_arrays
+from patchfem.dynamics.march.march import GOAL, march, plant_of
 from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
@@ -249,22 +249,25 @@ def release(basis, model, start, steps_per_cycle, count):
     hub = load_kernels()
     drive = BaseSine(0.0, basis.omega[0])
     prop = propagator(basis, drive, steps_per_cycle)
-    contact, work = model.build(hub)
+    contact, _ = model.build(hub)
     state = np.zeros((2, basis.omega.size))
     state[0] = start
-    modes, steps, table = modes_arrays(basis, hub), steps_arrays(prop, hub), prop.tables(drive, 0, 1)
-    held, ledger, rows = np.zeros(1), np.zeros(9), np.zeros((2, 2 * basis.omega.size + 6))
+    plant, table = plant_of(basis, prop), prop.tables(drive, 0, 1)
+    ledger, rows = np.zeros(9), np.zeros((2, 2 * basis.omega.size + 6))
 
     def energy():
         out = 0.5 * basis.mass * np.sum(state[1]**2 + (basis.omega * state[0])**2)
-        if model.kind == hub.JENKINS:
-            return out + 0.5 * contact.stiffness @ contact.stretch**2
-        return out + 0.5 * contact.weight @ contact.bonds[2] + 0.5 * contact.kappa @ contact.b**2
+        memory = model.shown(contact)
+        if "stretch" in memory:
+            return out + 0.5 * model.element.numbers[2:2 + memory["stretch"].size] @ memory["stretch"]**2
+        weight = contact.weight if "b" in memory else model.element.numbers[8:8 + memory["bonds"].shape[1]]
+        pieces = 0.5 * contact.kappa @ contact.b**2 if "b" in memory else 0.0
+        return out + 0.5 * weight @ memory["bonds"][2] + pieces
 
     history = [energy()]
     for _ in range(count):
-        done, status = hub.march(0, 1, state, held, modes, steps, table, basis.mass, model.kind, False, contact, work,
-                                 GOAL * model.limit, np.inf, ledger, rows)
+        done, status = hub.march(model.kind, 0, 1, state, plant, table, contact, GOAL * model.limit, np.inf, ledger,
+                                 rows)
         assert (done, status) == (1, 0)
         history.append(energy())
     assert ledger[7] == 0
