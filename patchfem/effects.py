@@ -57,8 +57,8 @@ EFFECTS = {
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
                               "joints varying-load harmonic comparison", "creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
-                                         "reversal)", ("bond_length", ""), "shear joints varying-load harmonic comparison",
-                                         "timeless"),
+                                         "reversal)", ("bond_length", ""),
+                                         "shear joints varying-load harmonic comparison", "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
                                    "initial_bonds breakaway spread temperature"),

@@ -1,6 +1,7 @@
 """A contact, `arrays.Element`, with one slide and one law on it.
 
-Such are elements side by side, a law of the speed, points that slide alike. The functions are those that `march.loop_kernels` asks of every contact.
+Such are elements side by side, a law of the speed, points that slide alike. The functions are those that
+`march.loop_kernels` asks of every contact.
 """
 
 from numba import njit

@@ -60,7 +60,8 @@ def cubic(port: int, stiffness: float) -> Joint:
 def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
     """Restoring force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks."""
     turn = 2 * np.pi / wavelength
-    return _spring(port, [0.0, 0.0, stiffness, wavelength], lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
+    return _spring(port, [0.0, 0.0, stiffness, wavelength],
+                   lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
 
 
 def _spring(port: int, numbers, potential) -> Joint:
@@ -101,13 +102,15 @@ def loop_of(laws: tuple, patch: tuple):
 class JointsModel:
     """A patch (ContactModel on port 0, or None) and joints; rows (p, n): slide of every port per coordinate.
 
-    scale [N]: force against which residuals of springs count.
+    scale [N]: force against which residuals of springs count; also: modules of compiled laws that the loop knows
+    besides those of the joints, so that models of several sets of laws share one loop.
     """
 
     patch: ContactModel | None
     joints: tuple
     rows: np.ndarray
     scale: float
+    also: tuple = ()
 
     @property
     def limit(self) -> float:
@@ -132,7 +135,7 @@ class JointsModel:
     @property
     def laws(self) -> tuple:
         """Modules of the compiled laws, each once."""
-        return tuple(sorted({one.element.kernels or COULOMB for one in self.joints}))
+        return tuple(sorted({*self.also, *(one.element.kernels or COULOMB for one in self.joints)}))
 
     @property
     def kind(self) -> tuple:
@@ -167,7 +170,8 @@ class JointsModel:
             (one.port, one.potential is None) for one in self.joints)))
         return arrays.Joints(
             np.array([self.patch is not None], np.int64), np.array(beta, float), np.ascontiguousarray(self.rows, float),
-            ports, rubs, num, mem, np.array([one.limit if one.bounded else np.inf for one in elements]), GOAL * np.array(goal), give,
+            ports, rubs, num, mem, np.array([one.limit if one.bounded else np.inf for one in elements]),
+            GOAL * np.array(goal), give,
             np.zeros((e, 2)), np.zeros(e), np.zeros(2), np.zeros(p), *np.zeros((5, e)), np.zeros((e, e)),
             np.zeros((3, n)), np.zeros((n, n)))
 

@@ -157,7 +157,7 @@ def committed(there, q, v, dq, motion, plant, c, j):
 def march(first, steps, motion, plant, table, c, j, travel, ledger, rows):
     """March `steps` steps; arguments as `loop_kernels.march`.
 
-    j: `contacts.arrays.Joints`, c: arrays of the patch on port 0, where there is one. rows as of `march`, for the patch or
+    j: `arrays.Joints`, c: arrays of the patch on port 0, where there is one. rows as of `march`, for the patch or
     else the first element, then the friction work of the step that follows [J], then slide, speed, force and slip of
     every element; the energy in them is that of the friction alone. Returns (steps done, status).
     """

@@ -42,6 +42,9 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
                       shape[0], mass, None, rows, shapes=shape)
 
 
+ALL = tuple(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh"))
+
+
 def coulomb(port, static, kinetic):
     return Joint(port, Coulomb(kinetic, static).element(1.0))
 
@@ -178,8 +181,8 @@ def test_always_energy_closes_and_friction_only_takes(seed):
               "tanh": lambda p: rate(p, limit[p], length[p])}
     elements = [makers[kind](p) for p, kind in enumerate(kinds)]
     elements += [cubic(0, rng.uniform(0, 3)), interlock(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5))]
-    got = march(modes, BaseSine(1.0, rng.uniform(0.3, 3.0)), JointsModel(None, tuple(elements), modes.interfaces, 1.0),
-                5, int(rng.integers(20, 120)))
+    got = march(modes, BaseSine(1.0, rng.uniform(0.3, 3.0)), JointsModel(None, tuple(elements), modes.interfaces, 1.0,
+                                                                             ALL), 5, int(rng.integers(20, 120)))
     assert got.outcome is None, got.message
     book = got.ledger
     miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
