@@ -19,10 +19,10 @@ from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tan
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.one_mode import sdof, sdof_kernels
 from patchfem.dynamics.one_mode.sdof_samples import position
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 from patchfem.structure.drives import release
 

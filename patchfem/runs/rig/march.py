@@ -16,13 +16,6 @@ from .solution import Solution, sampled_loop, seen
 from .strips import joined, other_measures
 
 
-def sampled(values: dict) -> dict:
-    """Errors of measures of strips that are read off 400 samples a cycle, by the trapezoidal rule."""
-    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
-    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
-            else 1e-9 * abs(value) for name, value in values.items()}
-
-
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One march at numerics.steps per cycle; patch: the solved Patch or None."""
     from ...dynamics.march import march as hub
