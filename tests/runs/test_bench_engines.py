@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from patchfem.scene.scene import loads
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
@@ -19,6 +18,7 @@ from patchfem.runs.bench.watch import BLOCK, UNWATCHED, Watch
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
+from patchfem.scene.scene import loads
 
 POINT = '[normal]\nload = "100 N"\n'
 PATCH = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "100 N"\n'
