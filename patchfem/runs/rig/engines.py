@@ -121,8 +121,8 @@ def sampled(values: dict) -> dict:
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The mesh, where the loads of strips or the limit of an averaged law come from it. Strips that slide apart are read
-    off 400 samples a cycle besides, by the trapezoidal rule."""
+    """The mesh, where the loads of strips or the limit of an averaged law come from it. Strips that slide apart are
+    read off 400 samples a cycle besides, by the trapezoidal rule."""
     averaged = model.friction is not None and has(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
     samples = [Rung((), sampled)] if model.rig.strips_slide_apart else []
