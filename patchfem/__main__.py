@@ -34,14 +34,20 @@ def _scene(path: Path, sets):
     return load(path, sets)
 
 
+def _model(path: Path, sets):
+    from .model.model import build
+
+    return build(_scene(path, sets))
+
+
 @app.command
 def check(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(name="--json", negative=())] = False):
     """Name every mistake in SCENE and in the path it slides along; compute nothing."""
     found = _scene(scene, set_)
     if found.slide is not None and found.slide.file is not None:
-        from .model.slide import file_corners
+        from .model.slide import slide_asked
 
-        file_corners(found)
+        slide_asked(found)
     for remark in found.remarks:
         say(f"{scene}: {remark}")
     if json_:
@@ -57,14 +63,15 @@ def plan(scene: Path, /, *, set_: Sets = (), json_: Annotated[bool, Parameter(na
     from .runs.plan import plan as make
 
     found = make(_scene(scene, set_))
-    answer = found.as_json()
-    if probe and found.scene.contact is not None:
+    answer, asked = found.as_json(), found.model.patch
+    if probe and asked is not None:
+        from .model.source import placed
         from .runs.patch.ladder import solve_all
         from .runs.patch.values import values
 
-        solved = values(solve_all(found.scene, False)[0])
-        answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] \
-            if found.scene.contact.shear is not None else "rigid"
+        with placed(found.model.source):
+            solved = values(solve_all(asked, found.model.accuracy.tolerance, False)[0])
+        answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"
         answer["probe"] = solved
     if json_:
         print(json.dumps(answer))
@@ -98,15 +105,14 @@ def run(scene: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--
     """Run SCENE and write its results folder, by default out/<scene name>; --fresh ignores kept operators."""
     if resume:
         raise Refused("run: --resume is not yet built; run the scene again")
-    found = _scene(scene, set_)
     from .export.folder import run_into
     from .runs.plan import plan as make
 
     talk = (lambda text: None) if quiet else say
-    what = make(found)
+    what = make(_scene(scene, set_))
     if verbose:
         talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
-    target = out if out is not None else Path("out") / found.path.stem
+    target = out if out is not None else Path("out") / what.model.source.path.stem
     with _progress(quiet or json_) as progress:
         answer = run_into(what, target, talk, progress, fresh)
     if json_:
@@ -158,20 +164,21 @@ def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
 @app.command
 def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], set_: Sets = ()):
     """Write the tagged mesh of SCENE as .msh or .vtu."""
-    found = _scene(scene, set_)
-    if found.contact is None:
+    found = _model(scene, set_)
+    if found.patch is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from .mesh.files import write_mesh
-    from .model.accuracy import chosen_mesh
     from .model.pieces import bodies_of
+    from .model.source import placed
 
-    if chosen_mesh(found):
-        from .runs.patch.ladder import solve_all
+    with placed(found.source):
+        if found.patch.chosen:
+            from .runs.patch.ladder import solve_all
 
-        pair = solve_all(found)[0].pair
-        low, high = pair.grid, None if pair.upper is pair.piece else pair.upper_grid
-    else:
-        low, high = bodies_of(found)
+            pair = solve_all(found.patch, found.accuracy.tolerance)[0].pair
+            low, high = pair.grid, None if pair.upper is pair.piece else pair.upper_grid
+        else:
+            low, high = bodies_of(found.patch)
     write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
         print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")
@@ -184,7 +191,7 @@ def cost(scene: Path, /, *, over: str = "", out: Annotated[Path | None, Paramete
     """Error against time of SCENE for a knob (--over element_size, steps_per_cycle, shear_modes), or for all it has."""
     from .campaigns.cost import KNOBS, cheapest, curve, knobs_of, turned_by
 
-    found = _scene(scene, set_)
+    found = _model(scene, set_)
     if over and over not in KNOBS:
         raise Refused(f"cost --over {over}: the knobs are {', '.join(KNOBS)}; others are not yet built")
     knobs = [over] if over else knobs_of(found)
@@ -192,7 +199,7 @@ def cost(scene: Path, /, *, over: str = "", out: Annotated[Path | None, Paramete
         raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
     from .export.cost import write
 
-    target, answer = out if out is not None else Path("out") / f"{found.path.stem}-cost", {}
+    target, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}
     for knob in knobs:
         runs = curve(found, knob, None if quiet else say)
         names = [name for name in MAIN if name in turned_by(runs)]
@@ -254,7 +261,7 @@ def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float
 @app.command
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
     """Write the fields of a results folder as .pvd (series), .vtu or .csv (last or --frame), or .vtkhdf."""
-    from .export.vtu import export as write
+    from .export.fields.vtu import export as write
 
     print(write(folder, out, frame))
 
@@ -263,7 +270,7 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out
 def view(folder: Path, /, *, out: Annotated[Path | None, Parameter(name=["-o", "--out"])] = None,
          frame: int | None = None, magnify: float | None = None):
     """Show the pressed pieces of a results folder in a window, or draw them into -o PICTURE.png."""
-    from .export.view import view as show
+    from .export.fields.view import view as show
 
     show(folder, out, frame, magnify, say)
 

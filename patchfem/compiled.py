@@ -111,8 +111,3 @@ def _prepared(say=None) -> Path:
 
     numba.config.CACHE_DIR = str(folder)
     return folder
-
-
-def load_kernels(say=None):
-    """The hub of the march, `dynamics.march.hub`."""
-    return load("dynamics.march.hub", say)

@@ -46,9 +46,17 @@ _SENTENCES = {
 
 
 class PatchfemError(Exception):
-    """A named failure a person can act on; `code` is the exit code of the command line."""
+    """A named failure a person can act on; `code` is the exit code of the command line.
+
+    key: the key of the scene at fault, whose file and line `model.source.placed` puts before the text; "" for the scene
+    as a whole, None where the text says it all.
+    """
 
     code = 2
+
+    def __init__(self, text: str = "", key: str | None = None):
+        super().__init__(text)
+        self.key = key
 
 
 class NotConverged(PatchfemError):

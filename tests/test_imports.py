@@ -7,36 +7,10 @@ from time import perf_counter
 
 import pytest
 from command_line import FROM_PYTHON, MODULES, absent, loaded
-from scene_texts import STRUCTURE
+from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
-PATCH = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-element_size = "0.5 mm"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-[contact.tilt]
-angle = "0.1 mrad"
-"""
-POINT = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "coulomb"
-static = 0.3
-"""
-BENCH = POINT + """\
-[slide]
-kind = "triangle"
-amplitude = "10 um"
-speed = "5 mm/s"
-"""
+PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 FROM_SHELL = f"""\
 import sys
 from patchfem.__main__ import main
@@ -78,20 +52,20 @@ def test_exact_an_effect_brings_its_own_module(scene, table, module):
 
 
 def test_exact_a_rubbing_point_needs_no_patch(scene):
-    modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE))
+    modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled")
-    assert {"patchfem.dynamics.events.events", "patchfem.structure.modes"} <= modules
+    assert {"patchfem.dynamics.one_mode.sdof", "patchfem.structure.modes"} <= modules
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
     """One mode, one sine, one point: no masses, files, springs, wrench, other drives, other engines."""
-    modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE))
+    modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
            "dynamics.comparison.newmark",
            "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
-           "dynamics.events.steady", "dynamics.events.steady_events",
+           "dynamics.one_mode.steady", "dynamics.events.steady_events",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load", "runs.rig.comparison",
            "runs.rig.steady", "dynamics.harmonic.balance", "contact.atlas", "inputs.signals")
@@ -105,7 +79,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
     ('[accuracy]\nmethod = "harmonic"\n', "dynamics.events.steady_events"),
 ], ids=["stiffening", "bonded", "newmark", "harmonic"])
 def test_exact_a_rig_brings_what_it_names(scene, lines, module):
-    modules = loaded(FROM_PYTHON, scene(POINT + STRUCTURE + lines))
+    modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE + lines))
     assert f"patchfem.{module}" in modules
     others = {"dynamics.march.joints", "structure.bonded", "dynamics.comparison.newmark",
               "dynamics.events.steady_events"} - {module}
@@ -116,7 +90,7 @@ def test_exact_a_linear_structure_needs_no_patch_and_no_loop(scene):
     modules = loaded(FROM_PYTHON, scene(STRUCTURE))
     absent(modules, "contact", "mesh", "skfem", "runs.patch.press", "dynamics.march.march",
            "dynamics.march.loop_kernels", "compiled")
-    assert "patchfem.dynamics.events.events" in modules
+    assert "patchfem.dynamics.one_mode.sdof" in modules
 
 
 def test_exact_a_bench_needs_no_structure(scene):
@@ -127,7 +101,7 @@ def test_exact_a_bench_needs_no_structure(scene):
     assert "patchfem.friction.laws.elastic_plastic" in modules
 
 
-@pytest.mark.parametrize("text", [POINT + STRUCTURE, STRUCTURE, BENCH], ids=["rig", "linear", "bench"])
+@pytest.mark.parametrize("text", [POINT + COULOMB + STRUCTURE, STRUCTURE, BENCH], ids=["rig", "linear", "bench"])
 def test_exact_results_without_a_patch_need_no_mesh(scene, tmp_path, text):
     modules = loaded(FROM_SHELL, "run", scene(text), "-o", tmp_path / "out", "-q")
     absent(modules, "contact", "mesh", "skfem")

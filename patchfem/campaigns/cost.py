@@ -4,7 +4,9 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from ..core import NotConverged, PatchfemError
-from ..model.pieces import AUTOMATIC_CELLS
+from ..effects import has
+from ..model.model import Model
+from ..model.source import placed
 from ..runs.plan import plan
 from ..runs.run import run
 
@@ -27,34 +29,39 @@ class Cost:
     units: dict
 
 
-def knobs_of(scene) -> list:
-    """Knobs that change what a scene computes."""
-    out = ["element_size"] if scene.contact is not None else []
-    if scene.kind in ("bench", "rig") or (scene.kind == "linear" and scene.accuracy.method == "march"):
-        engine = plan(scene).engine
+def knobs_of(model: Model) -> list:
+    """Knobs that change what a model computes."""
+    out = ["element_size"] if model.patch is not None else []
+    if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
+        engine = plan(model).engine
         if engine in ("march", "bench"):
             out.append("steps_per_cycle")
-            if scene.contact is not None and scene.contact.gives_way and scene.friction.law == "nonlocal":
+            if model.soft and has(model.friction.law, "bonds"):
                 out.append("shear_modes")
     return out
 
 
-def curve(scene, knob: str, say=None) -> list:
+def curve(model: Model, knob: str, say=None) -> list:
     """Cost of every value of a knob, coarse to fine; a static patch ends with the mesh that its tolerance chooses.
 
     PatchfemError for a knob that this scene does not have.
     """
-    mine = knobs_of(scene)
+    with placed(model.source):
+        return _curve(model, knob, say)
+
+
+def _curve(model: Model, knob: str, say) -> list:
+    mine = knobs_of(model)
     if knob not in mine:
-        raise PatchfemError(f"{scene.path}: cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}")
-    wanted = list(_turned(scene, knob))
+        raise PatchfemError(f"cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}", "")
+    wanted = list(_turned(model, knob))
     _timed(wanted[0][2], "first run, not counted", wanted[0][1], None)  # imports and compiling stay out of the times
     runs = [_timed(turned, label, value, say) for label, value, turned in wanted]
     runs = [one for one in runs if one is not None]
     if len(runs) < 3:
-        raise PatchfemError(f"{scene.path}: cost --over {knob}: fewer than three values could be run")
-    if knob == "element_size" and scene.kind == "patch" and scene.contact.mesh is None:
-        chosen = _timed(_sized(scene, None), "by tolerance", None, say, True)
+        raise PatchfemError(f"cost --over {knob}: fewer than three values could be run", "")
+    if knob == "element_size" and model.kind == "patch" and model.patch.mesh is None:
+        chosen = _timed(_sized(model, None), "by tolerance", None, say, True)
         if chosen is not None:
             return [*(_beside(one, chosen) for one in runs), chosen]
     from ..runs.patch.measures import remainder
@@ -70,43 +77,43 @@ def _beside(one: Cost, best: Cost) -> Cost:
                                 if name in best.values})
 
 
-def _turned(scene, knob: str):
-    """(label, value, scene) for every value of a knob, coarse to fine."""
-    if knob == "element_size" and scene.contact.mesh is not None:
+def _turned(model: Model, knob: str):
+    """(label, value, (model, halvings of the file)) for every value of a knob, coarse to fine."""
+    if knob == "element_size" and model.patch.mesh is not None:
         for level in range(3):
-            yield f"file split {2**level} x", float(2**-level), (scene, level)
+            yield f"file split {2**level} x", float(2**-level), (model, level)
         return
     if knob == "element_size":
-        length = scene.contact.length
-        middle = round(length / (scene.contact.element_size or length / AUTOMATIC_CELLS))
+        length = model.patch.length
+        middle = round(length / model.patch.size)
         for power in range(-3, LEVELS - 3):
             cells = round(middle * 2.0**power)
             if 8 <= cells <= MOST_CELLS:
-                yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(scene, length / cells), 0)
+                yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(model, length / cells), 0)
         return
     from ..model.accuracy import choose
 
-    now = getattr(scene.accuracy, knob) or (choose(scene).steps if knob == "steps_per_cycle" and scene.kind == "rig"
+    now = getattr(model.accuracy, knob) or (choose(model).steps if knob == "steps_per_cycle" and model.kind == "rig"
                                             else {"steps_per_cycle": 400, "shear_modes": 8}[knob])
     for power in range(-2, LEVELS - 2):
         value = max(1, round(now * 2.0**power))
         if knob == "shear_modes" or 4 <= value <= MOST_STEPS:
-            accuracy = scene.accuracy.model_copy(update={knob: value})
-            yield str(value), float(value), (replace(scene, accuracy=accuracy), 0)
+            accuracy = model.accuracy.model_copy(update={knob: value})
+            yield str(value), float(value), (replace(model, accuracy=accuracy), 0)
 
 
-def _sized(scene, size):
-    return replace(scene, contact=scene.contact.model_copy(update={"element_size": size}))
+def _sized(model: Model, size: float | None) -> Model:
+    return replace(model, patch=model.patch.sized(size, model.kind))
 
 
 def _timed(turned, label: str, value, say, estimate: bool = False):
-    scene, level = turned if isinstance(turned, tuple) else (turned, 0)
+    model, level = turned if isinstance(turned, tuple) else (turned, 0)
     begin = perf_counter()
     try:
-        if level or (scene.kind == "patch" and scene.contact.mesh is not None):
-            (values, units), errors = _split_file(scene, level), {}
+        if level or (model.kind == "patch" and model.patch.mesh is not None):
+            (values, units), errors = _split_file(model, level), {}
         else:
-            found = run(plan(scene), estimate=estimate, fresh=True).measures
+            found = run(plan(model), estimate=estimate, fresh=True).measures
             values = {name: m.value for name, m in found.items() if m.value is not None}
             errors = {name: m.error for name, m in found.items() if m.error is not None} if estimate else {}
             units = {name: m.unit for name, m in found.items()}
@@ -120,7 +127,7 @@ def _timed(turned, label: str, value, say, estimate: bool = False):
     return Cost(label, value, seconds, values, errors, units)
 
 
-def _split_file(scene, level: int) -> tuple:
+def _split_file(model: Model, level: int) -> tuple:
     """Static measures on the mesh of a file with every edge halved `level` times."""
     from ..mesh.anymesh import halved
     from ..mesh.tensor import TensorGrid, finer
@@ -128,11 +135,11 @@ def _split_file(scene, level: int) -> tuple:
     from ..runs.patch.press import solve
     from ..runs.patch.values import UNITS, values
 
-    low, high = bodies_of(scene)
+    low, high = bodies_of(model.patch)
     for _ in range(level):
         low, high = (None if body is None else finer(body) if isinstance(body, TensorGrid) else halved(body)
                      for body in (low, high))
-    return values(solve(scene, low, high, True)), UNITS
+    return values(solve(model.patch, low, high, True)), UNITS
 
 
 def turned_by(runs: list) -> list:

@@ -7,13 +7,14 @@ from time import perf_counter
 import numpy as np
 
 from ..core import NotConverged, Outcome, PatchfemError
+from ..effects import has
 from ..identify.least_squares import Fit, fit
 from ..identify.words import remarks
 from ..inputs.loops import Loop, read_loop
 from ..scene.quantities import KINDS
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
-from .fit_model import Model
+from .fit_model import BenchModel
 
 MOST_PIECES = 64  # steps between two rows
 LOAD_UNITS = {"time": KINDS["time"], "displacement": KINDS["length"],
@@ -67,7 +68,7 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
     if used <= len(wanted):
         raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(wanted)} values and their "
                             "intervals")
-    bench = Model(scene, loop, wanted, say)
+    bench = BenchModel(scene, loop, wanted, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
     def residual(values):
@@ -142,7 +143,7 @@ def _doubts(loop: Loop, miss, held, rms: float, step_error: float, scene: Scene)
         if tied > 0.3:
             out.append(f"the residual is correlated from row to row ({tied:.2f}): the law misses something, and the "
                        "intervals, which take rows as independent, are too narrow")
-    if abs(loop.reading[0]) > 0.2 * peak and scene.friction.law not in ("coulomb", "tanh") and not held[0]:
+    if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0]:
         out.append(f"the first row carries {abs(loop.reading[0]) / peak:.0%} of the peak, where the model starts "
                    "unstressed: hold the first cycle out or begin the record at rest")
     if step_error > scene.accuracy.tolerance * peak:

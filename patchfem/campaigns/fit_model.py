@@ -3,11 +3,14 @@
 import numpy as np
 
 from ..core import Outcome, PatchfemError
+from ..effects import has
 from ..inputs.loops import Loop
+from ..model.model import Model, build
+from ..model.source import placed
 from ..scene.scene import Scene, SceneError, loads
 
 
-class Model:
+class BenchModel:
     """The bench of a scene along the measured rows, as a function of the free values."""
 
     def __init__(self, scene: Scene, loop: Loop, wanted: list, say):
@@ -15,15 +18,16 @@ class Model:
         self.notes, self.sets, law = [], [], scene.friction
         self.time = self._paced()
         named = {one.key for one in wanted}
-        if law.law == "nonlocal" and law.rest_growth is not None and law.rest_speed is None \
+        sums = has(law.law, "bonds")
+        if sums and law.rest_growth is not None and law.rest_speed is None \
                 and "friction.rest_speed" not in named:
             speed = 1e-3 * float(np.abs(np.diff(loop.displacement) / np.diff(self.time)).max())
             self.sets.append(f"friction.rest_speed={speed!r} m/s")
         self._note_amplitude()
-        self.instant = law.law in ("coulomb", "tanh")
+        self.instant = has(law.law, "memoryless") and not has(law.law, "averaged")
         soft = scene.contact is not None and scene.contact.gives_way
-        steady = law.law != "nonlocal" or (law.rest_growth is None and (law.reading == "report" or law.order == 1))
-        self.exact = steady and not (soft and law.law == "nonlocal") and not self._on_lower()
+        steady = not sums or (law.rest_growth is None and (law.reading == "report" or law.order == 1))
+        self.exact = steady and not (soft and sums) and not self._on_lower()
         steps, legs = scene.accuracy.steps_per_cycle, loop.reading.size - 1
         self.pinned = steps is not None
         self.pieces = max(1, -(-steps // legs)) if self.pinned and not self.exact else 1
@@ -32,17 +36,23 @@ class Model:
 
     def __call__(self, values) -> np.ndarray:
         """(k,) reading at the rows; PatchfemError where the values make no scene."""
-        from ..runs.bench import bench as law_bench
-
-        scene = self.scene_at(values)
+        model = build(self.scene_at(values))
         self.made += 1
-        patch = self._patch(scene)
+        with placed(model.source):
+            return self._reading(model)
+
+    def _reading(self, model: Model) -> np.ndarray:
+        from ..runs.bench import bench as law_bench
+        from ..runs.bench.engine import smooth_sum_of
+        from ..runs.bench.watch import Watch
+
+        patch = self._patch(model)
         corner = np.arange(self.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
         path = np.interp(number, corner, self.time), np.interp(number, corner, self.loop.displacement), 0, 0.0
-        run = law_bench.run(scene, patch, 4, 0, self.say, path)
+        run = law_bench.run(model, patch, 4, 0, path, Watch(smooth_sum_of(model, path[1]), self.say))
         if not run.load[0] > 0:
-            raise PatchfemError(f"{scene.path}: no load presses the pieces")
+            raise PatchfemError("no load presses the pieces", "")
         out = run.force[corner]
         if self.instant:  # a row stands between two straight legs: the mean of both sides
             after = run.force[np.minimum(corner + 1, number[-1])]
@@ -58,15 +68,15 @@ class Model:
             self.refused = self.refused or error
             raise PatchfemError(error.mistakes[0]) from None
 
-    def _patch(self, scene):
-        if scene.contact is None:
+    def _patch(self, model: Model):
+        if model.patch is None:
             return None
         if self.patch is None or self.moving:
             from ..runs.patch.ladder import solve_all
 
-            self.patch = solve_all(scene, False)[0]
+            self.patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
             if self.patch.pressure.outcome is Outcome.NO_CONTACT:
-                raise PatchfemError(f"{scene.path}: {self.patch.pressure.outcome.sentence}")
+                raise PatchfemError(self.patch.pressure.outcome.sentence, "")
         return self.patch
 
     def _on_lower(self) -> bool:
@@ -82,7 +92,7 @@ class Model:
         if loop.time is not None:
             return loop.time
         law, slide = scene.friction, scene.slide
-        aged = law.law == "tanh" or (law.law == "nonlocal" and law.rest_growth is not None)
+        aged = law.rest_growth is not None if has(law.law, "bonds") else not has(law.law, "timeless")
         if not aged and not (scene.normal is not None and scene.normal.amplitude):
             self.notes.append(f"{loop.path} has no time: its rows are taken as even in time, which law '{law.law}' "
                               "does not feel")

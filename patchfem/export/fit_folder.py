@@ -8,14 +8,13 @@ import numpy as np
 from .. import __version__
 from ..campaigns.fit import Fitted
 from ..identify.least_squares import Fit
+from ..model.model import build, resolved
 from ..scene.ranges import Range
 from ..scene.scene import loads
 
 
 def fitted_scene(fitted: Fitted, folder: Path) -> str:
     """The fitted scene in SI with every default, its paths relative to `folder`; a comment says what was fitted."""
-    from .folder import resolved
-
     scene, moved = fitted.scene, []
     profile = scene.contact.profile if scene.contact is not None else None
     for key, file in (("contact.mesh", scene.contact and scene.contact.mesh),
@@ -25,8 +24,9 @@ def fitted_scene(fitted: Fitted, folder: Path) -> str:
             moved.append(f"{key}={Path(os.path.relpath(scene.beside(file), folder)).as_posix()}")
     told = [f"# {one.key} fitted to {fitted.loop.path.name}: {value!r} {one.unit}" + _bar(ends) for one, value, ends in
             zip(fitted.free, fitted.found.values.tolist(), fitted.found.intervals.tolist())]
-    found = loads(scene.text, folder / "scene.fitted.toml", [*scene.sets, *fitted.sets, *moved])
-    return "\n".join(told) + "\n\n" + resolved(found)
+    sets = [*scene.sets, *fitted.sets]
+    model = build(loads(scene.text, scene.path, sets))  # its files are where they were; `folder` may not be there yet
+    return "\n".join(told) + "\n\n" + resolved(loads(scene.text, folder / "scene.fitted.toml", [*sets, *moved]), model)
 
 
 def _bar(ends) -> str:

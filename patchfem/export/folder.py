@@ -1,7 +1,6 @@
 """A finished run on disk: summary, netCDF, fields, resolved scene and report in one results folder."""
 
 import sys
-from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
@@ -10,9 +9,10 @@ import numpy as np
 
 from .. import __version__
 from ..effects import EFFECTS
-from ..model.accuracy import chosen_mesh
+from ..model.structure import motions
 from ..runs.result import Result
 from ..runs.run import run
+from ..structure.drive_sizes import largest
 from .results import Folder
 from .summary import summary, write_json
 
@@ -34,8 +34,8 @@ def versions() -> dict:
 def summary_of(result: Result) -> dict:
     """The object of summary.json."""
     what = result.plan
-    return summary(__version__, what.scene.title, what.kind, str(result.outcome), result.measures, effects_of(result),
-                   list(what.not_in_scene), result.warnings, result.seconds)
+    return summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
+                   effects_of(result), list(what.not_in_scene), result.warnings, result.seconds)
 
 
 def effects_of(result: Result) -> list:
@@ -67,12 +67,12 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False) -
 def write(result: Result, path: Path) -> dict:
     """Write every file of a run into the folder `path`; the summary."""
     begin = perf_counter()
-    text = resolved(result.plan.scene)
+    text = result.plan.model.source.resolved
     (path / "scene.resolved.toml").write_text(text, encoding="utf-8")
     _write_netcdf(result, path / "result.nc", text)
     data = report_data(result)
     if result.patch is not None:
-        from .bodies import write_fields
+        from .fields.bodies import write_fields
 
         drawn = write_fields(result, path / "fields.vtkhdf")
         data |= {"bodies": drawn} if drawn else {}
@@ -84,28 +84,6 @@ def write(result: Result, path: Path) -> dict:
     answer = summary_of(result)
     write_json(answer, path / "summary.json")
     return answer
-
-
-def resolved(scene) -> str:
-    """The scene in SI with every default written out, also those that follow from other keys."""
-    contact, friction = scene.contact, scene.friction
-    free = contact is not None and contact.element_size is None and contact.mesh is None
-    if free and not chosen_mesh(scene):
-        from ..model.pieces import AUTOMATIC_CELLS
-
-        contact = contact.model_copy(update={"element_size": contact.length / AUTOMATIC_CELLS})
-    if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
-        if scene.kind == "bench":
-            from ..model.law import bonds_of
-
-            law = bonds_of(scene)
-        else:
-            from ..model.drive import drive_of, speed_of
-            from ..model.law import law_of
-
-            law = law_of(scene, speed_of(scene, drive_of(scene)))
-        friction = friction.model_copy(update={"rest_speed": law.rest_speed})
-    return replace(scene, contact=contact, friction=friction).resolved()
 
 
 def _histories(result: Result) -> tuple:
@@ -122,33 +100,25 @@ def _histories(result: Result) -> tuple:
            "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
     if kind == "rig" and "ledger" in r.extra:
         out |= dict(zip(LEDGER, r.extra["ledger"]))
-    if result.plan.scene.structure.interface:
+    rig = result.plan.model.rig
+    if rig.names:
         out |= _between(result)
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
-    from ..model.structure import modes_of, motions
-
-    modes = modes_of(result.plan.scene)
-    return out, (list(modes.names), motions(modes, r.modal))
+    return out, (list(rig.modes.names), motions(rig.modes, r.modal))
 
 
 def _between(result: Result) -> dict:
     """Histories (i, k) of the interfaces of a rig of masses, those of its output beside them."""
-    r, scene = result.response, result.plan.scene
+    r = result.response
     columns = {"relative_displacement": ("slides", r.slide), "relative_velocity": ("slide_rates", r.slide_rate),
                "friction_force": ("forces", r.force)}
-    loads = np.array([one.load for one in scene.structure.interface])
+    loads = np.array([one.load for one in result.plan.model.rig.interfaces])
     return {"output_displacement": r.output, "output_velocity": r.output_rate,
             "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
             **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
                for name, (many, one) in columns.items()}}
-
-
-def interface_names(scene) -> list:
-    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
-    found = [] if scene.structure is None else [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
-    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]
 
 
 def _write_netcdf(result: Result, path: Path, text: str) -> None:
@@ -160,7 +130,8 @@ def _write_netcdf(result: Result, path: Path, text: str) -> None:
     fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
     strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
     levels = _levels(extra["levels"]) if "levels" in extra else None
-    names = interface_names(result.plan.scene) if histories else []
+    rig = result.plan.model.rig
+    names = list(rig.names) if histories and rig is not None else []
     data = netcdf.dataset(histories, modal, fields, x, weight, strips, levels, names)
     if "events" in extra:
         from ..response.events import MEANINGS
@@ -182,21 +153,22 @@ def _multiplier(extra: dict) -> float:
 def _levels(levels) -> dict:
     """Columns of a run in levels: the drive, whether it held, every measure and its error."""
     from ..response.levels import KEPT
-    from ..response.measures import UNITS
+    from ..response.rows import TABLE
 
     out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
            "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
     for name in KEPT:
         if any(name in one.values for one in levels):
-            out[f"level_{name}"] = (UNITS[name], np.array([one.values.get(name, np.nan) for one in levels]))
-            out[f"level_{name}_error"] = (UNITS[name], np.array([one.errors.get(name, np.nan) for one in levels]))
+            out[f"level_{name}"] = (TABLE[name].unit, np.array([one.values.get(name, np.nan) for one in levels]))
+            out[f"level_{name}_error"] = (TABLE[name].unit, np.array([one.errors.get(name, np.nan) for one in levels]))
     return out
 
 
 def report_data(result: Result) -> dict:
     """Plain arrays and texts for the report page."""
-    scene, r, w = result.plan.scene, result.response, result.window
-    data = {"name": scene.path.stem, "summary": summary_of(result), "scene": scene.text, "resolved": resolved(scene),
+    model, r, w = result.plan.model, result.response, result.window
+    source = model.source
+    data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": source.resolved,
             "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
             "x": None if result.patch is None else result.patch.x, "versions": versions()}
     if "curve" in result.extra:
@@ -214,15 +186,13 @@ def report_data(result: Result) -> dict:
             data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
                               "base": w.base_acceleration, "force": w.force, "slide": w.slide}
             data["loop"] |= {"period": result.extra["period"]}
-    if scene.measured is not None:
+    if model.measured is not None:
         from ..inputs.measured import read_table
 
-        table = read_table(scene.beside(scene.measured.file))
-        data["measured"] = {"rows": table, "frequency": scene.drive.frequency if scene.drive else None,
-                            "gain": scene.measured.acceleration_gain}
-        if scene.drive is not None:
-            from ..model.drive import drive_of
-            from ..structure.drive_sizes import largest
-
-            data["measured"]["input"] = largest(drive_of(scene))
+        path, gain = model.measured
+        rig = model.rig
+        data["measured"] = {"rows": read_table(path), "frequency": rig.frequency if rig is not None else None,
+                            "gain": gain}
+        if rig is not None:
+            data["measured"]["input"] = largest(rig.drive)
     return data

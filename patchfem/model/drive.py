@@ -4,16 +4,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core import BaseSine, ModalBasis, PatchfemError
-from ..structure.drive_sizes import own_period, peak_speed
-from .structure import modes_of, start_of
+from ..core import BaseSine, ModalBasis
+from ..structure.drive_sizes import own_period
 
 
-def drive_of(scene, modes: ModalBasis | None = None):
+def drive_of(scene, modes: ModalBasis):
     """The drive of [drive]; a displacement amplitude X of the base gives the acceleration X omega^2, a force F over the
     modal mass F/m. `modes` gives the cycle of what has no frequency of its own."""
     drive = scene.drive
-    modes = modes_of(scene) if modes is None else modes
     if drive.kind == "free":
         from ..structure.drives import release
 
@@ -87,15 +85,3 @@ def _read(path, name: str, _changed: int) -> tuple:
     from ..inputs.signals import read_signal
 
     return read_signal(path, name)
-
-
-def refuse_rest(scene, modes: ModalBasis) -> None:
-    """PatchfemError where nothing moves: a drive that pushes no mode."""
-    if scene.drive.kind != "free" and not np.any(modes.base):
-        raise PatchfemError(f"{scene.where('drive.kind')}: the drive pushes no mode, so nothing moves; give a mode its "
-                            "share of it, base or output")
-
-
-def speed_of(scene, drive) -> float:
-    """Size of the speeds to expect [m/s]: sets the default floor of the speed in the growth of bonds."""
-    return peak_speed(drive, start_of(scene, modes_of(scene)))

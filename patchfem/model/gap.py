@@ -1,36 +1,68 @@
-"""The gap between the unloaded pieces: the sum of the shapes that a scene names."""
+"""The gap between the unloaded pieces: the sum of the shapes that a scene names.
 
+A shape is one row of SHAPES: its table in [contact] and its height from the places x and the keys of that table.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from ..contact.gaps import crown, step, tilt
 from ..core import PatchfemError
+from ..scene.tables import Contact
 
 SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: crown(x, part.radius),
           "step": lambda x, part: step(x, part.height, part.at)}
 
 
-def gap_of(scene, x) -> tuple:
-    """((m,) gap of the unloaded surfaces [m], notes, seconds by shape): the sum of what the scene names."""
-    gap, seconds, notes = np.zeros(x.size), {}, ()
-    for name, shape in SHAPES.items():
-        part = getattr(scene.contact, name)
-        if part is not None:
+@dataclass(frozen=True, eq=False, slots=True)
+class Gap:
+    """shapes: (name, keys of its table) each; profile: path of measured heights or None, which stand for content down
+    to profile_size [m], None: of the mesh's own cells; rough: asperities stand for what is finer; side: the piece that
+    carries the shapes, "upper" or "lower"."""
+
+    shapes: tuple
+    profile: Path | None
+    profile_size: float | None
+    rough: bool
+    side: str
+
+    @property
+    def angle(self) -> float:
+        """Angle [rad] at which a tilted upper piece is held."""
+        return next((part.angle for name, part in self.shapes if name == "tilt" and self.side == "upper"), 0.0)
+
+    def at(self, x) -> tuple:
+        """((m,) gap of the unloaded surfaces [m] at x (m,) [m], notes, seconds by shape)."""
+        gap, seconds, notes = np.zeros(x.size), {}, ()
+        for name, part in self.shapes:
             begin = perf_counter()
-            gap = gap + shape(x, part)
+            gap = gap + SHAPES[name](x, part)
             seconds[name] = perf_counter() - begin
-    if scene.contact.profile is not None:
-        from .profile import profile_gap
+        if self.profile is not None:
+            from .profile import profile_gap
 
-        begin = perf_counter()
-        heights, notes = profile_gap(scene, x)
-        gap = gap + heights
-        seconds["profile"] = perf_counter() - begin
-    return gap, notes, seconds
+            begin = perf_counter()
+            heights, notes = profile_gap(self.profile, x, self.profile_size, self.rough)
+            gap = gap + heights
+            seconds["profile"] = perf_counter() - begin
+        return gap, notes, seconds
 
 
-def shape_side(contact) -> str:
+def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
+    """The shapes of [contact]; size [m]: of the elements, None: those of a mesh file; beside(name) -> path of a file.
+
+    PatchfemError where the shapes lie on different pieces.
+    """
+    shapes = tuple((name, getattr(contact, name)) for name in SHAPES if getattr(contact, name) is not None)
+    profile = contact.profile
+    return Gap(shapes, beside(profile.file) if profile is not None else None, size, contact.asperities is not None,
+               shape_side(contact))
+
+
+def shape_side(contact: Contact) -> str:
     """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
     sides = {part.on for part in (contact.tilt, contact.crown, contact.step, contact.profile) if part is not None}
     if len(sides) > 1:

@@ -1,19 +1,44 @@
-"""The friction numbers that act: those of a scene at its surface temperature (2.13) and spread over its pad (2.15)."""
+"""The law of every interface with its numbers as they act: at a surface temperature (2.13) and over a pad (2.15)."""
 
-from dataclasses import replace
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..core import PatchfemError
-from ..friction.bonds.parameters import Bonds
-from .slide import peak_speed
+
+if TYPE_CHECKING:
+    from ..friction.bonds.parameters import Bonds
 
 
-def acting(scene):
-    """The scene with the effects that only change numbers of [friction] worked in: rest_growth and slip_growth at
-    friction.temperature, static and kinetic times the pad's share of friction.spread. The scene itself where it names
-    neither. PatchfemError where a rate leaves the range of numbers."""
-    f = scene.friction
+@dataclass(frozen=True, eq=False, slots=True)
+class Rubbing:
+    """One interface and its law. key: of its table, for messages; numbers: keys of the law as they act; load: normal
+    load [N] of an interface between masses, None where the patch or the point of the model carries it."""
+
+    key: str
+    numbers: object
+    load: float | None
+
+    def limits(self, load: float) -> tuple:
+        """(static, kinetic) friction force [N] under a load [N]."""
+        return limits_of(self.numbers, load)
+
+
+def limits_of(f, load: float) -> tuple:
+    """(static, kinetic) friction force [N] of the keys of a law under a load [N]."""
+    return f.static * load, (f.kinetic if f.kinetic is not None else f.static) * load
+
+
+def acting(f, width: float | None, where):
+    """The keys of a law with the effects that only change its numbers worked in: rest_growth and slip_growth at
+    friction.temperature, static and kinetic times the pad's share of friction.spread.
+
+    width [m]: of the contact across the path. where(key) -> place of a key. PatchfemError where a rate leaves the range
+    of numbers.
+    """
     if f is None or (f.temperature is None and f.spread is None):
-        return scene
+        return f
     new = {"temperature": None, "spread": None}
     if f.temperature is not None and f.rest_growth is not None:
         from ..friction.bonds.temperature import growth_at
@@ -23,31 +48,42 @@ def acting(scene):
             new["rest_growth"], new["slip_growth"] = growth_at(f.rest_growth, f.slip_growth, t.surface, t.reference,
                                                                t.rest_activation, t.slip_activation)
         except PatchfemError as error:
-            raise PatchfemError(f"{scene.where('friction.temperature')}: {error}") from None
+            raise PatchfemError(f"{where('friction.temperature')}: {error}") from None
     if f.spread is not None:
         from ..friction.bonds.spread import pad_factor
 
-        share = pad_factor(pad_width(scene), f.spread)
+        share = pad_factor(width, f.spread)
         new |= {"static": f.static * share, "kinetic": None if f.kinetic is None else f.kinetic * share}
-    return replace(scene, friction=f.model_copy(update=new))
+    return f.model_copy(update=new)
 
 
-def pad_width(scene) -> float:
+def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
+    """Bond parameters of the keys of a law; v_h defaults to 1e-3 of the peak speed [m/s], but not below `least`."""
+    from ..friction.bonds.parameters import Bonds
+
+    ratio = f.kinetic / f.static if f.static > 0 else 1.0
+    return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
+                 f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)
+
+
+def rubbings_of(scene) -> tuple:
+    """A Rubbing for every interface of a rig: those of [[structure.interface]], or [friction]; none without either."""
+    if scene.structure.interface:
+        return tuple(Rubbing(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
+                     for k, one in enumerate(scene.structure.interface))
+    if scene.friction is None:
+        return ()
+    return (Rubbing("friction", acting(scene.friction, pad_width(scene), scene.where), None),)
+
+
+def pad_width(scene) -> float | None:
     """Width of the contact across the path [m]; strips share it."""
-    return scene.contact.width if scene.contact is not None else scene.normal.width
+    if scene.contact is not None:
+        return scene.contact.width
+    return scene.normal.width if scene.normal is not None else None
 
 
-def bonds_of(scene) -> Bonds:
-    """Bond parameters of a bench scene; v_h defaults to 1e-3 of the peak speed."""
-    f = acting(scene).friction
-    ratio = f.kinetic / f.static if f.static > 0 else 1.0
-    return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
-                 f.rest_speed or 1e-3 * peak_speed(scene), f.initial_bonds, f.breakaway)
-
-
-def law_of(scene, speed: float) -> Bonds:
-    """Bond law of [friction]; `speed` [m/s] sets the default floor v_h = 1e-3 of the peak speed."""
-    f = acting(scene).friction
-    ratio = f.kinetic / f.static if f.static > 0 else 1.0
-    return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
-                 f.rest_speed or max(1e-3 * speed, 1e-12), f.initial_bonds, f.breakaway)
+def interface_names(scene) -> list:
+    """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
+    found = [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]

@@ -1,57 +1,58 @@
-"""The load of [normal] in time, N = max(0, load + amplitude cos(2 pi f t + phase)), and a bench's samples under it."""
+"""The load of [normal]: constant or N = max(0, load + amplitude cos(2 pi f t + phase)), and a bench's samples of it."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core import Missing
+from .slide import SlidePath
 
 MOST_SAMPLES = 5_000_000
 
 
-def varies(scene) -> bool:
-    """Whether the scene names a load that changes in time."""
-    return scene.normal is not None and bool(scene.normal.amplitude)
+@dataclass(frozen=True, slots=True)
+class PointLoad:
+    """A load on one point: load [N], amplitude [N] of its oscillation or 0, frequency [Hz], phase [rad]; width [m]
+    across the path or None."""
+
+    load: float
+    amplitude: float = 0.0
+    frequency: float | None = None
+    phase: float = 0.0
+    width: float | None = None
+
+    def at(self, time) -> np.ndarray:
+        """Load (k,) [N] at the times (k,) [s]."""
+        load = self.load + self.amplitude * np.cos(2 * np.pi * self.frequency * np.asarray(time) + self.phase)
+        return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)  # round-off carries nothing
+
+    def refined(self, slide: SlidePath, time, place, steps: int) -> tuple:
+        """(time, slide) with samples fine enough for the load as well: `steps` per period of it, its extremes, and the
+        instants at which the contact is lost or made. Missing where that is too many."""
+        period, span = 1 / self.frequency, time[-1] - time[0]
+        if span / period * steps + time.size > MOST_SAMPLES:
+            raise Missing(f"the load makes {span / period:.3g} periods during the slide, more than {MOST_SAMPLES} "
+                          "samples resolve; lower normal.frequency, slide.cycles or slide.hold", "")
+        lag = self.phase / (2 * np.pi)
+        marks = np.arange(np.floor(time[0] / period + lag) - 1, time[-1] / period + lag + 2)
+        inner = [marks[:, None] + np.arange(steps) / steps]
+        if self.amplitude > self.load:
+            edge = np.arccos(-self.load / self.amplitude) / (2 * np.pi)
+            inner += [marks[:, None] + np.array([edge, 1 - edge])]
+        extra = (np.concatenate([part.ravel() for part in inner]) - lag) * period
+        grid = np.union1d(time, extra[(extra > time[0]) & (extra < time[-1])])
+        kept = np.append(True, np.diff(grid) > 1e-9 * period) | np.isin(grid, time)
+        grid = grid[kept]
+        if slide.kind == "sine":
+            return grid, slide.amplitude * np.sin(2 * np.pi * slide.frequency * grid)
+        return grid, np.interp(grid, time, place)
 
 
-def load_at(scene, time) -> np.ndarray:
-    """Load (k,) [N] at the times (k,) [s]."""
+def point_asked(scene) -> PointLoad | None:
+    """The load of [normal], or of the first [[structure.interface]]; None where a patch carries it or nothing does."""
+    if scene.structure is not None and scene.structure.interface:
+        return PointLoad(scene.structure.interface[0].load)
     normal = scene.normal
-    wave = np.cos(2 * np.pi * normal.frequency * np.asarray(time) + (normal.phase or 0.0))
-    load = normal.load + normal.amplitude * wave
-    return np.where(load > 1e-12 * (normal.load + normal.amplitude), load, 0.0)  # round-off carries nothing
-
-
-def refined(scene, time, slide, steps: int) -> tuple:
-    """(time, slide) with samples fine enough for the load as well: `steps` per period of it, its extremes, and the
-    instants at which the contact is lost or made. Missing where that is too many."""
-    normal, period = scene.normal, 1 / scene.normal.frequency
-    span = time[-1] - time[0]
-    if span / period * steps + time.size > MOST_SAMPLES:
-        raise Missing(f"{scene.path}: the load makes {span / period:.3g} periods during the slide, more than "
-                      f"{MOST_SAMPLES} samples resolve; lower normal.frequency, slide.cycles or slide.hold")
-    lag = (normal.phase or 0.0) / (2 * np.pi)
-    marks = np.arange(np.floor(time[0] / period + lag) - 1, time[-1] / period + lag + 2)
-    inner = [marks[:, None] + np.arange(steps) / steps]
-    if normal.amplitude > normal.load:
-        edge = np.arccos(-normal.load / normal.amplitude) / (2 * np.pi)
-        inner += [marks[:, None] + np.array([edge, 1 - edge])]
-    extra = (np.concatenate([part.ravel() for part in inner]) - lag) * period
-    grid = np.union1d(time, extra[(extra > time[0]) & (extra < time[-1])])
-    kept = np.append(True, np.diff(grid) > 1e-9 * period) | np.isin(grid, time)
-    grid = grid[kept]
-    if scene.slide.kind == "sine":
-        return grid, scene.slide.amplitude * np.sin(2 * np.pi * scene.slide.frequency * grid)
-    return grid, np.interp(grid, time, slide)
-
-
-def spring_of(contact) -> float:
-    """Rotational stiffness of the holder [N m/rad], 0 where none is named."""
-    return (contact.holder.rotational_stiffness or 0.0) if contact.holder is not None else 0.0
-
-
-def moment_of(contact) -> float | None:
-    """Moment of the load about the middle of the patch [N m], None where the rotation is held."""
-    if contact.load_line is None:
-        return 0.0 if spring_of(contact) > 0 else None
-    if contact.load_line.moment is not None:
-        return contact.load_line.moment
-    return contact.load * contact.load_line.offset
+    if normal is None:
+        return None
+    return PointLoad(normal.load, normal.amplitude or 0.0, normal.frequency, normal.phase or 0.0, normal.width)

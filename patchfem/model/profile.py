@@ -1,6 +1,7 @@
-"""A measured profile of a scene as its share of the gap."""
+"""A measured profile as its share of the gap."""
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -14,12 +15,13 @@ from ..surface.trace import read_trace
 NOISE = 1e-10  # m: heights below it are digits
 
 
-def profile_gap(scene, x) -> tuple:
-    """((m,) heights of the scene's profile at the nodes x (m,) [m], notes): levelled, without spikes, averaged over the
-    nodes' cells, from the lowest on, where flat pieces touch first. PatchfemError where too much of it is finer than
-    the mesh and no asperities stand for it."""
-    contact = scene.contact
-    path = scene.beside(contact.profile.file)
+def profile_gap(path: Path, x, asked: float | None, rough: bool) -> tuple:
+    """((m,) heights of the profile in a file at the nodes x (m,) [m], notes): levelled, without spikes, averaged over
+    the nodes' cells, from the lowest on, where flat pieces touch first.
+
+    asked [m]: element size that decides what a profile may hold, None: that of the nodes; rough: asperities stand for
+    what is finer. PatchfemError where too much of it is finer than the mesh and no asperities stand for it.
+    """
     stamp = path.stat().st_mtime_ns if path.exists() else 0
     size = float(np.diff(x).max())
     whole = cleaned(placed(_read(path, stamp), x), 2 * size)
@@ -30,21 +32,12 @@ def profile_gap(scene, x) -> tuple:
         notes = (*notes, f"{trace.source}: levelled, a slope of {slope:.3g} rad is taken out; a tilt belongs in "
                          "[contact.tilt]")
     noise = np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z))  # what levelling leaves of a straight line
-    if not noise and (said := too_fine(trace, asked_size(contact, size))) is not None:
-        if contact.asperities is None:
-            raise PatchfemError(f"{scene.where('contact.profile.file')}: {said}")
+    if not noise and (said := too_fine(trace, size if asked is None else asked)) is not None:
+        if not rough:
+            raise PatchfemError(said, "contact.profile.file")
         notes = (*notes, said.partition(": add")[0] + ": that is averaged out and left to the law of the asperities")
     heights = on_nodes(trace, x)
     return heights - heights.min(), notes
-
-
-def asked_size(contact, size: float) -> float:
-    """Element size [m] that decides what a profile may hold: the scene's own, not that of a coarser comparison mesh."""
-    from .pieces import AUTOMATIC_CELLS
-
-    if contact.mesh is not None:
-        return size
-    return contact.element_size or contact.length / AUTOMATIC_CELLS
 
 
 @lru_cache(maxsize=4)

@@ -35,8 +35,6 @@ def modes_of(scene) -> ModalBasis:
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
     """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
-    from .interfaces import strip_rows, yaws
-
     if not yaws(scene):
         return found
     count, width = scene.contact.strips.count, scene.contact.width
@@ -120,40 +118,19 @@ def motions(found: ModalBasis, modal) -> np.ndarray:
     return modal if found.shapes is None else modal @ found.shapes.T
 
 
-def frequencies(scene) -> np.ndarray:
+def frequencies(scene, modes: ModalBasis) -> np.ndarray:
     """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
     if scene.structure.mode and scene.structure.bonded is None:
         return np.array([mode.frequency for mode in scene.structure.mode])
-    return modes_of(scene).omega / (2 * pi)
+    return modes.omega / (2 * pi)
 
 
-def highest_frequency(scene) -> float:
-    """The largest natural frequency [Hz]; 0 where all coordinates are rigid."""
-    return float(frequencies(scene).max())
+def first_of(scene) -> tuple:
+    """(frequency [Hz], mass [kg]) of the first mode that is not rigid, without the bonded spring; 0 where all are.
 
-
-def first_frequency(scene) -> float:
-    """Frequency [Hz] of the first mode that is not rigid, in the order of the scene, without the bonded spring; 0 where
-    all are rigid. Masses and files have their modes in ascending order."""
-    return _first(scene)[0]
-
-
-def mode_stiffness(scene) -> float:
-    """Stiffness K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all rigid.
-
-    mass: moving_mass for modes, else the modal mass seen at the output, basis.mass / output_1^2.
+    mass: structure.moving_mass, or the modal mass at the output; where that mode leaves the output at rest, the mass of
+    all coordinates. Masses and files have their modes in ascending order.
     """
-    frequency, mass = _first(scene)
-    return mass * (2 * pi * frequency)**2 if frequency else 0.0
-
-
-def moving_mass(scene) -> float:
-    """The mass [kg] of dimensionless groups: structure.moving_mass, or the modal mass of the first mode at the output;
-    where that mode leaves the output at rest, the mass of all coordinates."""
-    return _first(scene)[1]
-
-
-def _first(scene) -> tuple:
     structure = scene.structure
     if structure.mode:
         held = [mode.frequency for mode in structure.mode if mode.frequency > 0]
@@ -169,13 +146,6 @@ def _first(scene) -> tuple:
     return frequency, float(found.mass / (share if share > 1e-12 * reach else reach))
 
 
-def friction_limit(scene, load: float) -> float:
-    """Sum of mu_s N [N] over the interfaces of a scene; load [N]: of [contact] or [normal]."""
-    if scene.structure is not None and scene.structure.interface:
-        return float(sum(i.static * i.load for i in scene.structure.interface))
-    return scene.friction.static * load
-
-
 def start_of(scene, modes: ModalBasis):
     """core.Start of a scene that does not begin at rest, else None."""
     start, travel = start_state(scene, modes), scene.structure.travel
@@ -183,3 +153,24 @@ def start_of(scene, modes: ModalBasis):
         raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
                             "nearer to the middle")
     return start if start.z.any() or start.v.any() else None
+
+
+def yaws(scene) -> bool:
+    """Whether strips slide each by themselves: modes that yaw the patch about its normal, over [contact.strips]."""
+    strips = scene.contact is not None and scene.contact.strips is not None
+    return strips and scene.friction is not None and any(mode.yaw for mode in scene.structure.mode)
+
+
+def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
+    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
+    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
+    yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
+    return basis.slide - np.outer(offsets, yaw)
+
+
+def acts(scene) -> bool:
+    """Whether the load of a rig changes with its motion (modes with normal or pitch) or in time (normal.amplitude)."""
+    if scene.friction is None and not scene.structure.interface:
+        return False
+    varies = scene.normal is not None and bool(scene.normal.amplitude)
+    return varies or any(mode.normal or mode.pitch for mode in scene.structure.mode)

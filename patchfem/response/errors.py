@@ -9,7 +9,7 @@ the true error of every amplitude, acceleration peak and loop area, at a median 
 import numpy as np
 
 from ..core import Measure
-from .measures import floor_of, of_first, unit_of
+from .rows import row_of
 
 
 def change(fine: dict, coarse: dict) -> dict:
@@ -30,9 +30,8 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
     last, before = change(fine, half), change(half, quarter)
     factor = 2.0 if steps < 400 else 1.0
     out = {name: factor * max(value, before.get(name, 0.0) / 2) for name, value in last.items()}
-    least = {"stick_fraction": 4 / steps, "open_fraction": 4 / steps, "slip_start_phase": 4 * np.pi / steps}
     for name in out:
-        out[name] += least.get(of_first(name), 0.0)
+        out[name] += row_of(name).grain / steps
     return out
 
 
@@ -45,5 +44,5 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
         error = float(sum(known) + abs(value) * least)
         if name == "slip_start_phase":
             error = min(error, np.pi / 2)  # a phase modulo pi cannot be farther off
-        out[name] = Measure(float(value), unit_of(name), error, floor_of(name))
+        out[name] = Measure(float(value), row_of(name).unit, error, row_of(name).floor)
     return out

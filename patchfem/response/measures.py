@@ -1,4 +1,4 @@
-"""Measures of a run from its last window of cycles; names, definitions and units are those of the README.
+"""Functions that read numbers off the last window of cycles; `rows` has their names, units and definitions.
 
 Everything works on samples: values of an exact run and of a march differ only in how they were made.
 """
@@ -7,42 +7,7 @@ import numpy as np
 
 from ..core import STICK, Outcome, Response
 
-UNITS = {
-    "relative_displacement_amplitude": "m", "absolute_acceleration_peak": "m s-2", "slip_amplitude": "m",
-    "stick_fraction": "1", "slip_start_phase": "rad", "friction_force_peak": "N", "loop_area": "J",
-    "equivalent_stiffness": "N m-1", "equivalent_damping": "1", "energy_balance": "1", "drift_per_cycle": "m",
-    "normal_load": "N", "friction_ratio_end": "1", "friction_ratio_peak": "1",
-    "friction_work": "J", "energy_stored": "J", "energy_dissipated": "J", "energy_created": "J",
-    "ring_frequency": "Hz", "ring_damping": "1",
-    "normal_load_least": "N", "normal_load_peak": "N", "open_fraction": "1",
-    "onset_level": "m s-2", "jump_level": "m s-2", "level_hysteresis": "m",
-}
-FLOORS = {
-    "relative_displacement_amplitude": 1e-10, "absolute_acceleration_peak": 1e-4, "slip_amplitude": 1e-10,
-    "stick_fraction": 1e-3, "slip_start_phase": 1e-3, "friction_force_peak": 1e-6, "loop_area": 1e-10,
-    "equivalent_stiffness": 1.0, "equivalent_damping": 1e-8, "energy_balance": 1e-8, "drift_per_cycle": 1e-11,
-    "normal_load_least": 1e-6, "normal_load_peak": 1e-6,
-    "open_fraction": 1e-3, "friction_ratio_end": 1e-9, "friction_ratio_peak": 1e-9,
-    "friction_work": 1e-10, "energy_stored": 1e-10, "energy_dissipated": 1e-10, "energy_created": 1e-10,
-    "ring_frequency": 1e-3, "ring_damping": 1e-6,
-}
 ROUND = 1e-13  # of the largest coordinate
-
-
-def of_first(name: str) -> str:
-    """The name of a measure without the number of its interface: slip_amplitude_2 is slip_amplitude."""
-    head, _, number = name.rpartition("_")
-    return head if number.isdigit() else name
-
-
-def unit_of(name: str) -> str:
-    """Unit of a measure of any interface."""
-    return UNITS[of_first(name)]
-
-
-def floor_of(name: str) -> float:
-    """Absolute floor of a measure of any interface."""
-    return FLOORS.get(of_first(name), 0.0)
 
 
 def energy_balance(book: dict) -> float:
@@ -123,6 +88,26 @@ def ledger_measures(ledger) -> dict:
     """Measures of a ledger (4, k) [J]: friction work, energy stored, dissipated and created at its end."""
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
+
+
+def work_check(work, pairs, jumps: bool = False) -> float:
+    """The energy book against the run's own samples: |trapezoid of the forces over the slides - work|, over the work
+    that went to and fro [1]; it falls with the square of the step.
+
+    work (k,) [J]: running sum of the book; pairs: (slide (k,) [m], force (k,) [N]) of every direction. jumps: whether
+    the force jumps where the slide starts or turns; the sample there holds the force before the jump, so the force
+    after it is taken from the work of the step that follows.
+    """
+    parts = np.diff(work)
+    power, total = np.abs(parts).sum(), 0.0
+    for slide, force in pairs:
+        move, ends = np.diff(slide), force[:-1] + force[1:]
+        if jumps:
+            way = np.sign(move)
+            turned = (way != 0) & (way != np.append(0.0, way[:-1]))
+            ends[turned] = 2 * parts[turned] / move[turned]
+        total += float(ends @ move) / 2
+    return float(abs(total - work[-1]) / power) if power > 0 else 0.0
 
 
 def drift(time, slide, period: float) -> float:
@@ -253,19 +238,3 @@ def _rises(a) -> bool:
         return False
     ratios = steps[1:] / steps[:-1]
     return bool(np.all(ratios > 0.5) and np.all(ratios < 3))
-
-
-def run_measures(window: Response, extremes, book: dict, drive, last: int, peak: float | None = None) -> dict:
-    """Measures that every engine shares: amplitude, acceleration, force, energy balance, drift.
-
-    extremes (c, 2) of the output per cycle, `last` of them in the window; book: the energy ledger; peak: the largest
-    acceleration where the engine knows it better than its samples do.
-    """
-    tail = extremes[-last:]
-    return {
-        "relative_displacement_amplitude": float(tail[:, 1].max() - tail[:, 0].min()) / 2,
-        "absolute_acceleration_peak": acceleration_peak(window) if peak is None else peak,
-        "friction_force_peak": float(np.abs(window.force).max()),
-        "energy_balance": energy_balance(book),
-        "drift_per_cycle": drift(window.time, window.slide, drive.period),
-    }

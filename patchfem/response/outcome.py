@@ -3,28 +3,26 @@
 from dataclasses import replace
 
 from ..core import Measure, Outcome
-from ..model import drive as model_drive
 from ..structure.drive_sizes import sinusoidal
 from .measures import classify
 
 
-def settle(raw, measures: dict, scene, drive) -> tuple:
+def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0) -> tuple:
     """(outcome, measures with the steady estimate where there is one).
 
     Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`). A
     release or a step is steady once it is at rest: its amplitude below the tolerance of the largest; else the same
     amplitudes decide, but a release never grows. A sweep or a recorded signal changes to the end: unless it leaves the
-    interface stuck it is transient, without a steady estimate.
+    interface stuck it is transient, without a steady estimate. level_cycles: of each level, 0 without levels.
     """
-    tolerance = scene.accuracy.tolerance
     if raw.outcome is not None:
         return raw.outcome, measures
     if not drive.segments:
         return Outcome.TRANSIENT, measures
     amplitudes, last = raw.amplitudes, drive.segments[-1]
-    if model_drive.levelled(scene):
+    if level_cycles:
         window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-        amplitudes = amplitudes[-max(1, int(model_drive.cycles_per_level(scene) / window)):]
+        amplitudes = amplitudes[-max(1, int(level_cycles / window)):]
     if last.amplitude == 0:
         outcome = Outcome.STEADY if amplitudes[-1] <= tolerance * amplitudes.max() else classify(amplitudes, tolerance)
         return (Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome), measures

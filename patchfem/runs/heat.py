@@ -5,7 +5,7 @@ import numpy as np
 from ..scene.materials import MATERIALS, THERMAL
 
 
-def heating(scene, patch, work: float, duration: float) -> list:
+def heating(model, patch, work: float, duration: float) -> list:
     """One line on the rise of the surface temperature; none where nothing is loaded or nothing moves.
 
     work [J] of the friction over `duration` [s]. All of the heat goes into one half-space of the substrate through the
@@ -13,7 +13,7 @@ def heating(scene, patch, work: float, duration: float) -> list:
     """
     if patch is None:
         return ["the warming by friction is not estimated: [normal] has no contact area"]
-    kind = scene.contact.substrate
+    kind = model.patch.substrate
     known = THERMAL.get(kind.name) if kind.name in MATERIALS else None
     if known is None:
         return ["the warming by friction is not estimated: the conductivity of contact.substrate is not known; name a "
@@ -23,7 +23,7 @@ def heating(scene, patch, work: float, duration: float) -> list:
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):
         return []
-    period = _cycle(scene)
+    period = _cycle(model)
     flux, stuff = work / duration / area, (known.conductivity, known.heat_capacity * kind.density)
     rises = [f"{surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
     if period is not None:
@@ -32,10 +32,8 @@ def heating(scene, patch, work: float, duration: float) -> list:
             f"it all by {', '.join(rises)}; friction.temperature.surface stays as given"]
 
 
-def _cycle(scene) -> float | None:
+def _cycle(model) -> float | None:
     """Period of the motion [s], None where it does not repeat."""
-    if scene.drive is not None:
-        return 1 / scene.drive.frequency if scene.drive.frequency else None
-    if scene.slide.kind == "sine":
-        return 1 / scene.slide.frequency
-    return 4 * scene.slide.amplitude / scene.slide.speed if scene.slide.kind == "triangle" else None
+    if model.rig is not None:
+        return 1 / model.rig.frequency if model.rig.frequency else None
+    return model.slide.period

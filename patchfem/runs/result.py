@@ -50,9 +50,9 @@ def frames_of(patch, time, tau, local, slide) -> dict:
             "holder_slide": np.concatenate([[0.0], slide])}
 
 
-def warming(scene, patch, response, work: float | None = None) -> list:
-    """The line on the rise of the surface temperature, where the scene has one."""
-    if scene.friction is None or scene.friction.temperature is None:
+def warming(model, patch, response, work: float | None = None) -> list:
+    """The line on the rise of the surface temperature, where the scene names one."""
+    if model.heat is None:
         return []
     from .heat import heating
 
@@ -60,7 +60,7 @@ def warming(scene, patch, response, work: float | None = None) -> list:
         work = float(np.trapezoid(response.force, response.slide))
         if response.lateral is not None:
             work += float(np.trapezoid(response.lateral_force, response.lateral))
-    return heating(scene, patch, work, float(response.time[-1]))
+    return heating(model, patch, work, float(response.time[-1]))
 
 
 def without_errors(found: dict, estimate: bool) -> dict:

@@ -1,4 +1,4 @@
-"""The page where the stages meet: plan(scene) says what would run, run(plan) runs it."""
+"""The page where the pillars meet: plan(scene) says what would run, run(plan) runs it."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -6,41 +6,48 @@ from time import perf_counter
 import numpy as np
 
 from ..core import Measure, Outcome
-from ..model.accuracy import chosen_mesh
-from ..model.pieces import piece_of
+from ..effects import has
+from ..model.model import Model
+from ..model.source import placed
 from .plan import Plan, plan, refuse_size
 from .result import FRAMES, Result, frames_of, still, unripe, warming, without_errors
 
 __all__ = ["Plan", "Result", "plan", "run"]
 
 
-def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: bool = True,
-        fresh: bool = False) -> Result:
-    """Run a plan. say: called with one line when the hub compiles; progress: with the done share of the main pass.
+def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False) -> Result:
+    """Run a Plan, or plan and run a Scene or a Model.
 
-    per_point forces the path of every interface point where one lumped point would do; estimate=False skips the
-    re-runs and leaves errors None; fresh condenses the pieces anew. NotConverged and Missing as named by the stages.
+    say: called with one line when the hub compiles; progress: with the done share of the main pass. per_point forces
+    the path of every interface point where one lumped point would do; estimate=False skips the re-runs and leaves
+    errors None; fresh condenses the pieces anew. NotConverged and Missing as named by the stages.
     """
-    begin, scene = perf_counter(), what.scene
-    seconds, warnings = {}, list(scene.remarks)
-    refuse_size(what)
+    what = what if isinstance(what, Plan) else plan(what, per_point)
+    with placed(what.model.source):
+        refuse_size(what)
+        return _run(what, say, progress, per_point, estimate, fresh)
+
+
+def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool) -> Result:
+    begin, model = perf_counter(), what.model
+    seconds, warnings = {}, list(model.source.remarks)
     patch, coarse = None, (None, None)
-    if scene.contact is not None:
+    if model.patch is not None:
         from .patch.ladder import solve_all
 
-        patch, *coarse = solve_all(scene, estimate, fresh)
+        patch, *coarse = solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
-        warnings += [*_strained(scene, patch), *patch.notes]
+        warnings += [*_strained(model.patch, patch), *patch.notes]
         if estimate and coarse[0] is None:
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; lower "
                             "contact.element_size")
-        if patch.pair.coupling > 0.02 and scene.kind != "patch":
+        if patch.pair.coupling > 0.02 and model.kind != "patch":
             warnings.append("the pieces are unlike: what shear does to the normal closing, and the load to the slide, "
                             f"is left out; it is {patch.pair.coupling:.2g} of what shear does to the slide")
-    if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and scene.kind != "patch":
+    if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = _static(what, patch, coarse, seconds, warnings)
-    elif _unloaded(scene):
+    elif _unloaded(model):
         warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
         result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
                         seconds, warnings, {})
@@ -50,55 +57,54 @@ def run(what: Plan, say=None, progress=None, per_point: bool = False, estimate: 
     return replace(result, warnings=result.warnings + _loose(result))
 
 
-def _unloaded(scene) -> bool:
-    """Whether no interface of a scene without [contact] bears a load."""
-    if scene.structure is not None and scene.structure.interface:
-        return not any(one.load for one in scene.structure.interface)
-    return scene.normal is not None and scene.normal.load == 0
+def _unloaded(model: Model) -> bool:
+    """Whether no interface of a model without a patch bears a load."""
+    if model.rig is not None and len(model.rig.names):
+        return not any(one.load for one in model.rig.interfaces)
+    return model.point is not None and model.point.load == 0
 
 
 def _loose(result: Result) -> list:
     """One warning per measure whose error exceeds tolerance * |value| + floor, all in one line."""
-    tolerance = result.plan.scene.accuracy.tolerance
+    model = result.plan.model
+    tolerance, asked, remedies = model.accuracy.tolerance, model.patch, []
     wide = [name for name, m in result.measures.items()
             if m.error is not None and m.error > tolerance * abs(m.value) + m.floor]
     if not wide:
         return []
-    scene, remedies = result.plan.scene, []
-    if scene.contact is not None and scene.contact.mesh is not None:
+    if asked is not None and asked.mesh is not None:
         remedies.append("split the elements of contact.mesh")
-    elif scene.contact is not None and chosen_mesh(scene):
+    elif asked is not None and asked.chosen:
         remedies.append("the mesh that the tolerance chose reaches no further, their errors stand")
-    elif scene.contact is not None:
+    elif asked is not None:
         remedies.append("lower contact.element_size")
     finer = "harmonics" if result.extra.get("engine") == "harmonic" else "steps_per_cycle"
-    remedies += [f"raise accuracy.{finer}"] if result.plan.kind in ("rig", "bench") else []
+    remedies += [f"raise accuracy.{finer}"] if model.kind in ("rig", "bench") else []
     return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; "
             f"{' or '.join(remedies)}"]
 
 
-def _strained(scene, patch) -> list:
+def _strained(asked, patch) -> list:
     """Warnings where the answer leaves small strains, or where bilinear cells lock."""
-    out, contact = [], scene.contact
-    pieces = [piece_of(contact, side) for side in ("lower", "upper")]
-    stuff = [m for _, substrate, coating in pieces for m in (substrate, coating and coating.material) if m]
+    out, pieces = [], (asked.lower, asked.upper)
+    stuff = [m for piece in pieces for m in (piece.substrate, piece.coating and piece.coating.material) if m]
     deep = patch.pressure.sigma_n.max(initial=0.0) / min(m.young for m in stuff)
-    closed = patch.pressure.approach / sum(height for height, _, _ in pieces)
+    closed = patch.pressure.approach / sum(piece.height for piece in pieces)
     for share, what in ((deep, "the peak pressure is {:.3g} of the lowest Young's modulus"),
                         (closed, "the approach is {:.3g} of the pieces' height")):
         if share > 0.02:
             out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
     stiff = max(m.poisson for m in stuff)
-    if contact.plane == "strain" and stiff > 0.47:
+    if asked.plane == "strain" and stiff > 0.47:
         out.append(f"Poisson's ratio {stiff:g} in plane strain: bilinear cells lock towards 0.5; the pressure peak is "
                    "some 2 % too high at 0.45, 7 % at 0.499 and wrong beyond")
     return out
 
 
-def _overhang(scene, fine) -> list:
+def _overhang(asked, fine) -> list:
     """Warnings of a bench whose slide leaves the patch or whose law has no finite peak."""
-    out, travel = [], float(np.abs(fine.slide).max()) / scene.contact.length
-    if fine.lateral is not None and (aside := float(np.abs(fine.lateral).max()) / scene.contact.width) > 0.1:
+    out, travel = [], float(np.abs(fine.slide).max()) / asked.length
+    if fine.lateral is not None and (aside := float(np.abs(fine.lateral).max()) / asked.width) > 0.1:
         out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
@@ -116,56 +122,49 @@ def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     elif coarse[-1] is not None and what.kind == "patch":
-        warnings = [*warnings, *plane_band(what.scene, coarse[0])]
+        warnings = [*warnings, *plane_band(what.model.patch, coarse[0])]
     found = measures(patch, *coarse)
     if patch.strips is not None and coarse[0] is not None:
-        found = strip_error(what.scene, coarse[0], found)
+        found = strip_error(what.model.patch, coarse[0], found)
     return Result(what, p.outcome, found, None, None, patch, still(patch), seconds, warnings, extra)
 
 
 def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
-    from ..model.law import bonds_of
-    from ..model.slide import peak_speed, steps_of
-    from ..response.errors import change, step_error, with_errors
+    from ..response.errors import with_errors
     from .bench import bench
+    from .bench.errors import errors_of
+    from .bench.watch import Watch
 
-    scene = what.scene
-    if scene.friction.law == "nonlocal" and scene.friction.order < 0 and scene.friction.initial_bonds > 0:
+    model, f = what.model, what.model.friction
+    if has(f.law, "bonds") and f.order < 0 and f.initial_bonds > 0:
         warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
                     "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
-    if scene.friction.law == "nonlocal":
-        warnings = [*warnings, *unripe(bonds_of(scene), peak_speed(scene))]
-        if scene.friction.reading == "report" and bench.varies(scene):
+    if has(f.law, "bonds"):
+        warnings = [*warnings, *unripe(model.bonds, model.speed)]
+        if f.reading == "report" and model.load_varies:
             warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
                         "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
-    steps = steps_of(scene)
+    steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, f.bond_length)
     frames = FRAMES if patch is not None else 0
-    fine = bench.run(scene, patch, steps, frames, say)
+    fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
     seconds["bench"] = fine.seconds
     others = []
     if estimate:
-        half, quarter = (bench.run(scene, patch, max(4, steps // (4 * k) * 4), 0, say) for k in (2, 4))
-        seconds["error"] = half.seconds + quarter.seconds
-        first_order = bench.varies(scene)  # twice the change, as of few steps
-        others.append(step_error(fine.values, half.values, quarter.values, min(steps, 399) if first_order else steps))
-        if coarse[0] is not None:
-            rough = bench.run(scene, coarse[0], max(4, steps // 16 * 4), 0, say)
-            others.append(change(quarter.values, rough.values))
-            seconds["error"] += rough.seconds
+        others, seconds["error"] = errors_of(model, patch, coarse[0], fine, steps, say)
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
-    if created > 1e-6 * power:
+    if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
                     "that went to and fro: reading = \"stretch\" creates none"]
-    warnings = [*warnings, *warming(scene, patch, fine)]
+    warnings = [*warnings, *warming(model, patch, fine)]
     if patch is not None:
         from .patch.measures import measures
 
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
-        warnings = warnings + _overhang(scene, fine)
+        warnings = warnings + _overhang(model.patch, fine)
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
     return Result(what, Outcome.DONE, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
-                  {"engine": "bench", "steps": steps})
+                  {"engine": fine.engine.name, "steps": steps})
 
 
 def _coupled(*words) -> Result:

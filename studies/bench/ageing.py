@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 
 from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
@@ -47,7 +48,7 @@ def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
     sets = [f"slide.hold={float(hold)!r} s", f"slide.distance={(40 + 20 * part) * LENGTH!r} m",
             f"slide.distance_after={20 * LENGTH!r} m", f"friction.slip_growth={part * LENGTH!r} m",
             f"accuracy.steps_per_cycle={steps}", *more]
-    found = law_bench.run(scene.loads(SCENE, sets=sets), None, steps)
+    found = law_bench.run(build(scene.loads(SCENE, sets=sets)), None, steps)
     force = found.force / (STATIC * found.load[0])
     rest = np.flatnonzero(np.diff(found.slide) == 0)
     return force[rest[0]], force[rest[-1] + 1], force[rest[-1] + 1:].max()

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from patchfem.closed_forms.friction import growth_factor, steady_bond_length
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
@@ -45,7 +46,7 @@ def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -
     """Friction over load after so many bond lengths at a constant speed [m/s], ten steps each."""
     sets = [f"slide.speed={speed!r} m/s", f"slide.distance={lengths * LENGTH!r} m", f"friction.slip_growth={slip!r} m",
             f"friction.reading={reading}", f"friction.order={order}", "friction.rest_speed=1e-9 m/s"]
-    return law_bench.run(scene.loads(SCENE, sets=sets), None, 10 * lengths).values["friction_ratio_end"]
+    return law_bench.run(build(scene.loads(SCENE, sets=sets)), None, 10 * lengths).values["friction_ratio_end"]
 
 
 def promised(speed: float, slip: float) -> float:

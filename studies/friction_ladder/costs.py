@@ -22,8 +22,7 @@ import path_kernels as loops
 import today
 from ladder import HERTZ, LENGTH
 
-from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import list_model
+from patchfem.dynamics.march.models import list_model, load_kernels
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.coulomb import Coulomb

@@ -65,8 +65,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import today
 
-from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
+from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.friction.bonds.bond_kernels import list_mean, list_step
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff

@@ -15,13 +15,14 @@ from switched import PROBLEMS, follow
 from patchfem.compiled import load
 from patchfem.core import ModalBasis, NotConverged, Start
 from patchfem.dynamics.comparison import duhamel, euler, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh
-from patchfem.dynamics.events import sdof, sdof_kernels
-from patchfem.dynamics.events.sdof_samples import position
+from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.one_mode import sdof, sdof_kernels
+from patchfem.dynamics.one_mode.sdof_samples import position
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import Rate
 from patchfem.model.accuracy import choose
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
+from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
 from patchfem.scene import scene
@@ -78,10 +79,9 @@ def problem(name: str) -> Problem:
         made = Problem(name, problems.TWO, problems.TWO_DRIVE, problems.TWO_LIMIT, 20,
                        {"limit": problems.TWO_LIMIT, "omega": 1.14})
         return replace(made, truth=exact(made, 0))
-    given = scene.load(HERE / "patch.toml")
-    modes, drive = modes_of(given), drive_of(given)
-    contact = contact_model(given, choose(given),
-                                         solve_all(given, False)[0], drive)
+    model = build(scene.load(HERE / "patch.toml"))
+    modes, drive = model.rig.modes, model.rig.drive
+    contact = contact_model(model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0])
     k, y = contact.element.numbers[2:].reshape(2, -1)
     numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
                "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}
@@ -98,7 +98,7 @@ def exact(one: Problem, _) -> np.ndarray:
 
 def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
     """The compiled event engine of one mode."""
-    kernels = kernels or load("dynamics.events.event_kernels")
+    kernels = kernels or load("dynamics.one_mode.event_kernels")
     made = sdof.scene_of(one.modes, one.drive, one.limit, one.limit, one.cycles * one.drive.period)
     rows, state, none = np.zeros((16 * one.cycles, sdof_kernels.ROW)), np.zeros(9), np.empty((0, 2))
     z, v = (0.0, 0.0) if one.start is None else (float(one.start.z[0]), float(one.start.v[0]))
@@ -124,7 +124,7 @@ def _compared(method, one: Problem, steps: int, law, **how) -> np.ndarray:
     modes, laws = one.modes, (law,)
     if one.elements is not None:
         k, y = one.elements
-        laws = tuple(ElasticPlastic(a * b, b) for a, b in zip(k, y))
+        laws = tuple(Smooth(ElasticPlastic(a * b, b).element(1.0)) for a, b in zip(k, y))
         modes = replace(modes, faces=np.tile(modes.slide, (k.size, 1)))
     found = method.run(modes, one.drive, laws, one.cycles * one.drive.period, steps, start=one.start, **how)
     return (found.z[-one.last * steps - 1:] @ modes.slide)[::steps // POINTS][1:]
@@ -155,7 +155,7 @@ def newmark_cured(one: Problem, steps: int) -> np.ndarray:
 
 def euler_tanh(one: Problem, steps: int) -> np.ndarray:
     """Explicit Euler and friction limit tanh(v/1e-3)."""
-    return _compared(euler, one, steps, Tanh(one.limit, 1e-3))
+    return _compared(euler, one, steps, Smooth(Rate(one.limit, 1e-3).element(1.0)))
 
 
 def advancer(tolerance: float, size: float):

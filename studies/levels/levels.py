@@ -33,7 +33,7 @@ from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Spring
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.model.accuracy import choose
-from patchfem.model.structure import modes_of
+from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.rig.interface import contact_model
 from patchfem.scene import scene
@@ -126,10 +126,10 @@ def _jump(levels, slip, part) -> tuple:
 def folds_of(case: str) -> tuple:
     """Folds of the steady motions between the ends of the levels [g]: where the lower branch ends, where the upper."""
     text, frequency, up = CASES[case]
-    given = scene.loads(text)
-    modes, drive = modes_of(given), BaseSine(up[0] * G_N, 2 * np.pi * frequency)
-    joint = contact_model(given, choose(given), None, drive)
-    group = Group(modes, [(0, joint), (modes.output, Spring(0.0, given.structure.stiffening.cubic))])
+    model = build(scene.loads(text))
+    modes, drive = model.rig.modes, BaseSine(up[0] * G_N, 2 * np.pi * frequency)
+    joint = contact_model(model, choose(model), None)
+    group = Group(modes, [(0, joint), (modes.output, Spring(0.0, model.rig.cubic))])
     return tuple(f / G_N for f in follow(modes, drive, group, up[[0, -1]] * G_N, HARMONICS).folds)
 
 

@@ -39,13 +39,13 @@ COLUMNS = {"contact_fraction": ("contact", 1), "loaded_fraction": ("loaded", 1),
 
 
 def held(angle: float, spring: float | None, skin: str = "bare"):
-    """Scene of a holder at the neutral angle [rad] with its spring [N m/rad], None: rigid."""
+    """Pieces in a holder at the neutral angle [rad] with its spring [N m/rad], None: rigid."""
     more = () if spring is None else (f"holder.rotational_stiffness={spring!r} N m/rad",)
     return tilted.case(float(angle), skin, *more)
 
 
 def free(offset: float, skin: str = "bare"):
-    """Scene of a piece free to rotate, the load line `offset` lengths from its middle towards the fine edge."""
+    """A piece free to rotate, the load line `offset` lengths from its middle towards the fine edge."""
     return tilted.case(None, skin, f"load_line.offset={-12.7 * offset!r} mm")
 
 
@@ -77,7 +77,7 @@ def line(found: dict) -> str:
 
 
 def table(title: str, named: str, cases: dict, measured: Callable = tilted.measured) -> dict:
-    """{key: measures} of {key: scene}, printed as they come."""
+    """{key: measures} of {key: pieces}, printed as they come."""
     print(title)
     out: dict[float, dict[str, Measure]] = {}
     for key, found in cases.items():

@@ -12,6 +12,8 @@ import numpy as np
 
 from patchfem.mesh.grading import Layout, columns
 from patchfem.mesh.tensor import TensorGrid, finer, graded_depth
+from patchfem.model.model import build
+from patchfem.model.patch import PatchModel
 from patchfem.runs.patch.condensed import Pair, condensed
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import Patch, pressed
@@ -29,37 +31,37 @@ SKINS = {
 }  # peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
 
 
-def case(angle: float | None = None, skin: str = "bare", *more: str) -> scene.Scene:
-    """Scene of the pieces with a skin of SKINS; angle [rad], None: free to rotate; more: further key=value of contact,
+def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchModel:
+    """The pieces with a skin of SKINS; angle [rad], None: free to rotate; more: further key=value of contact,
     None for a free angle."""
     sets = [f"asperities.{text}" for text in SKINS[skin]] + list(more)
     if angle is not None:
         sets.append(f"tilt.angle={angle!r} rad")
     text = TEXT if angle is not None else TEXT.partition("[contact.tilt]")[0]
-    return scene.loads(text, RIG, [f"contact.{one}" for one in sets])
+    return build(scene.loads(text, RIG, [f"contact.{one}" for one in sets])).patch
 
 
 @cache
 def pair(halvings: int = 2) -> Pair:
     """The condensed pieces on the coarsest mesh (110 columns) with its cells halved so many times."""
-    contact = case(0.0).contact
-    half = contact.length / 2
-    x = columns(Layout(contact.length, (-half,), (-half, half), 1.2e-6, half / 30, half / 30, 0.06))
-    depth, rows = graded_depth(contact.height, x[1] - x[0], contact.coating.thickness, 1.25, 2)
+    asked = case(0.0)
+    half = asked.length / 2
+    x = columns(Layout(asked.length, (-half,), (-half, half), 1.2e-6, half / 30, half / 30, 0.06))
+    depth, rows = graded_depth(asked.height, x[1] - x[0], asked.lower.thickness, 1.25, 2)
     grid = TensorGrid(x, depth, rows)
     for _ in range(halvings):
         grid = finer(grid)
-    return condensed(case(0.0), grid)
+    return condensed(asked, grid)
 
 
-def patches(found: scene.Scene) -> tuple:
-    """The Patch of a scene of `case` on the finest mesh, on cells twice and four times as long."""
-    return tuple(pressed(found, pair(k)) for k in (2, 1, 0))
+def patches(asked: PatchModel) -> tuple:
+    """The Patch of a model of `case` on the finest mesh, on cells twice and four times as long."""
+    return tuple(pressed(asked, pair(k)) for k in (2, 1, 0))
 
 
-def measured(found: scene.Scene) -> dict:
-    """name -> Measure (value and error) of a scene of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
-    three = patches(found)
+def measured(asked: PatchModel) -> dict:
+    """name -> Measure (value and error) of a model of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
+    three = patches(asked)
     return measures(*three) | {"rubbed": rubbed(three[0])}
 
 

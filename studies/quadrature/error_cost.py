@@ -25,8 +25,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import list_model
+from patchfem.dynamics.march.models import list_model, load_kernels
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff

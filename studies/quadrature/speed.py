@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import list_model, points_model
+from patchfem.dynamics.march.models import list_model, load_kernels, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import Recursion

@@ -27,8 +27,7 @@ from against_march import PATCH, TEXTS
 from patchfem.dynamics.harmonic import balance as harmonic_balance
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.model.accuracy import choose
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
+from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
@@ -71,11 +70,11 @@ def loop(text: str, amplitude: float, steps: int) -> tuple:
 def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     """One contact."""
     text, size = CASES[name]
-    given = scene.loads(text)
-    modes, drive, chosen = modes_of(given), drive_of(given), choose(given)
-    patch = solve_all(given, False)[0] if given.contact is not None else None
-    model, amplitude = contact_model(given, chosen, patch, drive), size * np.asarray(shares)
-    free = [harmonic_balance.backbone(modes, model, amplitude, harmonics=h) for h in (1, 9)]
+    model = build(scene.loads(text))
+    modes = model.rig.modes
+    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0] if model.patch is not None else None
+    contact, amplitude = contact_model(model, choose(model), patch), size * np.asarray(shares)
+    free = [harmonic_balance.backbone(modes, contact, amplitude, harmonics=h) for h in (1, 9)]
     w, zeta = modes.omega[0], modes.zeta[0]
     stiffness, area = np.array([loop(text, float(a), steps) for a in amplitude]).T
     omega = np.sqrt(w**2 + stiffness / modes.mass)

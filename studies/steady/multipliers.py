@@ -12,7 +12,7 @@ Run: python studies/steady/multipliers.py
 """
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +21,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 from against_march import TEXTS
 
 from patchfem.core import Start
-from patchfem.dynamics.events.sdof import simulate as simulate_sdof
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import branches
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Spring
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.one_mode.sdof import simulate as simulate_sdof
 from patchfem.model.accuracy import choose
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
+from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model, model_of
@@ -77,12 +76,12 @@ def fitted(states, n: int, size: float, omega: float) -> np.ndarray:
     return values[np.argsort(-np.abs(values))]
 
 
-def marched(given, start: Start, steps: int, settle: int, cycles: int, size: float) -> np.ndarray:
-    """Multipliers by the march of a scene from a state near its steady motion."""
-    modes, drive, chosen = modes_of(given), drive_of(given), choose(given)
-    patch = solve_all(given, False)[0] if given.contact is not None else None
-    model = model_of(given, chosen, patch, modes, drive, start)
-    run = marching.fresh(modes, drive, model, steps, np.inf, start)
+def marched(model, start: Start, steps: int, settle: int, cycles: int, size: float) -> np.ndarray:
+    """Multipliers by the march of a model from a state near its steady motion."""
+    modes, drive = model.rig.modes, model.rig.drive
+    model = replace(model, rig=replace(model.rig, start=start))
+    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0] if model.patch is not None else None
+    run = marching.fresh(modes, drive, model_of(model, choose(model), patch), steps, np.inf, start)
     for _ in range(settle):
         run.cycle(steps, 0, [])
 
@@ -97,10 +96,10 @@ def marched(given, start: Start, steps: int, settle: int, cycles: int, size: flo
     return fitted(states, modes.omega.size, size, drive.omega)
 
 
-def exact(given, start: Start, cycles: int, size: float) -> np.ndarray:
+def exact(model, start: Start, cycles: int, size: float) -> np.ndarray:
     """The same by the event engine of one mode."""
-    modes, drive = modes_of(given), drive_of(given)
-    limit = given.friction.static * given.normal.load
+    modes, drive = model.rig.modes, model.rig.drive
+    limit = model.friction.static * model.point.load
 
     def states(push):
         out, now = [], Start(start.z + push[0], start.v + push[1])
@@ -117,30 +116,29 @@ def rows_of(case: str, steps: int = STEPS, settle: int = SETTLE, cycles: int = 1
     """Every steady motion of a case, and what pushed motions near it do."""
     text, level = CASES[case]
     sets = [f"drive.acceleration={level}"]
-    given = scene.loads(text, sets=[*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"])
-    if given.structure.stiffening is not None:
-        return _branches(given, case, steps, cycles)
+    model = build(scene.loads(text, sets=[*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"]))
+    if model.rig.cubic is not None:
+        return _branches(model, case, steps, cycles)
     steady = runner.run(runner.plan(scene.loads(text, sets=[*sets, "accuracy.method=harmonic",
                                                                 "accuracy.tolerance=1e-5"])), estimate=False)
     seen, size = steady.response, PUSH * steady.measures["relative_displacement_amplitude"].value
     start = Start(np.array(seen.modal[0]), np.array(seen.modal_rate[0]))
-    found = exact(given, start, cycles, size) if given.friction.law == "coulomb" and given.contact is None else \
-        marched(given, start, steps, settle, cycles, size)
+    found = exact(model, start, cycles, size) if model.friction.law == "coulomb" and model.patch is None else \
+        marched(model, start, steps, settle, cycles, size)
     return [Row(case, steady.extra["regime"], steady.extra["multipliers"], found)]
 
 
-def _branches(given, case: str, steps: int, cycles: int) -> list:
+def _branches(model, case: str, steps: int, cycles: int) -> list:
     """All motions at one frequency; from the one that is not stable the march is pushed before it has left it."""
-    modes, drive = modes_of(given), drive_of(given)
-    group = Group(modes, [(0, contact_model(given, choose(given), None, drive)),
-                          (modes.output, Spring(0.0, given.structure.stiffening.cubic))])
+    modes, drive = model.rig.modes, model.rig.drive
+    group = Group(modes, [(0, contact_model(model, choose(model), None)), (modes.output, Spring(0.0, model.rig.cubic))])
     out = []
     for one in branches(modes, drive, group, 1e-5):
         seen = periodic_response(one, modes, drive, 200)
         start = Start(seen.modal[0].copy(), seen.modal_rate[0].copy())
         size = PUSH * one.amplitude(modes.output)
         out.append(Row(case, "stable" if one.stable else "unstable", one.multipliers,
-                       marched(given, start, steps, 10, cycles, size)))
+                       marched(model, start, steps, 10, cycles, size)))
     return out
 
 

@@ -27,14 +27,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 import engines
 from common import Peer
 
-from patchfem.compiled import load, load_kernels
+from patchfem.compiled import load
 from patchfem.core import BaseSine, Missing, ModalBasis
-from patchfem.dynamics.events import orbit_kernels, sdof
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.march.march import Run
-from patchfem.dynamics.march.models import jenkins_model, points_model
+from patchfem.dynamics.march.models import jenkins_model, load_kernels, points_model
+from patchfem.dynamics.one_mode import orbit_kernels, sdof
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
@@ -69,7 +69,7 @@ def block():
 @cache
 def cycle_of_events() -> tuple:
     """(seconds per drive cycle of the compiled event engine in a batch of long runs, relative error of the peak)."""
-    kernels = load("dynamics.events.event_kernels")
+    kernels = load("dynamics.one_mode.event_kernels")
     table = np.tile([1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0, 0.0], (BATCH, 1))
     size, books, ends = np.zeros((BATCH, 2)), np.zeros((BATCH, 10)), np.zeros((BATCH, 2))
     seconds = least(lambda: kernels.batch(table, float(CYCLES), 10, size, books, ends)) / (BATCH * CYCLES)
@@ -105,7 +105,7 @@ def twin() -> float:
 @cache
 def steady_point() -> tuple:
     """(seconds of a steady point by the event map, residual of its periodicity, seconds of the plain form)."""
-    kernels = load("dynamics.events.steady_kernels")
+    kernels = load("dynamics.one_mode.steady_kernels")
     row = [1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0]
     count = 200
     table, found, phases = np.tile(row, (count, 1)), np.zeros((count, 12)), np.zeros((count, 16))

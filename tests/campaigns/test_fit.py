@@ -14,6 +14,7 @@ from patchfem.campaigns.fit import fit_loop
 from patchfem.core import PatchfemError
 from patchfem.export.fit_folder import fitted_scene
 from patchfem.inputs.loops import read_loop
+from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.scene.scene import SceneError, load, loads
 
@@ -148,7 +149,7 @@ def test_exact_growth_is_found_again(tmp_path):
     scene = scene_of(tmp_path, "growth", *fixed)
     true = loads(scene.text, sets=[*fixed, "friction.static=0.31", "friction.kinetic=0.22",
                                    "friction.slip_growth=1.1e-6 m"])
-    force = bench.run(true, None, 4, path=(time, slide, 0, 0.0)).force
+    force = bench.run(build(true), None, 4, path=(time, slide, 0, 0.0)).force
     found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force), free_of(*names))
     assert found.found.values == pytest.approx([TRUTH["growth"][name] for name in names], rel=1e-6)
     assert found.pieces == 1 and found.rms < 1e-6
@@ -244,7 +245,7 @@ def test_exact_intervals_of_growing_bonds_cover_the_truth_in_19_of_20(tmp_path):
     scene, (time, slide) = scene_of(tmp_path, "growth", *fixed), rows(40)
     true = loads(scene.text, sets=[*fixed, "friction.static=0.31", "friction.kinetic=0.22",
                                    "friction.slip_growth=1.1 um"])
-    force = bench.run(true, None, 4, path=(time, slide, 0, 0.0)).force
+    force = bench.run(build(true), None, 4, path=(time, slide, 0, 0.0)).force
     inside = []
     for seed in range(100):
         noise = 0.1 * np.random.default_rng(seed).normal(size=force.size)
@@ -347,7 +348,7 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
     assert (tmp_path / "out/fit.svg").read_text().startswith("<svg")
     scene = load(tmp_path / "out/scene.fitted.toml")
     assert scene.friction.static == one["value"] and scene.slide.file == "../loop.csv"
-    ran = bench.run(scene, None, 400)
+    ran = bench.run(build(scene), None, 400)
     written = read_loop(tmp_path / "out/fit.csv")
     fitted = np.array(written.labels["fitted"], float)
     at = [np.argmin(np.abs(ran.time - t)) for t in written.time]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
+from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import Outcome
 from patchfem.export import curves, netcdf, report
@@ -14,16 +15,6 @@ FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
           "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
           "regime": np.array(["stable"] * 4 + ["unstable"] * 3 + ["stable"] * 2),
           "multiplier": np.linspace(0.2, 1.5, 9), "folds": np.array([13.0, 11.5])}
-POINT = '[normal]\nload = "26 lbf"\n'
-MODE = """\
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-"""
 SWEEP = """\
 [drive]
 kind = "base"
@@ -36,10 +27,10 @@ acceleration = "{2} g"
 method = "harmonic"
 tolerance = 1e-2
 """
-COULOMB = POINT + '[friction]\nlaw = "coulomb"\nstatic = 0.3\n' + MODE
+SLIPPING = POINT + COULOMB + MODE
 STIFFENED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n' + MODE \
     + '[structure.stiffening]\ncubic = "1e11 N/m^3"\n'
-LEVELS = COULOMB + """\
+LEVELS = SLIPPING + """\
 [drive]
 kind = "base"
 waveform = "levels"
@@ -107,7 +98,7 @@ def test_exact_a_curve_in_the_file():
 
 def test_exact_the_regimes_over_a_sweep_of_a_coulomb_rig(written):
     """Stuck while mu N/m stays above a; the page shows the curve and says the regime of the largest motion."""
-    folder, data = written(COULOMB + SWEEP.format(130, 155, 5))
+    folder, data = written(SLIPPING + SWEEP.format(130, 155, 5))
     page = (folder / "report.html").read_text()
     assert "Steady motion at the output" in page and "121 points" in page and "Floquet multiplier" in page
     assert data.curve_point.size == 121 and data.attrs["regime"] == "sliding"

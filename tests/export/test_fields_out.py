@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 import pyvista
 from command_line import cli
-from exported import POINT, UNITS, at, write_small
+from exported import UNITS, at, write_small
+from scene_texts import BENCH
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDataArray
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from patchfem.core import Missing, PatchfemError
+from patchfem.export.fields.vtkhdf import NAME, Series
+from patchfem.export.fields.vtu import BLOCK, _packed, export
 from patchfem.export.results import FILES
-from patchfem.export.vtkhdf import NAME, Series
-from patchfem.export.vtu import BLOCK, _packed, export
 
 
 def through_vtk(path):
@@ -187,7 +188,7 @@ def test_exact_bond_line_of_a_run_carries_load_and_friction_in_every_frame(bench
 
 
 def test_refuses_a_run_without_contact(tmp_path):
-    (tmp_path / "point.toml").write_text(POINT, "utf-8")
+    (tmp_path / "point.toml").write_text(BENCH, "utf-8")
     assert cli("run", tmp_path / "point.toml", "-o", tmp_path / "out", "-q").code == 0
     for words in (("export", tmp_path / "out", "-o", tmp_path / "a.pvd"), ("view", tmp_path / "out")):
         answer = cli(*words)

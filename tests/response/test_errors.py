@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.model.accuracy import choose
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
+from patchfem.model.model import build
 from patchfem.response.errors import change, step_error, with_errors
 from patchfem.runs.rig import march as rig_march
 from patchfem.scene import scene
@@ -53,10 +52,9 @@ def coverage(count, seed):
     """Share of (scene, measure) pairs whose error bar holds the true error."""
     rng, held = np.random.default_rng(seed), []
     for _ in range(count):
-        found = random_scene(rng)
-        settings, modes = choose(found), modes_of(found)
-        drive = drive_of(found)
-        runs = {n: rig_march.run_march(found, replace(settings, steps=n), modes, drive, None).values
+        model = build(random_scene(rng))
+        numerics = choose(model)
+        runs = {n: rig_march.run_march(model, replace(numerics, steps=n), None).values
                 for n in (400, 200, 100, 12800)}
         errors = step_error(runs[400], runs[200], runs[100], 400)
         truth = change(runs[400], runs[12800])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_texts import MODE, POINT
 
 from patchfem.core import G_N
 from patchfem.response.levels import Level, bracket, hysteresis, jump
@@ -10,19 +11,11 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 NAME = "relative_displacement_amplitude"
-RIG = """\
-[normal]
-load = "26 lbf"
+RIG = POINT + """\
 [friction]
 static = 0.3
 {law}
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+""" + MODE + """\
 [drive]
 kind = "base"
 waveform = "levels"

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from patchfem.response.errors import step_error, with_errors
-from patchfem.response.measures import FLOORS, UNITS, floor_of, of_first, steady_amplitude, unit_of
+from patchfem.response.measures import steady_amplitude
+from patchfem.response.rows import TABLE, of_first, row_of
 
 
-@pytest.mark.parametrize("name", sorted(UNITS))
-def test_exact_a_number_behind_a_name_changes_neither_unit_nor_floor(name):
+@pytest.mark.parametrize("name", sorted(TABLE))
+def test_exact_a_number_behind_a_name_changes_no_row(name):
     for full in (name, f"{name}_2", f"{name}_17"):
-        assert of_first(full) == name and unit_of(full) == UNITS[name] and floor_of(full) == FLOORS.get(name, 0.0)
+        assert of_first(full) == name and row_of(full) is TABLE[name]
 
 
 def test_exact_errors_of_further_interfaces_know_the_step():

@@ -1,7 +1,7 @@
-"""Measures on signals whose answers are known by hand, and tables of measurements as typed."""
+"""Measures on signals whose answers are known by hand."""
 
+from dataclasses import replace
 from math import acos, asin, cos, pi, sin
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,12 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from patchfem import closed_forms
-from patchfem.core import G_N, BaseSine, Outcome, PatchfemError, Response
+from patchfem.core import G_N, BaseSine, Outcome, Response
 from patchfem.dynamics.march.march import hermite_extremes
-from patchfem.inputs.measured import FLAGS, read_table
 from patchfem.response import measures
+from patchfem.response.rows import ROWS, TABLE, Seen, measures_of
 
-TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
 OMEGA = 2 * pi * 143
 DRIVE = BaseSine(5 * G_N, OMEGA)
 
@@ -200,13 +199,16 @@ def test_exact_run_measures():
     window = response(time, slide=slide, force=3 * np.cos(phase), acceleration=8 * np.sin(phase))
     book = {"work_in": 1.0, "stored": 0.0, "friction": 1.0, "viscous": 0.0, "power": 1.0, "peak_stored": 0.0}
     extremes = np.array([[-9.0, 9.0], [-1e-6, 2e-6], [-1e-6, 1e-6], [-3e-6, 1e-6]])
-    found = measures.run_measures(window, extremes, book, DRIVE, 3)
+    seen = Seen(window, DRIVE, 100, extremes[-3:], book, 10.0, 0.0, True)
+    found = measures_of(seen)
     assert found["relative_displacement_amplitude"] == pytest.approx(2.5e-6, rel=1e-15)
     assert found["absolute_acceleration_peak"] == pytest.approx(8.0, rel=1e-6)
     assert found["friction_force_peak"] == 3.0 and found["energy_balance"] == 0.0
     assert found["drift_per_cycle"] == pytest.approx(0.0, abs=1e-20)
-    assert measures.run_measures(window, extremes, book, DRIVE, 3, 9.5)["absolute_acceleration_peak"] == 9.5
-    assert set(found) <= set(measures.UNITS) and set(found) <= set(measures.FLOORS)
+    known = measures_of(replace(seen, known={"absolute_acceleration_peak": 9.5, "slip_amplitude": None}))
+    assert known["absolute_acceleration_peak"] == 9.5 and "slip_amplitude" not in known
+    assert "friction_force_peak" not in measures_of(replace(seen, load=None))  # where nothing rubs
+    assert set(known) < set(found) <= set(TABLE)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.123, 0.5, 0.77])
@@ -289,69 +291,7 @@ def test_exact_short_and_odd_runs():
     assert measures.classify(5 - 0.5 * np.arange(6), 1e-3) is Outcome.TRANSIENT
 
 
-def test_exact_every_measure_has_a_unit():
-    assert set(measures.FLOORS) <= set(measures.UNITS)
-
-
-# tables of measurements
-
-def test_table_1_as_typed():
-    rows = read_table(TABLE_1)
-    assert len(rows) == 28
-    assert sum(r.acceleration is not None for r in rows) == 27
-    assert sum(r.displacement is not None for r in rows) == 8
-    bare = [r for r in rows if r.acceleration is None]
-    assert [(r.frequency, r.input, r.displacement, r.flag) for r in bare] == [(143.0, 8 * G_N, None, "U")]
-    assert sum("R" in r.flag for r in rows) == 9 and sum("U" in r.flag for r in rows) == 3
-    assert all((r.displacement is None) == ("*" in r.flag or r in bare) for r in rows)
-    mine = next(r for r in rows if r.frequency == 143 and r.input == 5 * G_N and "R" not in r.flag)
-    assert mine.acceleration == pytest.approx(6 * G_N, rel=1e-15)
-    assert mine.displacement == pytest.approx(0.23 * 25.4e-6, rel=1e-15)
-
-
-def test_table_1_interface_force_at_the_onset():
-    """A rigid block of mass M at 143 Hz and 4 g needs the interface force a_abs - x omega_n^2 = 4.8 g times M."""
-    mine = next(r for r in read_table(TABLE_1) if r.frequency == 143 and r.input == 4 * G_N and "R" not in r.flag)
-    assert (mine.acceleration - mine.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
-
-
-def test_exact_units_of_a_table(tmp_path):
-    path = tmp_path / "t.csv"
-    path.write_text("\ufeffinput [m/s^2], displacement [um],frequency [kHz],flag\n2,3,0.1,UR\n\n4,,0.2,\n", "utf-8")
-    first, second = read_table(path)
-    assert (first.input, first.frequency, first.acceleration, first.flag) == (2.0, 100.0, None, "UR")
-    assert first.displacement == pytest.approx(3e-6, rel=1e-15)
-    assert (second.input, second.displacement, second.flag) == (4.0, None, "")
-    assert set("UR") < set(FLAGS)
-
-
-HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
-
-
-@pytest.mark.parametrize("text, wanted", [
-    ("", ":1: the measured table is empty"),
-    ("frequency,input [g]\n", ":1: column 'frequency'"),
-    ("frequency [Hz],input [lb]\n", ":1: column 'input [lb]'"),
-    ("frequency [Hz],speed [m/s]\n", ":1: column 'speed [m/s]'"),
-    ("frequency [Hz],flag\n", ":1: no column input"),
-    ("flag\n", ":1: no column frequency, input"),
-    (HEAD + "143,5,6.0,,\n143,6\n", ":3: 2 cells under 5 columns"),
-    (HEAD + "143,5,six,,\n", ":2: acceleration: 'six' is not a number"),
-    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a number"),
-    (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
-    (HEAD + ",5,6.0,,\n", ":2: frequency and input are wanted"),
-    (HEAD + "143,,6.0,,\n", ":2: frequency and input are wanted"),
-])  # fmt: skip
-def test_refuses_a_faulty_table(tmp_path, text, wanted):
-    path = tmp_path / "t.csv"
-    path.write_text(text, "utf-8")
-    with pytest.raises(PatchfemError) as caught:
-        read_table(path)
-    assert str(caught.value).startswith(f"{path}{wanted}")
-
-
-def test_refuses_a_file_that_cannot_be_read(tmp_path):
-    (tmp_path / "t.csv").write_bytes(b"frequency [Hz],input [g]\n\xff")
-    for path in (tmp_path / "t.csv", tmp_path / "none.csv", tmp_path):
-        with pytest.raises(PatchfemError, match="cannot be read"):
-            read_table(path)
+def test_exact_every_row_says_what_it_is():
+    assert len(TABLE) == len(ROWS)
+    for row in ROWS:
+        assert row.unit and row.floor >= 0 and row.text[0].islower() and not row.text.endswith("."), row.name

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import KILOGRAM
 
-from patchfem.model.structure import modes_of
 from patchfem.response.ringing import ring, ringing
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -18,13 +18,7 @@ load = "130.8 N"
 law = "{law}"
 static = 0.3
 bond_length = "{length} um"
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+""" + KILOGRAM + """\
 [drive]
 kind = "free"
 displacement = "200 um"
@@ -159,7 +153,7 @@ def test_exact_the_second_mode_rings_while_the_interface_holds():
     """The eigenvalue of the two modes held together at the interface."""
     scene = loads(TWO_MODES.format(load=10))
     result = run(plan(scene))
-    modes, found = modes_of(scene), result.measures
+    modes, found = result.plan.model.rig.modes, result.measures
     assert result.extra["engine"] == "exact" and 0.1 < found["stick_fraction"].value < 1
     across = np.array([-modes.slide[1], modes.slide[0]]) / np.hypot(*modes.slide)
     own = np.sqrt(across @ np.diag(modes.omega**2) @ across)

@@ -7,13 +7,13 @@ import pytest
 from command_line import cli
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_texts import POINT, SHEAR, SMALL_PATCH
+from scene_texts import COULOMB, PLASTIC, POINT, SHEAR, SLIDE, SMALL_PATCH
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.core import Missing, PatchfemError
 from patchfem.inputs.paths import read_path
-from patchfem.model.slide import path_of, peak_speed, steps_of
+from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -30,8 +30,7 @@ slip_growth = "1 um"
 rest_speed = "1 um/s"
 """
 DWELL = ('[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "0.3 s"\ndistance_after = "20 um"\n')
-COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-ELASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"\n'
+ELASTIC = PLASTIC.replace("1 um", "2 um")
 
 
 def healed(hold, scale=1.0):
@@ -55,9 +54,14 @@ def breakaway(hold, scale=1.0):
     return curve.max(), curve[-1]
 
 
+def steps_of(model) -> int:
+    """Steps per cycle as a run of the bench takes them."""
+    return model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
+
+
 def sliding(text, *sets, patch=None, steps=None):
-    scene = loads(text, sets=sets)
-    return bench.run(scene, patch, steps or steps_of(scene))
+    model = build(loads(text, sets=sets))
+    return bench.run(model, patch, steps or steps_of(model))
 
 
 @pytest.fixture
@@ -73,11 +77,11 @@ def table(tmp_path):
 # ---- the dwell
 
 def test_exact_the_dwell_is_slide_rest_slide():
-    scene = loads(POINT + NONLOCAL + DWELL)
-    time, slide, first, omega = path_of(scene, 600)
+    path = build(loads(POINT + NONLOCAL + DWELL)).slide
+    time, slide, first, omega = path.samples(600)
     speed = np.diff(slide) / np.diff(time)
     rest = np.abs(np.diff(slide)) < 1e-18
-    assert (first, omega) == (0, 0.0) and peak_speed(scene) == SPEED
+    assert (first, omega) == (0, 0.0) and path.peak_speed == SPEED
     assert time[-1] == pytest.approx(0.36, rel=1e-12) and slide[-1] == pytest.approx(60e-6, rel=1e-12)
     assert np.diff(time)[rest].sum() == pytest.approx(0.3, rel=1e-12)
     assert (np.diff(slide)[rest] == 0).all() and speed[~rest] == pytest.approx(SPEED, rel=1e-9)
@@ -86,8 +90,7 @@ def test_exact_the_dwell_is_slide_rest_slide():
 
 @pytest.mark.parametrize("key, legs", [("slide.hold=0 s", 2), ("slide.distance_after=0 m", 2)])
 def test_exact_a_leg_without_duration_is_left_out(key, legs):
-    scene = loads(POINT + NONLOCAL + DWELL, sets=[key])
-    time, slide, *_ = path_of(scene, 100)
+    time, slide, *_ = build(loads(POINT + NONLOCAL + DWELL, sets=[key])).slide.samples(100)
     assert (np.diff(time) > 0).all()
     assert np.count_nonzero(np.diff(np.diff(slide) / np.diff(time) > SPEED / 2)) == (1 if "after" in key else 0)
 
@@ -177,11 +180,11 @@ def test_exact_points_behind_the_shear_see_the_true_hold():
 
 def test_exact_a_table_of_the_corners_is_the_triangle(table):
     rows = "time [ms],displacement [um]\n0,0\n2,10\n6,-10\n8,0\n"
-    found = table(rows, ELASTIC)
+    found = build(table(rows, ELASTIC))
     one = bench.run(found, None, 400)
-    other = sliding(POINT + ELASTIC + '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n', steps=400)
+    other = sliding(POINT + ELASTIC + SLIDE, steps=400)
     top = one.slide.argmax()
-    assert peak_speed(found) == pytest.approx(5e-3) and one.time[top] == pytest.approx(2e-3)
+    assert found.slide.peak_speed == pytest.approx(5e-3) and one.time[top] == pytest.approx(2e-3)
     up = np.minimum(one.slide[:top + 1] / 2e-6, 1)
     back = np.maximum(1 - (10e-6 - one.slide[top:one.slide.argmin() + 1]) / 2e-6, -1)
     assert one.force[:top + 1] == pytest.approx(0.3 * one.load[0] * up, rel=1e-9)
@@ -192,8 +195,9 @@ def test_exact_a_table_of_the_corners_is_the_triangle(table):
 
 
 def test_exact_a_table_with_a_rest_is_the_dwell(table):
-    found = bench.run(table("displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n",
-                            NONLOCAL, "accuracy.steps_per_cycle=600"), None, 600)  # fmt: skip
+    scene = table("displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n", NONLOCAL,
+                  "accuracy.steps_per_cycle=600")
+    found = bench.run(build(scene), None, 600)
     other = sliding(POINT + NONLOCAL + DWELL, steps=600)
     assert found.force == pytest.approx(other.force, rel=1e-9)
     assert found.values == pytest.approx(other.values, rel=1e-9, abs=1e-12)
@@ -202,13 +206,13 @@ def test_exact_a_table_with_a_rest_is_the_dwell(table):
 def test_always_more_steps_than_rows_and_rows_are_samples(table):
     time = np.linspace(0, 0.05, 301)
     rows = "\n".join(f"{t!r},{10e-6 * math.sin(2 * math.pi * 20 * t)!r}" for t in time.tolist())
-    scene = table("time [s],displacement [m]\n" + rows, NONLOCAL, "accuracy.steps_per_cycle=4")
+    model = build(table("time [s],displacement [m]\n" + rows, NONLOCAL, "accuracy.steps_per_cycle=4"))
     for parts in (1, 2, 4):
-        t, q, *_ = path_of(scene, steps_of(scene) // parts)
+        t, q, *_ = model.slide.samples(steps_of(model) // parts)
         at = np.searchsorted(t, time - 1e-12)
         assert t[at] == pytest.approx(time, abs=1e-15) and np.diff(at).min() >= 8 // (2 * parts)
         assert q[at] == pytest.approx(10e-6 * np.sin(2 * np.pi * 20 * time), abs=1e-18)
-    assert peak_speed(scene) == pytest.approx(2 * np.pi * 20 * 10e-6, rel=1e-3)
+    assert model.speed == pytest.approx(2 * np.pi * 20 * 10e-6, rel=1e-3)
 
 
 @given(st.lists(st.tuples(st.floats(1e-6, 10), st.floats(-1e-3, 1e-3)), min_size=1, max_size=20),

@@ -7,8 +7,10 @@ import sys
 
 import numpy as np
 import pytest
+from scene_texts import PIECE
 
 from patchfem.mesh.tensor import TensorGrid, coarser, finer
+from patchfem.model.model import build
 from patchfem.runs.patch import grading
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all
@@ -17,13 +19,7 @@ from patchfem.runs.patch.press import pressed
 from patchfem.runs.patch.values import values
 from patchfem.scene.scene import loads
 
-PIECE = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-substrate = "Ti-8Al-1Mo-1V"
-"""
+BLOCKS = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\n'
 ALWAYS = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}
 LEAST_WORK = 1e8  # of the graded meshes here: two levels finer stay affordable
 
@@ -72,14 +68,14 @@ def settings(seed: int, kind: str) -> list:
 
 def compared(seed: int, kind: str) -> dict:
     """name -> (value, error, truth) of a random scene; the truth is what two splits of every cell lead to."""
-    scene = loads(PIECE, "a.toml", settings(seed, kind))
-    series = solve_all(scene)
+    model = build(loads(BLOCKS, "a.toml", settings(seed, kind)))
+    series = solve_all(model.patch, model.accuracy.tolerance)
     found = measures(*series)
     grids, finest = [series[0].pair.grid, series[0].pair.upper_grid], [values(series[0])]
     same = grids[0] is grids[1]
     for _ in range(2):
         grids = [finer(grid) for grid in grids[:2 - same]]
-        finest.append(values(pressed(scene, condensed(scene, *grids))))
+        finest.append(values(pressed(model.patch, condensed(model.patch, *grids))))
     return {name: (m.value, m.error, limit(*(value[name] for value in finest))) for name, m in found.items()}
 
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from command_line import cli
+from scene_texts import PIECE
 
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak, wedge_linear, wedge_opening, wedge_skin
 from patchfem.core import Outcome, PatchfemError
@@ -15,11 +16,7 @@ from patchfem.scene.scene import SceneError, loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
 MODULUS = 121e9 / (1 - 0.31**2) / 2  # E* of two pieces of the material below
-PIECE = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+BLOCKS = PIECE + """\
 load = "26 lbf"
 substrate = {young = "121 GPa", poisson = 0.31, density = "4370 kg/m^3"}
 """
@@ -29,7 +26,7 @@ COARSE = "contact.element_size=0.2 mm"
 TILT = "contact.tilt.angle=0.1 mrad"
 
 
-def solved(*sets, text=PIECE):
+def solved(*sets, text=BLOCKS):
     """The Result of a scene, after what must hold in every one: finite numbers, no tension, forces in balance."""
     scene = loads(text, "hard.toml", sets)
     result = run(plan(scene))
@@ -104,7 +101,7 @@ def test_exact_a_soft_thin_coating_is_a_bed_of_springs():
     stiff = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thick / 2
     half = (3 * LOAD / WIDTH * radius / (2 * stiff))**(1 / 3)
     found = solved("contact.crown.radius=1 m", "contact.element_size=0.1 mm",
-                   text=PIECE + COATING.format(young, nu, thick))
+                   text=BLOCKS + COATING.format(young, nu, thick))
     assert half / thick > 20 and half < 0.45 * SIZE
     assert value(found, "pressure_peak") == pytest.approx(stiff * half**2 / (2 * radius), rel=0.02)
     assert value(found, "contact_half_width") == pytest.approx(half, abs=0.1e-3)
@@ -117,7 +114,7 @@ def test_exact_a_stiff_coating_carries_a_small_contact_alone(cheap):
     modulus, line = young / (1 - nu**2) / 2, LOAD / WIDTH
     half = hertz_half_width(line, radius, modulus)
     found = solved("contact.crown.radius=0.1 m", "accuracy.tolerance=1e-2",
-                   text=PIECE + COATING.format(young, nu, thick))
+                   text=BLOCKS + COATING.format(young, nu, thick))
     assert thick / half > 20
     assert value(found, "pressure_peak") == pytest.approx(hertz_peak(line, radius, modulus), rel=0.01)
     assert value(found, "contact_half_width") == pytest.approx(half, rel=0.02)
@@ -126,7 +123,7 @@ def test_exact_a_stiff_coating_carries_a_small_contact_alone(cheap):
 def test_exact_cells_a_thousand_times_as_long_as_thin_pass_the_patch_test():
     """Without lateral strain flat pieces are bars: approach = 2 p (t/E1 + (H - t)/E2), the same pressure everywhere,
     in cells of 0.5 mm by 0.25 um."""
-    text = PIECE.replace("0.31", "0.0") + COATING.format(600e9, 0.0, 1e-6)
+    text = BLOCKS.replace("0.31", "0.0") + COATING.format(600e9, 0.0, 1e-6)
     found = solved("contact.element_size=0.5 mm", text=text)
     rows = np.diff(found.patch.pair.grid.depth)
     assert np.diff(found.patch.x).max() / rows.min() > 1000
@@ -137,7 +134,7 @@ def test_exact_cells_a_thousand_times_as_long_as_thin_pass_the_patch_test():
 
 def test_exact_long_thin_cells_leave_hertz_right():
     """A coating of the substrate's own material, 0.2 um thick under cells of 0.1 mm, changes nothing."""
-    text = PIECE + COATING.format(121e9, 0.31, 2e-7)
+    text = BLOCKS + COATING.format(121e9, 0.31, 2e-7)
     sets = ("contact.crown.radius=3 m", "contact.load=100 N", "contact.element_size=0.1 mm")
     found, bare = solved(*sets, text=text), solved(*sets)
     for name in ("pressure_peak", "approach", "normal_stiffness"):
@@ -156,9 +153,9 @@ def test_exact_a_load_at_the_edge_of_tipping_is_carried_at_the_edge(share):
 
 def test_refuses_a_load_on_the_edge_by_name():
     with pytest.raises(SceneError, match=r"contact\.load_line\.offset.*outside the patch"):
-        loads(PIECE, "hard.toml", [f"contact.load_line.offset={SIZE / 2} m"])
+        loads(BLOCKS, "hard.toml", [f"contact.load_line.offset={SIZE / 2} m"])
     with pytest.raises(SceneError, match=r"contact\.load_line\.moment.*outside the patch"):
-        loads(PIECE, "hard.toml", [f"contact.load_line.moment={LOAD * SIZE / 2 * (1 + 1e-12)} N m"])
+        loads(BLOCKS, "hard.toml", [f"contact.load_line.moment={LOAD * SIZE / 2 * (1 + 1e-12)} N m"])
 
 
 def profile(path, spoil=False) -> list:
@@ -191,7 +188,7 @@ def test_always_spikes_and_missing_heights_are_counted_and_bridged(tmp_path):
 @pytest.mark.parametrize("mesh", [COARSE, "accuracy.tolerance=1e-2"])
 def test_exact_an_approach_that_closes_nothing_carries_nothing(mesh):
     """A crown on a step of -1 um stands 1 um above the flat: 0.9 um of approach leave the pieces apart."""
-    text = PIECE.replace('load = "26 lbf"\n', "")
+    text = BLOCKS.replace('load = "26 lbf"\n', "")
     found = solved("contact.step.height=1 um", "contact.step.at=-6.3 mm", "contact.crown.radius=1 mm",
                    "contact.approach.distance=0.9 um", mesh, text=text)
     assert found.outcome is Outcome.NO_CONTACT and not found.patch.active.any()
@@ -267,7 +264,7 @@ COATED = {"thin coating": 1e-6, "thick coating": 6.2865e-3}
 
 @pytest.mark.parametrize("name", [*GRADED, *COATED])
 def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
-    text = PIECE + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else PIECE
+    text = BLOCKS + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else BLOCKS
     found = solved(*GRADED.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
     grids = {id(g): g for g in (found.patch.pair.grid, found.patch.pair.upper_grid)}.values()
     assert sum(16.0 * g.x.size * g.depth.size**2 * (3 * g.depth.size + g.x.size) for g in grids) <= 2e9
@@ -279,7 +276,7 @@ def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
 def test_always_the_command_line_names_what_was_wrong(tmp_path):
     """Exit 0 with numbers throughout, 2 for what a scene got wrong; never a traceback."""
     path = tmp_path / "hard.toml"
-    path.write_text(PIECE + '[contact.crown]\nradius = "1 mm"\n', "utf-8")
+    path.write_text(BLOCKS + '[contact.crown]\nradius = "1 mm"\n', "utf-8")
     code, out, err = cli("run", path, "-o", tmp_path / "out", "--set", COARSE, "--json")
     assert code == 0 and "NaN" not in out and "Infinity" not in out and "Traceback" not in err
     assert all(np.isfinite(m["value"]) for m in json.loads(out)["measures"].values())

@@ -5,36 +5,31 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scene_texts import COATING, PIECE
 
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome, PatchfemError
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh
 from patchfem.mesh.tensor import graded_grid
+from patchfem.model.model import build
 from patchfem.model.pieces import bodies_of
 from patchfem.runs.patch import measures as patch_measures
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.values import values
 from patchfem.scene import scene
 
-TEXT = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+TEXT = PIECE + """\
 element_size = "0.2 mm"
 substrate = "Ti-8Al-1Mo-1V"
 {}
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-{}
-"""
+""" + COATING + "{}\n"
 LOAD = 'load = "26 lbf"'
+TOLERANCE = 1e-3
 
 
 def solved(keys=LOAD, tables=""):
-    found = scene.loads(TEXT.format(keys, tables))
-    patch = solve_all(found, False)[0]
+    found = build(scene.loads(TEXT.format(keys, tables))).patch
+    patch = solve_all(found, TOLERANCE, False)[0]
     return patch, values(patch)
 
 
@@ -128,12 +123,12 @@ def test_exact_a_scene_on_triangles_is_within_its_error_of_the_quads(tmp_path):
     text = TEXT.format(LOAD + '\nmesh = "pieces.msh"', '[contact.tilt]\nangle = "0.1 mrad"\n').replace(
         'element_size = "0.2 mm"\n', "")
     (tmp_path / "scene.toml").write_text(text, "utf-8")
-    found = scene.load(tmp_path / "scene.toml")
-    patch, finer, _ = solve_all(found)
+    found = build(scene.load(tmp_path / "scene.toml")).patch
+    patch, finer, _ = solve_all(found, TOLERANCE)
     assert finer.pair.grid.x.size == 2 * patch.pair.grid.x.size - 1
     cut = patch_measures.measures(patch, finer)
-    whole = patch_measures.measures(*solve_all(
-        scene.loads(TEXT.format(LOAD, '[contact.tilt]\nangle = "0.1 mrad"\n'))))
+    grids = build(scene.loads(TEXT.format(LOAD, '[contact.tilt]\nangle = "0.1 mrad"\n'))).patch
+    whole = patch_measures.measures(*solve_all(grids, TOLERANCE))
     for name, measure in cut.items():
         assert abs(measure.value - whole[name].value) <= measure.error + whole[name].error + measure.floor
     assert cut["normal_load"].value == pytest.approx(26 * 4.4482216152605, rel=1e-12)
@@ -143,7 +138,7 @@ def test_refuses_a_mesh_whose_interfaces_do_not_match(tmp_path):
     triangles(tmp_path / "pieces.msh", 5e-4, shift=1e-4)
     (tmp_path / "scene.toml").write_text(TEXT.format(LOAD + '\nmesh = "pieces.msh"', ""), "utf-8")
     with pytest.raises(PatchfemError, match=r"pieces.msh.*not yet built"):
-        bodies_of(scene.load(tmp_path / "scene.toml"))
+        bodies_of(build(scene.load(tmp_path / "scene.toml")).patch)
 
 
 @pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])

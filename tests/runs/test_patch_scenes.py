@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import cli
+from scene_texts import COATED, COULOMB, PIECE, SLIDE
 
 from patchfem import closed_forms
 from patchfem.core import Outcome, PatchfemError, frozen_array
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
+from patchfem.model.model import build
 from patchfem.model.pieces import bodies_of
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all
@@ -23,11 +26,7 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
-TEXT = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+TEXT = PIECE + """\
 {keys}
 substrate = {material}
 {tables}
@@ -48,8 +47,13 @@ def scene(tables="", keys='load = "26 lbf"\nelement_size = "0.127 mm"', material
     return loads(TEXT.format(keys=keys, material=material, tables=tables), path)
 
 
+def asked(*args, **kwargs):
+    """The PatchModel of a scene."""
+    return build(scene(*args, **kwargs)).patch
+
+
 def solved(*args, **kwargs) -> tuple:
-    found = scene(*args, **kwargs)
+    found = asked(*args, **kwargs)
     patch = solve(found, *bodies_of(found))
     return patch, values(patch)
 
@@ -169,9 +173,9 @@ def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
 def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
-    with pytest.raises(PatchfemError, match=r"scene\.toml:10: contact\.profile\.file: .* % of its height below 2 "
+    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .* % of its height below 2 "
                                             "elem.*element_size"):
-        solved(tables, path=tmp_path / "scene.toml")
+        run(scene(tables, path=tmp_path / "scene.toml"))
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
     assert any("left to the law of the asperities" in note for note in patch.notes)
     box = np.sinc(0.127e-3 / 50e-6)  # of the average over a cell
@@ -187,20 +191,20 @@ def meshed(folder, lower, upper) -> str:
 def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     coarse, fine = (graded_grid(LENGTH, HEIGHT, LENGTH / cells) for cells in (60, 96))
     found = scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")
-    low, high = bodies_of(found)
-    patch = solve(found, low, high)
+    low, high = bodies_of(build(found).patch)
+    patch = solve(build(found).patch, low, high)
     assert patch.pair.joint is not None and low.x.size == 61 and high.x.size == 97
     weight = patch.pieces.interface.weight
     forces = patch.pair.forces(patch.pressure.sigma_n * weight)
     for body, force in zip((low, high), forces):
         assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
         assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
-    same = values(solve(scene(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'), coarse))
+    same = values(solve(asked(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'), coarse))
     mine = values(patch)
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
         assert mine[name] == pytest.approx(same[name], rel=0.02), name
     result = run(plan(found), estimate=False)
-    from patchfem.export.bodies import write_fields
+    from patchfem.export.fields.bodies import write_fields
 
     write_fields(result, tmp_path / "fields.vtkhdf")
     assert (tmp_path / "fields.vtkhdf").stat().st_size > 1e4
@@ -212,20 +216,28 @@ UNLIKE = '[contact.upper]\nsubstrate = "Ti-8Al-1Mo-1V"\nheight = "{}"\n'
 @pytest.mark.parametrize("height", ["6.35 mm", "9 mm"])
 def test_exact_a_mesh_of_unlike_pieces_is_the_grids_it_was_made_of(tmp_path, height):
     tables = TILT.format(2e-5) + UNLIKE.format(height)
-    made = scene(tables, 'load = "26 lbf"\nelement_size = "0.3 mm"')
+    made = asked(tables, 'load = "26 lbf"\nelement_size = "0.3 mm"')
     low, high = bodies_of(made)
-    read = scene(tables, meshed(tmp_path, low, high), path=tmp_path / "scene.toml")
+    read = asked(tables, meshed(tmp_path, low, high), path=tmp_path / "scene.toml")
     mine, theirs = values(solve(read, *bodies_of(read))), values(solve(made, low, high))
     assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-15)
-    alike = scene(TILT.format(2e-5), 'load = "26 lbf"\nelement_size = "0.3 mm"')
+    alike = asked(TILT.format(2e-5), 'load = "26 lbf"\nelement_size = "0.3 mm"')
     assert theirs["approach"] > 1.1 * values(solve(alike, *bodies_of(alike)))["approach"]
 
 
 def test_refuses_a_mesh_whose_pieces_are_not_those_of_the_scene(tmp_path):
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / 20)
     found = scene(UNLIKE.format("9 mm"), meshed(tmp_path, grid, grid), path=tmp_path / "scene.toml")
-    with pytest.raises(PatchfemError, match=r"scene\.toml:5: contact\.height: 0\.009 m, the upper piece of the mesh"):
-        bodies_of(found)
+    with pytest.raises(PatchfemError, match=r"^0\.009 m, the upper piece of the mesh") as caught:
+        bodies_of(build(found).patch)
+    assert caught.value.key == "contact.height"
+    with pytest.raises(PatchfemError, match=r"scene\.toml:4: contact\.height: 0\.009 m, the upper piece of the mesh"):
+        run(found)
+    found.path.write_text(found.text, "utf-8")
+    for words in (["plan", found.path, "--probe"], ["mesh", found.path, "-o", tmp_path / "other.msh"],
+                  ["cost", found.path, "--over", "element_size", "-q"]):
+        said = cli(*words).err
+        assert f"{found.path}:4: contact.height: 0.009 m" in said and said.count("scene.toml") == 1, words
 
 
 def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_path):
@@ -237,7 +249,7 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
     points[:, 1] = depth + points[:, 0]**2 / (4 * 5.0) * (1 - depth / HEIGHT)
     round_ = replace(flat, points=frozen_array(points))
     keys = meshed(tmp_path, round_, round_)
-    found = scene("", keys, path=tmp_path / "scene.toml")
+    found = asked("", keys, path=tmp_path / "scene.toml")
     patch = solve(found, *bodies_of(found))
     x = patch.x
     assert patch.gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
@@ -249,8 +261,8 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
 # ------------------------------------------------------------------------------------------------------ the chosen mesh
 def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
     """The contact is a hundredth of the patch, which no even mesh of that cost resolves."""
-    found = scene('[contact.crown]\nradius = "0.2 m"\n[accuracy]\ntolerance = 1e-2\n', 'load = "40 N"')
-    series = solve_all(found)
+    found = asked('[contact.crown]\nradius = "0.2 m"\n', 'load = "40 N"')
+    series = solve_all(found, 1e-2)
     mine = measures(*series)
     modulus = closed_forms.combined_modulus(210e9, 0.3, 210e9, 0.3)
     half = closed_forms.hertz_half_width(40 / WIDTH, 0.2, modulus)
@@ -264,32 +276,30 @@ def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
 
 
 def test_exact_the_same_pair_serves_every_load_and_tilt():
-    found = scene(TILT.format(1e-5))
+    found = asked(TILT.format(1e-5))
     pair = condensed(found, *bodies_of(found))
     for angle in (0.0, 1e-4):
-        other = scene(TILT.format(angle))
+        other = asked(TILT.format(angle))
         again, anew = values(pressed(other, pair)), solved(TILT.format(angle))[1]
         assert again == pytest.approx(anew, rel=1e-12, abs=1e-18)
 
 
 def test_exact_worn_depth_is_a_shape_like_any_other():
-    found, crown = scene(), scene('[contact.crown]\nradius = "5 m"\n')
+    found, crown = asked(), asked('[contact.crown]\nradius = "5 m"\n')
     pair = condensed(found, *bodies_of(found))
     worn = pressed(found, pair, pair.compliance.interface.x**2 / 10)
     assert values(worn) == pytest.approx(values(pressed(crown, pair)), rel=1e-12, abs=1e-18)
 
 
 def test_exact_the_plane_band_is_the_other_plane_state():
-    found = scene(TILT.format(1e-5))
+    found = asked(TILT.format(1e-5))
     patch = solve(found, *bodies_of(found))
     [sentence] = plane_band(found, patch)
-    stress = values(solve(scene(TILT.format(1e-5) + "", 'load = "26 lbf"\nelement_size = "0.127 mm"\nplane = "stress"'),
-                          *bodies_of(found)))
+    stress = values(solve(replace(found, plane="stress"), *bodies_of(found)))
     mine = values(patch)
     assert f"approach by {stress['approach'] - mine['approach']:+.2g} m" in sentence
     assert f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %" in sentence
-    wide = loads(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.127 mm"', material=STEEL, tables="")
-                 .replace('width = "12.7 mm"', 'width = "60 mm"'))
+    wide = replace(asked(), width=60e-3)
     assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
 
 
@@ -351,12 +361,11 @@ def test_exact_nothing_touching_is_a_result_with_its_gap():
 def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
     """Strips under a roll of 0.1 mrad: two finite-element programs of other elements (quadratic to quartic, graded to
     the far corners) agree on K_n = 6.93285e8 N/m, lateral centre -4.975888 mm and roll moment -0.575480 N m."""
-    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "115.65376 N"\n'
-            'element_size = "{} um"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\n'
-            'thickness = "6 mil"\n[contact.strips]\ncount = 8\nroll = "0.1 mrad"\n')
+    text = COATED.replace("26 lbf", "115.65376 N").replace("0.5 mm", "{} um") + \
+        '[contact.strips]\ncount = 8\nroll = "0.1 mrad"\n'
     truth = {"normal_stiffness": 6.93285e8, "pressure_centre_lateral": -4.975888e-3, "roll_moment": -0.575480}
     for size in (250, 127, 100):
-        found = measures(*solve_all(loads(text.format(size))))
+        found = measures(*solve_all(build(loads(text.format(size))).patch, 1e-3))
         for name, value in truth.items():
             assert abs(found[name].value - value) <= found[name].error <= 60 * abs(found[name].value - value), name
 
@@ -391,8 +400,7 @@ def test_always_what_leaves_the_model_is_said(tables, keys, said):
 
 def test_exact_the_chain_of_a_plan_knows_both_pieces():
     soft = '[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.3, density = "1 kg/m^3"}\n[contact.shear]\n'
-    rub = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "triangle"\namplitude = "1 um"\n' \
-          'speed = "1 mm/s"\n'
+    rub = COULOMB + SLIDE.replace("10 um", "1 um").replace("5 mm/s", "1 mm/s")
     chain = plan(scene(soft + rub)).chain
     bars = 1 / (HEIGHT * 2.6 / 210e9 + HEIGHT * 2.6 / 1e9) * LENGTH * WIDTH
     assert chain["pieces_shear"] == pytest.approx(bars, rel=1e-9)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from scene_texts import BENCH, COULOMB, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
+from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -28,7 +28,6 @@ from patchfem.scene.scene import load, loads
 
 STUDIES = Path(__file__).parents[2] / "studies"
 LOAD, WIDTH, OMEGA = 115.653761996773, 0.0127, 2 * np.pi * 143
-NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
 STEPS = "[accuracy]\nsteps_per_cycle = 200\n"
 SCENES = {
     "patch": SMALL_PATCH, "bench": BENCH, "bench patch": SMALL_PATCH + SHEAR + COULOMB + SLIDE + STEPS,
@@ -121,7 +120,7 @@ MEASURES = {
     "patch": "normal_load contact_fraction pressure_peak pressure_centre approach rotation moment normal_stiffness "
              "tangential_stiffness contact_half_width",
     "bench": "friction_force_peak friction_ratio_end friction_ratio_peak slip_amplitude loop_area energy_balance "
-             "equivalent_stiffness normal_load",
+             "equivalent_stiffness normal_load work_check",
     "linear": "relative_displacement_amplitude absolute_acceleration_peak energy_balance drift_per_cycle",
     "rig": "relative_displacement_amplitude absolute_acceleration_peak slip_amplitude stick_fraction normal_load "
            "friction_force_peak loop_area equivalent_stiffness equivalent_damping energy_balance drift_per_cycle "

@@ -26,7 +26,7 @@ def result_of(text, *sets, estimate=False):
                                  '"tanh"\nreference_speed = "1 mm/s"'])
 def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
     """Balance <= 1e-10; every frame is the unilateral solution at its gap: forces and gaps exclude each other."""
-    text = PITCH.replace('"nonlocal"', law).replace('static = 0.30\nbond_length = "1 um"', "static = 0.30")
+    text = PITCH.replace('"nonlocal"', law).replace('static = 0.3\nbond_length = "1 um"', "static = 0.3")
     found = result_of(text, *FEW)
     assert found.measures["energy_balance"].value <= 1e-10 and found.measures["energy_created"].value == 0
     fields, patch = found.fields, found.patch

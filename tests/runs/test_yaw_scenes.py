@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
-from scene_texts import mistakes
+from scene_texts import DRIVE, MODE, PIECE, mistakes
 
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-TEXT = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
+TEXT = PIECE + """\
 load = "26 lbf"
 element_size = "1 mm"
 substrate = "Ti-8Al-1Mo-1V"
@@ -23,24 +19,14 @@ roll = "{roll}"
 law = "{law}"
 static = 0.3
 {keys}
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+""" + MODE + """\
 [[structure.mode]]
 name = "yaw"
 frequency = "129 Hz"
 damping = 0.003
 slide = 0.0
 yaw = "{yaw}"
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
+""" + DRIVE + """\
 [accuracy]
 method = "{method}"
 """

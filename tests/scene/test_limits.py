@@ -61,7 +61,7 @@ def test_refuses_what_no_run_can_do(text, sets, key, says):
 
 
 def test_refuses_at_the_line_of_the_file():
-    text = RIG.replace("static = 0.30", "static = 0.30\norder = 0.5")
+    text = RIG.replace("static = 0.3", "static = 0.3\norder = 0.5")
     text = text.replace("[friction]", "[contact.shear]\n[friction]")
     text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
     text += '[accuracy]\nmethod = "exact"\n'

@@ -215,8 +215,8 @@ def test_refuses_tables_that_do_not_stand_together(text, start):
 
 def test_refuses_all_mistakes_at_once_in_the_order_of_the_file():
     text = (
-        RIG.replace('load   = "26 lbf"', 'load = "26 lb"')
-        .replace("static = 0.30", "static = 0.3\nkinetic = 0.4\norder = -3")
+        RIG.replace('load = "26 lbf"', 'load = "26 lb"')
+        .replace("static = 0.3", "static = 0.3\nkinetic = 0.4\norder = -3")
         .replace('bond_length = "1 um"\n', "")
         .replace("damping = 0.003", "dampin = 0.003")
         .replace("[drive]", "[drve]")

@@ -4,20 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import LINEAR, STRUCTURE, line_of, only
+from scene_texts import COULOMB, LINEAR, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
-from patchfem.model.structure import (
-    first_frequency,
-    frequencies,
-    friction_limit,
-    highest_frequency,
-    mode_stiffness,
-    modes_of,
-    motions,
-    moving_mass,
-    start_state,
-)
+from patchfem.model.model import build
+from patchfem.model.structure import modes_of, motions, start_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, load, loads
@@ -69,7 +60,7 @@ def test_exact_linear_run_of_masses():
     assert value["relative_displacement_amplitude"] == pytest.approx(abs(x[1]), rel=1e-9)
     assert value["absolute_acceleration_peak"] == pytest.approx(abs(2.0 - w * w * x[1]), rel=1e-6)
     assert value["energy_balance"] < 1e-12 and result.outcome == "steady"
-    both = motions(modes_of(result.plan.scene), result.response.modal)
+    both = motions(result.plan.model.rig.modes, result.response.modal)
     np.testing.assert_allclose(both[:, 1], result.response.output, atol=1e-15)
 
 
@@ -102,26 +93,26 @@ def test_exact_bonded_spring_in_a_run():
     x = 0.884 * 5 * 9.80665 / abs(k - 0.884 * w * w + 2j * 0.003 * w0 * w * 0.884)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(x, rel=1e-9)
     assert "structure.bonded" in scene.named() and result.plan.chain["bonded"] == 4e6
-    assert highest_frequency(scene) == pytest.approx(np.sqrt(k / 0.884) / (2 * np.pi), rel=1e-12)
-    assert (first_frequency(scene), mode_stiffness(scene)) == (143.0, pytest.approx(0.884 * w0 * w0, rel=1e-14))
+    rig = result.plan.model.rig
+    assert rig.frequencies.max() == pytest.approx(np.sqrt(k / 0.884) / (2 * np.pi), rel=1e-12)
+    assert (rig.own_frequency, rig.stiffness) == (143.0, pytest.approx(0.884 * w0 * w0, rel=1e-14))
 
 
 def test_exact_numbers_for_the_plan():
-    scene = loads(MASSES)
-    found = modes_of(scene)
-    np.testing.assert_allclose(frequencies(scene), found.omega / 2 / np.pi)
-    assert moving_mass(scene) == pytest.approx(1 / found.output[0]**2)
-    assert mode_stiffness(scene) == pytest.approx(moving_mass(scene) * found.omega[0]**2)
+    rig = build(loads(MASSES)).rig
+    np.testing.assert_allclose(rig.frequencies, rig.modes.omega / 2 / np.pi)
+    assert rig.mass == pytest.approx(1 / rig.modes.output[0]**2)
+    assert rig.stiffness == pytest.approx(rig.mass * rig.modes.omega[0]**2)
     free = loads(MASSES[:MASSES.index("[[structure.damper")] + MASSES[MASSES.index("[drive]"):],
                  sets=["structure.spring.0.stiffness=0 N/m"])
-    assert frequencies(free)[0] == 0.0
-    assert first_frequency(free) == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
+    assert build(free).rig.frequencies[0] == 0.0
+    assert build(free).rig.own_frequency == pytest.approx(np.sqrt(1e5 * 1.5) / 2 / np.pi)
     assert plan(free).chain["mode"] == pytest.approx(1.5e5 / (2 / 3)), "modal mass at the output 1/(2/3)"
-    rub = loads(RUB + MASSES)
-    assert friction_limit(rub, 0.0) == pytest.approx(3.0)
-    assert plan(rub).groups["D"] == pytest.approx(3.0 / (moving_mass(rub) * 2.0))
+    rub = build(loads(RUB + MASSES))
+    assert [one.limits(one.load) for one in rub.rig.interfaces] == [pytest.approx((3.0, 3.0))]
+    assert plan(rub).groups["D"] == pytest.approx(3.0 / (rub.rig.mass * 2.0))
     second = loads(LINEAR, sets=["structure.mode.axial.frequency=0 Hz"])
-    assert first_frequency(second) == 990.0
+    assert build(second).rig.own_frequency == 990.0
 
 
 def test_exact_a_force_acts_where_it_is_said():
@@ -182,7 +173,7 @@ def test_refuses_at_the_line_of_the_file():
 
 
 @pytest.mark.parametrize("text, key, says", [
-    (MASSES + '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "structure.interface",
+    (MASSES + '[normal]\nload = "1 N"\n' + COULOMB, "structure.interface",
      "write [[structure.interface]]"),
     (MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 0 interfaces"),
     (RUB + RUB + MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 2 interfaces"),
@@ -216,7 +207,7 @@ frequency = "40 Hz"
 acceleration = "2 m/s^2"
 cycles = 300
 """
-POINT = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+POINT = '[normal]\nload = "1 N"\n' + COULOMB
 
 
 def write_scene(folder, text):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
@@ -117,23 +118,7 @@ def test_order_a_recorded_sine_tends_to_the_sine():
 
 # ---- scenes
 
-RIG = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "elastic-plastic"
-static = 0.3
-bond_length = "1 um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[accuracy]
-tolerance = 1e-2
-"""
+RIG = POINT + PLASTIC + MODE + "[accuracy]\ntolerance = 1e-2\n"
 
 
 def measured(drive, head=RIG):
@@ -195,24 +180,3 @@ def test_refuses_a_broken_signal(tmp_path, text, word):
     scene = loads(RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n', tmp_path / "scene.toml")
     with pytest.raises(PatchfemError, match=word):
         run(plan(scene))
-
-
-def test_exact_a_universal_file_is_read_back(tmp_path):
-    import pyuff
-
-    from patchfem.inputs.signals import read_signal
-
-    t = np.arange(200) / 1e4
-    path = tmp_path / "shake.uff"
-    pyuff.UFF(str(path)).write_sets(pyuff.prepare_58(
-        binary=0, func_type=1, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1, ordinate_spec_data_type=12,
-        data=np.sin(W * t), x=t, abscissa_spacing=1, abscissa_inc=1e-4, num_pts=200, ord_data_type=4, id1="a", id2="b",
-        id3="c", id4="d", id5="e", load_case_id=0, ver_num=0, rsp_ent_name="N", ref_ent_name="N",
-        **{f"{axis}_{key}": 0 for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
-           for key in ("spec_data_type", "len_unit_exp", "force_unit_exp", "temp_unit_exp")
-           if (axis, key) != ("ordinate", "spec_data_type")}), "overwrite")
-    time, value = read_signal(path, "acceleration")
-    assert time == pytest.approx(t, abs=1e-9)
-    assert value == pytest.approx(np.sin(W * t), abs=1e-6)
-    with pytest.raises(PatchfemError, match="force is wanted, 0 of 1"):
-        read_signal(path, "force")

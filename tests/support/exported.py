@@ -5,45 +5,23 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+from scene_texts import COATED, COULOMB
 
-from patchfem.export.vtkhdf import NAME, bodies, write_series
+from patchfem.export.fields.vtkhdf import NAME, bodies, write_series
 
 UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "part": "1", "material": "1",
          "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond": "Pa"}
-BENCH = """\
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-element_size = "0.5 mm"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
+CROWNED = COATED + """\
 [contact.crown]
 radius = "80 m"
 [contact.shear]
-[friction]
-law = "coulomb"
-static = 0.3
+""" + COULOMB + """\
 [slide]
 kind = "triangle"
 amplitude = "0.4 um"
 speed = "0.2 mm/s"
 [accuracy]
 steps_per_cycle = 40
-"""
-POINT = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "coulomb"
-static = 0.3
-[slide]
-kind = "triangle"
-amplitude = "10 um"
-speed = "5 mm/s"
 """
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from patchfem.compiled import load_kernels
 from patchfem.core import ModalBasis
 from patchfem.dynamics.march.march import GOAL
+from patchfem.dynamics.march.models import load_kernels
 
 OMEGA = 2 * np.pi * 143
 

@@ -1,4 +1,4 @@
-"""Small scenes that the tests of reading, refusing and planning share."""
+"""Blocks of scenes, the small scenes they add up to, and the mistakes found in one, for any test."""
 
 from __future__ import annotations
 
@@ -6,61 +6,15 @@ import pytest
 
 from patchfem.scene.scene import SceneError, loads
 
-RIG = """\
-title = "143 Hz, 5 g"
-[contact]
-length = "12.7 mm"
-width  = "12.7 mm"
-height = "6.35 mm"
-load   = "26 lbf"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-[contact.tilt]
-angle = "0.1 mrad"
-[friction]
-law = "nonlocal"
-static = 0.30
-bond_length = "1 um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 0.8
-[[structure.mode]]
-name = "second"
-frequency = "990 Hz"
-damping = 0.01
-slide = 0.1
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 200
-"""
+# blocks; one scene is a sum of them
 POINT = '[normal]\nload = "26 lbf"\n'
+PIECE = '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\n'
+COATING = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "6 mil"\n'
+COATED = PIECE + 'load = "26 lbf"\nelement_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+SHEAR = "[contact.shear]\n"
 COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
-TRIANGLE = SLIDE + "cycles = 2\n"
-BENCH = POINT + COULOMB + SLIDE
-STRUCTURE = """\
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
-"""
-SHORT = STRUCTURE.replace("cycles = 30", "cycles = 20")
+PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "1 um"\n'
+NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
 GROWING = """\
 [friction]
 law = "nonlocal"
@@ -70,22 +24,31 @@ bond_length = "2 um"
 rest_growth = "10 m/s^2"
 slip_growth = "0.2 um"
 """
-SMALL_PATCH = """\
-title = "a small patch"
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-element_size = "0.5 mm"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-[contact.tilt]
-angle = "0.02 mrad"
+SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
+TRIANGLE = SLIDE + "cycles = 2\n"
+MODE = """\
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
 """
-SHEAR = "[contact.shear]\n"
+KILOGRAM = MODE.replace("0.884 kg", "1 kg")
+DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
+
+# whole scenes
+BENCH = POINT + COULOMB + SLIDE
+SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
+STRUCTURE = MODE + DRIVE
+SHORT = STRUCTURE.replace("cycles = 30", "cycles = 20")
+SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "990 Hz"\ndamping = 0.01\nslide = 0.1\n'
+RIG = "".join([
+    'title = "143 Hz, 5 g"\n', COATED.replace('element_size = "0.5 mm"\n', ""),
+    '[contact.tilt]\nangle = "0.1 mrad"\n', NONLOCAL, MODE.replace("slide = 1.0", "slide = 0.8"), SECOND,
+    DRIVE.replace("cycles = 30", "cycles = 200"),
+])
 LINEAR = RIG[RIG.index("[structure]") :]
 PATCH = RIG[RIG.index("[contact]") : RIG.index("[friction]")]
 

@@ -9,14 +9,15 @@ from scipy.optimize import brentq
 from patchfem.contact.atlas import Atlas
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.march import varying_load as wrench
+from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.measures import energy_balance
 
 MASS, LOAD, STILL = 0.884, 116.0, BaseSine(0.0, 2 * np.pi * 143)
-LAWS = {"coulomb": wrench.coulomb(0.3), "weaker": wrench.coulomb(0.3, 0.2), "tanh": wrench.rate(0.3, 1e-3),
-        "plastic": wrench.plastic(0.3, 1e-6), "bonds": wrench.bonds(Bonds(0.3, 1e-6)),
-        "growing": wrench.bonds(Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5))}
+LAWS = {"coulomb": varying_load.coulomb(0.3), "weaker": varying_load.coulomb(0.3, 0.2),
+        "tanh": varying_load.rate(0.3, 1e-3), "plastic": varying_load.plastic(0.3, 1e-6),
+        "bonds": varying_load.bonds(Bonds(0.3, 1e-6)),
+        "growing": varying_load.bonds(Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5))}
 
 
 def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:

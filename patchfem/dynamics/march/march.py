@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...compiled import load_kernels
 from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
-from .models import ContactModel
+from .models import ContactModel, load_kernels
 
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit

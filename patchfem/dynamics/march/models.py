@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...compiled import load
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
@@ -13,6 +14,11 @@ from ..contacts import arrays
 
 HERE = "dynamics.contacts"
 SET_VALUED = f"{HERE}.coulomb_kernels"  # the contact without a slope
+
+
+def load_kernels(say=None):
+    """The hub of the march, `hub`; `say` is told when its loops have to be compiled first."""
+    return load("dynamics.march.hub", say)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from ..flags_kernels import LEAN
-from .bond_math_kernels import fexp, flog
+from .bond_math_kernels import fexp, flog, share
 from .bond_merge_kernels import merge
 from .bond_sum_kernels import (
     AGED,
@@ -32,6 +32,8 @@ from .point_kernels import bond_mean, grow
 PIECE = 0.25  # longest strip in bond lengths
 GROWN = 0.5  # most growth J of one strip of growing bonds
 MOST_GROWN = 16
+TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
+LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies is no better than the force
 
 
 @njit(error_model="numpy", **LEAN)
@@ -120,14 +122,25 @@ def list_force(dq, bonds, tally, now, law, growth, table, v0, dt):
 
 
 @njit(error_model="numpy", **LEAN)
-def _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
-    """Integral of the force over a share of the increment by five Gauss points."""
+def list_energy(dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Energy [m] of all bonds, those of the increment too, after the straight increment dq in the stretch reading."""
+    middle = _after(dq, now, growth, v0, v0, dt)[5]
+    young = middle * middle / law[2] * share(law[0] + 1, abs(dq) / middle)
+    return young + list_state(dq, bonds, tally, now, law, growth, table, v0, dt)[1]
+
+
+@njit(error_model="numpy", **LEAN)
+def _panel(energy, low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Integral of the force, or of the energy, over a share of the increment by five Gauss points."""
     out = 0.0
     for y, w in ((-0.906179845938664, 0.23692688505618908), (-0.5384693101056831, 0.47862867049936647),
                  (0.0, 0.5688888888888889), (0.5384693101056831, 0.47862867049936647),
                  (0.906179845938664, 0.23692688505618908)):
         part = low + (high - low) * (1 + y) / 2
-        out += w / 2 * list_force(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
+        if energy:
+            out += w / 2 * list_energy(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
+        else:
+            out += w / 2 * list_force(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
     return (high - low) * out
 
 
@@ -135,23 +148,48 @@ def _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
 def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     """Path-mean weight over the increment.
 
-    Closed for the stretch reading of order 1. Else Simpson's rule where the increment is short (its first force is
-    known), five Gauss points up to half a bond length, beyond it such panels that double.
+    Stretch reading of order 1: closed. Of another order: what damage takes, the share dR/eps of the stored energy, and
+    the gain of that energy, so that no step creates any (twin: `quadrature.Quadrature.step`). Printed law: the mean of
+    the force. Integrals by Simpson's rule where the increment is short (its first value is known), by five Gauss points
+    up to half a bond length, beyond it by such panels that double. An increment that touches the place of the first
+    bonds takes Gauss points as well: their force may jump there, and its value at the place itself is that of neither
+    side.
     """
     if dq == 0:
         return tally[5]
     if law[1] == MOMENTS:
         return list_slope(dq, bonds, tally, now, law, growth, v0, dt)[0]
     size = abs(dq) / now[4]
-    if tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0:
+    low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
+    touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
+    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
+    if law[1] == POWER and size > LEAST_BALANCED:
+        gain = list_energy(dq, bonds, tally, now, law, growth, table, v0, dt) - tally[4]
+        middle = _after(dq, now, growth, v0, v0, dt)[5]
+        spent = _path_mean(True, short, gain + tally[4], dq, bonds, tally, now, law, growth, table, v0, dt)
+        return (spent * abs(dq) / middle + gain) / dq
+    last = 0.0
+    if short:
+        last = list_force(dq, bonds, tally, now, law, growth, table, v0, dt)
+    return _path_mean(False, short, last, dq, bonds, tally, now, law, growth, table, v0, dt)
+
+
+@njit(error_model="numpy", **LEAN)
+def _path_mean(energy, short, last, dq, bonds, tally, now, law, growth, table, v0, dt):
+    """Path mean of the force, or of the energy, over the increment; last: its value at the end of a short one."""
+    if short:
+        if energy:
+            half = list_energy(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
+            return (tally[4] + 4 * half + last) / 6
         half = list_force(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
-        return (tally[5] + 4 * half + list_force(dq, bonds, tally, now, law, growth, table, v0, dt)) / 6
+        return (tally[5] + 4 * half + last) / 6
+    size = abs(dq) / now[4]
     if size <= 0.5:
-        return _panel(0.0, 1.0, dq, bonds, tally, now, law, growth, table, v0, dt)
+        return _panel(energy, 0.0, 1.0, dq, bonds, tally, now, law, growth, table, v0, dt)
     low, high, out = 0.0, 0.5 / size, 0.0
     while low < 1:
         high = 1.0 if high > 0.75 else high
-        out += _panel(low, high, dq, bonds, tally, now, law, growth, table, v0, dt)
+        out += _panel(energy, low, high, dq, bonds, tally, now, law, growth, table, v0, dt)
         low, high = high, 2 * high
     return out
 

@@ -10,6 +10,7 @@ from .bond_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start
 
 GONE = 1e-8  # share of a bond length that was there when a bond formed
 MOST_AGED = 0.1  # widest growth J across one strip of growing bonds
+MOST_YOUNGER = 0.1  # share that the last bond of a strip may be shorter than its first
 
 
 @njit(error_model="numpy", **LEAN)
@@ -63,11 +64,13 @@ def _gone(bonds, k, now):
 
 @njit(error_model="numpy", **LEAN)
 def _evenly_aged(bonds, i, k, now):
-    """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds."""
+    """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds while the bonds
+    themselves differ by less than the share MOST_YOUNGER in length."""
     if _gone(bonds, k, now):
         return True
-    young = start_length(0.0, bonds[5, k], bonds[6, k])
-    return young <= exp(MOST_AGED) * start_length(1.0, bonds[5, i], bonds[6, i])
+    young, old = start_length(0.0, bonds[5, k], bonds[6, k]), start_length(1.0, bonds[5, i], bonds[6, i])
+    left = exp(now[5] - now[3])
+    return young <= exp(MOST_AGED) * old and now[4] - left * young >= (1 - MOST_YOUNGER) * (now[4] - left * old)
 
 
 @njit(error_model="numpy", **LEAN)

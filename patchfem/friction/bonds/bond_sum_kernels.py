@@ -19,6 +19,7 @@ from ..flags_kernels import LEAN
 from .bond_math_kernels import FAST, fexp, flog, share, tabled
 
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
+SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
 FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, seen from the end of a strip
 
 
@@ -250,26 +251,32 @@ def own_length(part, psi, length, c0, c1):
 
 @njit(error_model="numpy", **LEAN)
 def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
-    """One strip of growing bonds with u = 0 inside, or with R^p (p < 0) still steep: two points on each side."""
-    step, near, force, energy = b - a, path - at, 0.0, 0.0
+    """One strip of growing bonds with u = 0 inside, or with p < 0 near its end: two points on each side of u = 0.
+
+    A young bond has own proportional to R, so that (R/own)^p is smooth and the points are Gauss's in R. Where the bonds
+    grew at rest instead, R^p is steep towards R = 0 and the points are Gauss's in R^(p + 1), which takes it in exactly.
+    """
+    step, near, force, energy = b - a, max(path - at, 0.0), 0.0, 0.0
     turn = min(max((b - q) / step, 0.0), 1.0)
-    steep = p < 0 and near < 3 * wide and own_length(0.0, psi, length, c0, c1) > 0.5 * own_length(
-        1.0, psi, length, c0, c1)
+    steep = False
+    if p < 0:
+        last, first = own_length(0.0, psi, length, c0, c1), own_length(1.0, psi, length, c0, c1)
+        steep = last > SPROUTING * first and near * first < 0.5 * (near + wide) * last
     for side in range(2):
         low, high = (0.0, turn) if side == 0 else (turn, 1.0)
         if high <= low:
             continue
         for half in range(2):
+            share = FIRST if half == 0 else SECOND
+            part = low + share * (high - low)
+            weight = 0.5 * (high - low) * wide
             if steep:
-                x0 = max(near, 0.0) + (low + 0.5 * half * (high - low)) * wide
-                x1 = x0 + 0.5 * (high - low) * wide
-                part = low + (0.25 + 0.5 * half) * (high - low)
-                own = own_length(part, psi, length, c0, c1)
-                f = (x1 ** (p + 1) - x0 ** (p + 1)) / (p + 1) * own ** (-p) * fexp(-(near + part * wide) / own)
-            else:
-                part = low + (FIRST if half == 0 else SECOND) * (high - low)
-                x = max(near + part * wide, 1e-300) / own_length(part, psi, length, c0, c1)
-                f = 0.5 * (high - low) * wide * fexp(p * flog(x) - x)
+                start, end = (near + low * wide) ** (p + 1), (near + high * wide) ** (p + 1)
+                place = (start + share * (end - start)) ** (1 / (p + 1))
+                part = (place - near) / wide
+                weight = 0.5 * (end - start) / (p + 1) * place ** (-p)
+            x = max(near + part * wide, 1e-300) / own_length(part, psi, length, c0, c1)
+            f = weight * fexp(p * flog(x) - x)
             u = q - b + part * step
             force += np.copysign(f, u)
             energy += f * abs(u)

@@ -8,7 +8,8 @@ from .bond_list import AGED, MOMENTS, POWER, SHARES, form_of
 from .parameters import Bonds
 
 ENGINES = ("direct", "truncated", "merged", "recursion")
-MERGING = (0.25, 0.75, 1.0)  # largest measured error over merge width squared: order >= 1, growing bonds, order < 1
+MERGING = (0.25, 2.5, 1.0)  # largest measured error over merge width squared: order >= 1, growing bonds, order < 1
+YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
 SHARES_ANY = 4e-8  # the same for the printed law at constant length with an order other than 0, 1, 2
 PASS, STEP = 1.5e-7, 5e-7  # seconds per pass over the list and per step besides
@@ -71,7 +72,7 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
 
 
 def _merging(law) -> float:
-    return MERGING[2 if law.order < 1 else 1 if form_of(law) == AGED else 0]
+    return MERGING[1 if form_of(law) == AGED else 2 if law.order < 1 else 0]
 
 
 def _priced(law, name, tail, merge, stroke, steps) -> Choice:
@@ -92,5 +93,7 @@ def _priced(law, name, tail, merge, stroke, steps) -> Choice:
         cost = SHARES_ANY
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
     seconds = STEP + PASSES * (PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
-    error = tail + (_merging(law) * merge**2 if name == "merged" and form != MOMENTS else 0.0)
+    error = tail
+    if name == "merged" and merge > 0 and form != MOMENTS:
+        error += _merging(law) * merge**2 + (YOUNG if form == AGED and law.order < 0 else 0.0)
     return Choice(name, tail, merge if name == "merged" else 0.0, error, strips, seconds)

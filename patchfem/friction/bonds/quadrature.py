@@ -89,8 +89,10 @@ class Quadrature:
             part = free / dq * (bonds[1] + loose[1]) / 2 + damaging / dq * part
             mean = self.law.static / self.law.length * part
         elif self.law.reading == "stretch":
-            spent = self._spent(state, dq, s0, s1, dt)
-            return Step((spent + self.stored(after) - self.stored(state)) / dq, spent, after)
+            # bonds lost at the end of the step leave their energy to nobody: the force holds them until then
+            held = after if (s1 > 0).all() else self._moved(state, dq, s0, np.maximum(s1, np.finfo(float).tiny), dt,
+                                                            forming=(s0 + s1) / 2)
+            mean = (self._spent(state, dq, s0, s1, dt) + self.stored(held) - self.stored(state)) / dq
         else:
             mean = np.zeros(len(s0))
             for part, w in zip((1 + _NODES) / 2, _WEIGHTS / 2):

@@ -95,10 +95,19 @@ class Convolution:
     pattern: np.ndarray | None = None
     kept: dict = field(default_factory=dict)
     at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
+    holds: ClassVar[bool] = True  # the last traction at rest
 
     def start(self, sigma) -> Averaged:
         """No traction before any motion."""
         return Averaged(np.zeros_like(sigma), 0.0, 0.0)
+
+    def share(self, dq, dt):
+        """Share [1] of the limit that is carried in increments dq [m] of any duration; 0 at rest."""
+        return np.sign(dq)
+
+    def limit(self, sigma, way: float):
+        """Traction (m,) [Pa] of a motion of sign `way` under a pressure sigma (m,) [Pa] that rides on the mover."""
+        return self.static * self._averaged(0.0, sigma, way)
 
     def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]; the mean is that of its two ends."""

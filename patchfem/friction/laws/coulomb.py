@@ -18,6 +18,7 @@ class Coulomb:
     kinetic: float
     static: float | None = None
     at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
+    holds: ClassVar[bool] = True  # the last traction at rest
 
     def element(self, load: float) -> Element:
         """The law of a contact under a constant load [N]: no kernels with a slope."""
@@ -27,6 +28,14 @@ class Coulomb:
     def start(self, sigma):
         """State: the last traction (m,) [Pa], 0 before any motion."""
         return np.zeros_like(sigma)
+
+    def share(self, dq, dt):
+        """Share [1] of the limit that is carried in increments dq [m] of any duration; 0 at rest."""
+        return np.sign(dq)
+
+    def limit(self, sigma, way: float):
+        """Largest traction (m,) [Pa] of a motion of either sign."""
+        return self.kinetic * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
         """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]."""

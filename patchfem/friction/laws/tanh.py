@@ -16,6 +16,7 @@ class Rate:
     static: float
     speed: float
     at_once: ClassVar[bool] = True
+    holds: ClassVar[bool] = False
 
     def element(self, load: float) -> Element:
         """The law of a contact under a constant load [N]."""
@@ -26,10 +27,20 @@ class Rate:
         """State: the last traction (m,) [Pa], 0 before any motion."""
         return np.zeros_like(sigma)
 
-    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] in dt [s] under pressure s0 -> s1 (m,) [Pa]; a jump in no time has no speed
+    def share(self, dq, dt):
+        """Share [1] of the limit that is carried in increments dq [m] over dt [s]; a jump in no time has no speed
         limit."""
-        part = np.tanh(dq / dt / self.speed) if dt > 0 else np.sign(dq)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.tanh(np.divide(dq, dt) / self.speed)
+        return np.where(np.greater(dt, 0), part, np.sign(dq))[()]
+
+    def limit(self, sigma, way: float):
+        """Largest traction (m,) [Pa] of a motion of either sign."""
+        return self.static * sigma
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] in dt [s] under pressure s0 -> s1 (m,) [Pa]."""
+        part = self.share(dq, dt)
         mean = self.static * (s0 + s1) / 2 * part
         return Step(mean, mean * dq, self.static * s1 * part)
 

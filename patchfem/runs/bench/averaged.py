@@ -3,39 +3,39 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...effects import has
 from ...friction.laws.convolution import Convolution, average, limits
 
 ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
 
 
-def law_on(scene, patch) -> Convolution:
+def law_on(model, patch) -> Convolution:
     """The law of a bench scene; patch None for [normal]."""
-    f = scene.friction
+    f = model.friction
     if patch is None:
         return Convolution(f.static, f.bond_length, f.order)
-    from ...model.gap import shape_side
 
-    pattern = patch.pressure.sigma_n if shape_side(scene.contact) == "lower" else None
+    pattern = patch.pressure.sigma_n if model.side == "lower" else None
     return Convolution(f.static, f.bond_length, f.order, patch.x, pattern)
 
 
-def limit_share(scene, patch) -> float:
+def limit_share(model, patch) -> float:
     """Limit force of a rigid block over mu_s N. PatchfemError where it differs between the two ways of the slide."""
-    f = scene.friction
-    if patch is None or f.law != "convolution":
+    f = model.friction
+    if patch is None or not has(f.law, "averaged"):
         return 1.0
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
-        raise PatchfemError(f"{scene.where('friction.law')}: 'convolution' on a pressure that is not symmetric: the "
+        raise PatchfemError(f"'convolution' on a pressure that is not symmetric: the "
                             f"limit is {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
-                            "patch symmetric or use a bench, [slide]; not yet built")
+                            "patch symmetric or use a bench, [slide]; not yet built", "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 
 
-def limit_tractions(scene, patch, force) -> np.ndarray:
+def limit_tractions(model, patch, force) -> np.ndarray:
     """Tractions (f, m) [Pa] of resultants force (f,) [N] of a rigid block: the averaged pressure of their way."""
-    f, x = scene.friction, patch.x
+    f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
     shape = [np.where(sigma > 0, average(x, x, sigma, way, f.bond_length, f.order), 0.0) for way in (1.0, -1.0)]
     one = [part / max(weight @ part, 1e-300) for part in shape]

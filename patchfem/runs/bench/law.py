@@ -1,28 +1,47 @@
-"""The law object that a bench steps: one per value of friction.law."""
+"""The law object that a bench steps, one per value of friction.law, and the pressure it rubs under."""
+
+import numpy as np
 
 from ...effects import has
-from ...model.law import bonds_of
 
 
-def law_for(scene, patch=None):
+def law_for(model, patch=None):
     """The NumPy law object of a bench; only an averaged law looks at the patch."""
-    f = scene.friction
+    f = model.friction
     if has(f.law, "averaged"):
         from .averaged import law_on
 
-        return law_on(scene, patch)
+        return law_on(model, patch)
     if not has(f.law, "bonds"):
         from ...friction.record import law_from
 
-        return law_from(f, patch.pressure.load if patch is not None else scene.normal.load)
+        return law_from(f, patch.pressure.load if patch is not None else model.point.load)
     from ...friction.bonds.quadrature import Quadrature
     from ...friction.bonds.recursion import Recursion
 
-    law = bonds_of(scene)
-    engine = scene.accuracy.quadrature
+    law = model.bonds
+    engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
         return Recursion(law)
     if engine == "direct":
         return Quadrature(law, 0.0)
-    tail = scene.accuracy.tail if scene.accuracy.tail is not None else 1e-3 * scene.accuracy.tolerance
+    tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
     return Quadrature(law, tail)
+
+
+def pressed(model, patch) -> tuple:
+    """(pressure (m,) [Pa], nodal area (m,) [m2]) of the points; one point that carries the load without a patch."""
+    if patch is None:
+        return np.array([model.point.load]), np.ones(1)
+    return patch.pressure.sigma_n, patch.pieces.interface.weight
+
+
+def ends_of_rest(model, slide) -> dict:
+    """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
+    the first sample of a slide and the last of every rest."""
+    f = model.friction
+    if not has(f.law, "set-valued") or not (f.kinetic or f.static) < f.static:
+        return {}
+    moves = np.sign(np.diff(slide))
+    ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))
+    return {int(k): float(moves[k]) for k in ends}

@@ -1,37 +1,62 @@
-"""Energy book of a bench, its frames, and the refusal of sums that would take too long."""
+"""What one pass of a bench leaves behind: its histories, its energy book and its frames."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Missing
+from ...effects import has
 
-MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
+ROUND = 1e-13  # of what a law dissipates: created energy below it is round-off
+
+
+class Slid(NamedTuple):
+    """Histories of a pass over k samples. force, load, slip: (k,) [N], [N], [m]; ledger: of `ledger_of` [J]; frames:
+    (f,) numbers of the samples of the frames; tau, local: (f, m) traction [Pa] and irreversible slip [m] there."""
+
+    force: np.ndarray
+    load: np.ndarray
+    slip: np.ndarray
+    ledger: np.ndarray
+    frames: np.ndarray
+    tau: np.ndarray
+    local: np.ndarray
 
 
 def ledger_of(work, stored, losses) -> np.ndarray:
     """(4, k): work, stored, dissipated and created energy [J] of samples, from the (gain, loss) (k, 2) [J] of every
     step over the points that create energy and those that lose it."""
     created, dissipated = np.cumsum(losses, axis=0).T
-    created = created if created[-1] > 1e-13 * dissipated[-1] else 0 * created  # round-off
+    created = created if created[-1] > ROUND * dissipated[-1] else 0 * created
     return np.stack([work, stored, dissipated, created])
 
 
-def _split(losses) -> tuple:
-    """(created, dissipated) of the energy that places lose, some of it below zero."""
-    return -np.minimum(losses, 0.0).sum(), np.maximum(losses, 0.0).sum()
+def split(losses) -> tuple:
+    """(created, dissipated) of the energy (..., m) that points lose, some of it below zero; summed over the points."""
+    return -np.minimum(losses, 0.0).sum(axis=-1), np.maximum(losses, 0.0).sum(axis=-1)
 
 
-def _frame_numbers(count: int, frames: int) -> np.ndarray:
-    """Samples of the frames; the first sample is the pressed state, which is a frame of its own."""
+def frame_numbers(count: int, frames: int) -> np.ndarray:
+    """Numbers of the samples of the frames; the first sample is the pressed state, which is a frame of its own."""
     at = np.linspace(0, count - 1, frames + 1).round().astype(int)[1:]
     return np.unique(at[at > 0]) if frames else np.zeros(0, int)
 
 
-def _refuse_costly(scene, law, samples: int, points: int, slide) -> None:
-    if not hasattr(law, "weights"):
-        return
-    reach = 25 * scene.friction.bond_length
-    per_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(samples, 2 * reach / per_step + 64)
-    if 6 * strips * samples * points > MOST_WORK:
-        raise Missing(f"{scene.path}: the direct quadrature would form {6 * strips * samples * points:.1e} products, "
-                      f"more than {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles")
+def elastic_slip(model, slide, force, load) -> np.ndarray:
+    """Irreversible slip (k,) [m] of the whole interface along the slide (k,) [m]: without the stretch of the bonds,
+    which counts up to one bond length."""
+    length, static = _length(model), model.friction.static
+    stretch = length * np.divide(force, static * load, out=np.zeros_like(force), where=static * load > 0)
+    return slide - np.clip(stretch, -length, length)
+
+
+def local_slip(model, slide, tau, sigma) -> np.ndarray:
+    """Irreversible slip (f, m) [m] of points under the traction tau (f, m) and the pressure sigma, (m,) or (f, m) [Pa],
+    that share the slide (f,) [m]."""
+    limit = np.broadcast_to(model.friction.static * sigma, tau.shape)
+    return slide[:, None] - _length(model) * np.divide(tau, limit, out=np.zeros_like(tau), where=limit > 0)
+
+
+def _length(model) -> float:
+    """Bond length [m], 0 of a law that does not stretch."""
+    f = model.friction
+    return (f.bond_length or 0.0) if not has(f.law, "averaged") else 0.0

@@ -3,44 +3,43 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...model.gap import shape_side
-from ...model.law import bonds_of
-from ...model.slide import lateral_corners
-from .ledger import _frame_numbers, _refuse_costly, _split, ledger_of
+from ...effects import carries, refusal
+from .ledger import Slid, frame_numbers, ledger_of, split
+from .stepped import refuse_costly
+from .watch import BLOCK, Watch
 
 
-def refuse(scene) -> None:
+def refuse(model) -> None:
     """PatchfemError naming what a slide in two directions cannot do yet."""
-    f, contact = scene.friction, scene.contact
+    f = model.friction
     reason = ""
-    if f.law != "nonlocal":
-        reason = f"law '{f.law}': use law 'nonlocal'"
-    elif f.spread is not None:
+    if not carries(f, "two-directions"):
+        reason = f"law '{f.law}': {refusal('two-directions').removesuffix('; not yet built')}"
+    elif model.spread is not None:
         reason = "friction.spread, whose width turns with the path: leave one of them out"
     elif f.breakaway:
         reason = "friction.breakaway: leave one of them out"
-    elif contact is not None and contact.gives_way:
-        reason = f"{contact.gives_way}: leave one of them out"
-    elif contact is not None and shape_side(contact) == "lower":
+    elif model.soft:
+        reason = f"{model.soft}: leave one of them out"
+    elif model.side == "lower":
         reason = "the pressure on the lower piece: put the shapes on the upper piece"
-    elif scene.normal is not None and scene.normal.amplitude:
+    elif model.load_varies:
         reason = "normal.amplitude: leave one of them out"
     if reason:
-        raise PatchfemError(f"{scene.where('slide.file')}: a lateral column beside {reason}, or leave the column out; "
-                            "not yet built")
+        raise PatchfemError(f"a lateral column beside {reason}, or leave the column out; "
+                            "not yet built", "slide.file")
 
 
-def run_plane(scene, patch, time, slide, frames: int) -> tuple:
-    """((force, load, slip, ledger, frames, tau, local) as the bench has them along x, histories of the other direction
-    by name).
+def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
+    """(Slid along x, histories of the other direction by name; `pairs` are the (slide, force) of that direction).
 
     Pressure that rides on a rigid mover is constant at every point and the law is linear in it, so every point has the
     traction of one point under unit pressure times its own. yaw_moment [N m]: sum of y f_x - x f_y, about +z of the
     friction on the upper piece, f positive against its slip; strips have their places y over the width.
     """
-    law = law_for(scene)
-    _refuse_costly(scene, law, time.size, 1, slide)
-    across = np.interp(time, *lateral_corners(scene))
+    law = law_for(model)
+    refuse_costly(model, law, time.size, 1, slide)
+    across = np.interp(time, model.slide.corners[0], model.slide.across)
     q, one = np.stack([slide, across], axis=1), np.ones(1)
     state, unit = law.start(one), np.zeros((time.size, 2))
     work, stored, losses = np.zeros(time.size), np.zeros(time.size), np.zeros((time.size, 2))
@@ -49,37 +48,39 @@ def run_plane(scene, patch, time, slide, frames: int) -> tuple:
         state = step.state
         unit[k], stored[k] = law.traction(state)[:, 0], law.stored(state)[0]
         work[k] = work[k - 1] + (q[k] - q[k - 1]) @ step.mean[:, 0]
-        losses[k] = _split(step.dissipated)
-    load, moment, roll = _pressed(scene, patch)
-    at = _frame_numbers(time.size, frames)
+        losses[k] = split(step.dissipated)
+        if k % BLOCK == 0 or k == time.size - 1:
+            watch.tell(k / (time.size - 1))
+    load, moment, roll = _pressed(model, patch)
+    at = frame_numbers(time.size, frames)
     sigma = patch.pressure.sigma_n if patch is not None else np.array([load])
     give = law.law.length / law.law.static if law.law.static > 0 else 0.0
     slip = slide - give * unit[:, 0]
     local = np.where(sigma > 0, slip[at, None], slide[at, None])
-    more = {"lateral": across, "lateral_force": load * unit[:, 1]}
+    more = {"lateral": across, "lateral_force": load * unit[:, 1], "pairs": [(across, load * unit[:, 1])]}
     if patch is not None:
         more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
-    return (load * unit[:, 0], np.full(time.size, load), slip, load * ledger_of(work, stored, losses), at,
-            np.outer(unit[at, 0], sigma), local), more
+    return Slid(load * unit[:, 0], np.full(time.size, load), slip, load * ledger_of(work, stored, losses), at,
+                np.outer(unit[at, 0], sigma), local), more
 
 
-def law_for(scene):
+def law_for(model):
     """The law object in two directions."""
-    law = bonds_of(scene)
+    law = model.bonds
     if law.reading == "stretch" and law.order == 1:
         from ...friction.bonds.plane import PlaneRecursion
 
         return PlaneRecursion(law)
     from ...friction.bonds.plane_quadrature import PlaneQuadrature
 
-    tail = scene.accuracy.tail if scene.accuracy.tail is not None else 1e-3 * scene.accuracy.tolerance
+    tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
     return PlaneQuadrature(law, tail)
 
 
-def _pressed(scene, patch) -> tuple:
+def _pressed(model, patch) -> tuple:
     """(load [N], sum f x, sum f y [N m]) of the pressure; y from the strips, 0 without them."""
     if patch is None:
-        return scene.normal.load, 0.0, 0.0
+        return model.point.load, 0.0, 0.0
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     roll = patch.strips.roll_moment if patch.strips is not None else 0.0
     return float(force.sum()), float(force @ patch.x), roll

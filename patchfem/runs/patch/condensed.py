@@ -1,4 +1,4 @@
-"""The two pieces of a scene: their meshes, materials and the compliance of their common interface."""
+"""The two pieces of a patch: their meshes, materials and the compliance of their common interface."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -73,13 +73,12 @@ def compliance_of(body, piece, fresh: bool) -> tuple:
     return found
 
 
-def condensed(scene, grid, upper_grid=None, fresh: bool = False) -> Pair:
-    """Assemble and condense the pieces of a scene: bodies of `bodies_of`, the upper None where it is alike."""
-    contact = scene.contact
-    width = contact.width * contact.pairs
+def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
+    """Assemble and condense the pieces of a `PatchModel`: bodies of `bodies_of`, the upper None where it is alike."""
+    width = asked.width * asked.pairs
     start = perf_counter()
-    piece = finite_elements(grid, layers_of(contact, "lower"))
-    upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(contact, "upper"))
+    piece = finite_elements(grid, layers_of(asked, asked.lower))
+    upper = piece if upper_grid is None else finite_elements(upper_grid, layers_of(asked, asked.upper))
     assembled = perf_counter()
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)

@@ -8,7 +8,6 @@ import numpy as np
 from ...core import Outcome, frozen_array
 from ...mesh.grading import Layout, columns
 from ...mesh.tensor import TensorGrid, finer, graded_depth
-from ...model.pieces import piece_of, unlike
 from .condensed import condensed
 from .measures import measures, order
 from .press import Patch, pressed
@@ -34,36 +33,36 @@ class Base:
         return Base(self.layout.times(share), self.growth**share)
 
 
-def solve_graded(scene, fresh: bool = False) -> tuple:
+def solve_graded(asked, tolerance: float, fresh: bool = False) -> tuple:
     """(Patch, on the mesh with cells twice as long, four times as long) where every decisive measure has the tolerance.
 
     Three meshes tell by how much their cells must shrink: they are halved, or all three are made anew where less is
     enough. A measure that the largest affordable mesh would not bring to the tolerance, the singular peak of a step
     say, asks for nothing; a warning of the run names it.
     """
-    base = _affordable(scene, _base(scene))
-    series = _series(scene, base, fresh)
+    base = _affordable(asked, _base(asked, tolerance))
+    series = _series(asked, base, fresh)
     while True:
-        share = _share(scene, series)
+        share = _share(tolerance, series)
         if share >= 1 or max(share, 0.5) < _reach(_own(series[0])):
             return series
         if share > 0.55:
             base = base.shrunk(share)
-            series = _series(scene, base, fresh)
+            series = _series(asked, base, fresh)
         else:
             base = base.shrunk(0.5)
-            series = (_finer(scene, series[0], fresh), *series[:2])
+            series = (_finer(asked, series[0], fresh), *series[:2])
 
 
-def _series(scene, base: Base, fresh: bool) -> tuple:
-    out = [_on(scene, _grids(scene, columns(base.layout), base.growth), fresh)]
+def _series(asked, base: Base, fresh: bool) -> tuple:
+    out = [_on(asked, _grids(asked, columns(base.layout), base.growth), fresh)]
     for _ in range(2):
-        out.append(_finer(scene, out[-1], fresh))
+        out.append(_finer(asked, out[-1], fresh))
     return tuple(out[::-1])
 
 
-def _finer(scene, patch: Patch, fresh: bool) -> Patch:
-    return _on(scene, [finer(grid) for grid in _own(patch)], fresh)
+def _finer(asked, patch: Patch, fresh: bool) -> Patch:
+    return _on(asked, [finer(grid) for grid in _own(patch)], fresh)
 
 
 def _own(patch: Patch) -> tuple:
@@ -72,27 +71,27 @@ def _own(patch: Patch) -> tuple:
     return (low,) if high is low else (low, high)
 
 
-def _on(scene, grids, fresh: bool = False) -> Patch:
-    return pressed(scene, condensed(scene, *grids, fresh=fresh))
+def _on(asked, grids, fresh: bool = False) -> Patch:
+    return pressed(asked, condensed(asked, *grids, fresh=fresh))
 
 
-def _share(scene, series) -> float:
+def _share(tolerance: float, series) -> float:
     """By how much the cells must shrink for the decisive measures that can get the tolerance; 1 where none asks."""
     if series[0].pressure.outcome is Outcome.NO_CONTACT:
         return 1.0
     found, reach, out = measures(*series), _reach(_own(series[0])), 1.0
     orders = order(*series)
     for name in DECISIVE:
-        error, wanted = found[name].error, scene.accuracy.tolerance * abs(found[name].value) + 1e-12
+        error, wanted = found[name].error, tolerance * abs(found[name].value) + 1e-12
         share = 0.95 * (wanted / error)**(1 / orders[name]) if error > wanted else 1.0
         if share >= reach:
             out = min(out, share)
     return out
 
 
-def _affordable(scene, base: Base) -> Base:
+def _affordable(asked, base: Base) -> Base:
     """The base, its cells longer where splitting them twice would already take too much work."""
-    grids = _grids(scene, columns(base.layout), base.growth)
+    grids = _grids(asked, columns(base.layout), base.growth)
     return base.shrunk(max(1.0, 4 * _reach(grids)))
 
 
@@ -105,16 +104,16 @@ def _reach(grids) -> float:
     return max(grids[0].x.size / MOST_COLUMNS, (work / MOST_WORK)**0.25)
 
 
-def _base(scene) -> Base:
+def _base(asked, tolerance: float) -> Base:
     """The coarsest grids, their columns graded to the contact that they find."""
-    size = scene.contact.length
+    size = asked.length
     layout = Layout(size, (), (-size / 2, size / 2), size / SEARCH_CELLS, size / SEARCH_CELLS, size / SEARCH_CELLS, 0.0)
     for _ in range(8):
-        found = _loaded(_on(scene, _grids(scene, columns(layout), GROWTH)))
+        found = _loaded(_on(asked, _grids(asked, columns(layout), GROWTH)))
         if found is None:
             break
         span, places, cell = found
-        layout = _layout(size, span, places, scene.accuracy.tolerance)
+        layout = _layout(size, span, places, tolerance)
         if cell <= (span[1] - span[0]) / 64:  # the places are known better than the coarsest cells there
             break
     return Base(layout)
@@ -149,15 +148,14 @@ def _loaded(patch: Patch) -> tuple | None:
     return (float(np.squeeze(low)), float(np.squeeze(high))), [*corners, *ends.tolist()], float(cells.max(initial=0.0))
 
 
-def _grids(scene, x, growth: float) -> list:
-    sides = ("lower", "upper") if unlike(scene.contact) else ("lower",)
-    return [_grid(scene, x, side, growth) for side in sides]
+def _grids(asked, x, growth: float) -> list:
+    pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
+    return [_grid(asked, x, piece, growth) for piece in pieces]
 
 
-def _grid(scene, x, side: str, growth: float) -> TensorGrid:
-    height, _, coating = piece_of(scene.contact, side)
-    depth, rows = graded_depth(height, float(np.diff(x).min()), coating.thickness if coating else 0.0, growth, 2)
-    most = max(scene.contact.length / 4, height / 24) * np.log(growth) / np.log(GROWTH)
+def _grid(asked, x, piece, growth: float) -> TensorGrid:
+    depth, rows = graded_depth(piece.height, float(np.diff(x).min()), piece.thickness, growth, 2)
+    most = max(asked.length / 4, piece.height / 24) * np.log(growth) / np.log(GROWTH)
     return TensorGrid(frozen_array(x), _no_taller(depth, most), rows)
 
 

@@ -18,34 +18,31 @@ CORNER = 0.15  # largest share of the pressure at the corner of a coating that c
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
-def plane_band(scene, patch: Patch) -> list:
+def plane_band(asked, patch: Patch) -> list:
     """One sentence on the model error of the plane state, from the mesh of `patch`; none for a piece far wider than
     tall in plane strain or far taller than wide in plane stress. Between the two no mesh narrows the band."""
-    contact, pair = scene.contact, patch.pair
-    ratio = contact.width / contact.height
-    if ratio >= CLEAR if contact.plane == "strain" else ratio <= 1 / CLEAR:
+    pair, ratio = patch.pair, asked.width / asked.height
+    if ratio >= CLEAR if asked.plane == "strain" else ratio <= 1 / CLEAR:
         return []
-    other = "stress" if contact.plane == "strain" else "strain"
-    turned = replace(scene, contact=contact.model_copy(update={"plane": other}))
+    other = "stress" if asked.plane == "strain" else "strain"
     upper = None if pair.upper is pair.piece else pair.upper_grid
-    mine, theirs = values(patch), values(solve(turned, pair.grid, upper))
-    first = "approach" if contact.approach is None else "normal_load"
+    mine, theirs = values(patch), values(solve(replace(asked, plane=other), pair.grid, upper))
+    first = "approach" if asked.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {closing:+.2g} m"] if closing else []
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
-    return [f"plane {contact.plane} is assumed for pieces {ratio:.2g} times as wide as tall; the truth lies towards "
+    return [f"plane {asked.plane} is assumed for pieces {ratio:.2g} times as wide as tall; the truth lies towards "
             f"plane {other}, which would change {', '.join(parts)}"] if parts else []
 
 
-def strip_error(scene, patch: Patch, found: dict) -> dict:
+def strip_error(asked, patch: Patch, found: dict) -> dict:
     """Measures `found` with what the number of strips adds to their errors: the change to half as many on the mesh of
     `patch`, three times what second order leaves of it."""
-    count = scene.contact.strips.count
+    count, roll = asked.strips
     if count < 2:
         return found
-    strips = scene.contact.strips.model_copy(update={"count": max(1, count // 2)})
-    half = values(pressed(replace(scene, contact=scene.contact.model_copy(update={"strips": strips})), patch.pair))
+    half = values(pressed(replace(asked, strips=(max(1, count // 2), roll)), patch.pair))
     here = values(patch)
     return {name: replace(m, error=m.error + abs(here[name] - half[name])) for name, m in found.items()}
 

@@ -8,8 +8,6 @@ from scipy.optimize import brentq
 
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
-from ...model.gap import gap_of
-from ...model.load import moment_of, spring_of
 from ...slip.shear_modes import SHEAR_MODES
 from .condensed import Pair, condensed
 
@@ -50,29 +48,29 @@ class Patch:
         return self.pressure.sigma_n > 0
 
 
-def solve(scene, grid, upper_grid=None, fresh: bool = False) -> Patch:
-    """Assemble, condense and press the pieces of a scene: bodies of `bodies_of`, the upper None where it is alike."""
-    return pressed(scene, condensed(scene, grid, upper_grid, fresh))
+def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
+    """Assemble, condense and press the pieces of a `PatchModel`: bodies of `bodies_of`, the upper None where alike."""
+    return pressed(asked, condensed(asked, grid, upper_grid, fresh))
 
 
-def pressed(scene, pair: Pair, worn=None) -> Patch:
-    """The pair under the shapes, the load and the holder of a scene; the pair serves any number of them. worn (m,) [m]:
-    depth that wear has added to the gap."""
-    contact, pieces = scene.contact, pair.compliance
-    gap, notes, seconds = gap_of(scene, pieces.interface.x)
+def pressed(asked, pair: Pair, worn=None) -> Patch:
+    """The pair under the shapes, the load and the holder of a `PatchModel`; the pair serves any number of them.
+
+    worn (m,) [m]: depth that wear has added to the gap. PatchfemError where a profile does not fit the mesh.
+    """
+    gap, notes, seconds = asked.gap.at(pair.compliance.interface.x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    angle = contact.tilt.angle if contact.tilt is not None and contact.tilt.on == "upper" else 0.0
     begin = perf_counter()
-    turns = contact.load_line is not None or spring_of(contact) > 0
-    how = _closed_by if contact.approach is not None and turns else _under
-    pieces, pressure, skin, strips = how(contact, pieces, gap, angle)
+    turns = asked.rotates or asked.spring > 0
+    how = _closed_by if asked.approach is not None and turns else _under
+    pieces, pressure, skin, strips = how(asked, pair.compliance, gap)
     seconds["press"] = perf_counter() - begin
     giving = pieces.tangential
-    if contact.shear is None:
+    if not asked.shear:
         giving = frozen_array(giving - pair.compliance.tangential)
-    if contact.holder is not None and contact.holder.tangential_stiffness:
-        giving = frozen_array(giving + 1 / contact.holder.tangential_stiffness)
-    ratio = contact.asperities.tangential_ratio if contact.asperities is not None else None
+    if asked.slide_spring:
+        giving = frozen_array(giving + 1 / asked.slide_spring)
+    ratio = asked.skin.tangential_ratio if asked.skin is not None else None
     if strips is not None:
         notes = (*notes, strips.note)
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
@@ -80,39 +78,39 @@ def pressed(scene, pair: Pair, worn=None) -> Patch:
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
 
 
-def _under(contact, pieces: Compliance, gap, angle: float) -> tuple:
+def _under(asked, pieces: Compliance, gap) -> tuple:
     """(Compliance with its skin, Pressure, skin, strips) under the load, or the approach with the rotation held."""
     strips = skin = None
-    if contact.strips is not None:
+    angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
+    if asked.strips is not None:
         from .strips import in_strips
 
-        pieces, pressure, skin, strips = in_strips(contact, pieces, gap, angle, moment_of(contact), spring_of(contact))
-    elif contact.asperities is not None and contact.asperities.law != "linear":
+        pieces, pressure, skin, strips = in_strips(asked, pieces, gap, angle, moment, spring)
+    elif asked.skin is not None and asked.skin.law != "linear":
         from .skin import behind_skin
 
-        pieces, pressure, skin = behind_skin(contact, pieces, gap, angle, moment_of(contact), spring_of(contact))
+        pieces, pressure, skin = behind_skin(asked, pieces, gap, angle, moment, spring)
     else:
-        if contact.asperities is not None:
-            pieces = with_linear_skin(contact.asperities, pieces)
-        if contact.approach is not None:
-            pressure = press_by(pieces, gap, contact.approach.distance, angle)
+        if asked.skin is not None:
+            pieces = with_linear_skin(asked.skin, pieces)
+        if asked.approach is not None:
+            pressure = press_by(pieces, gap, asked.approach, angle)
         else:
-            pressure = press(pieces, gap, contact.load, moment_of(contact), angle, spring=spring_of(contact))
+            pressure = press(pieces, gap, asked.load, moment, angle, spring=spring)
     return pieces, pressure, skin, strips
 
 
-def _closed_by(contact, pieces: Compliance, gap, angle: float) -> tuple:
+def _closed_by(asked, pieces: Compliance, gap) -> tuple:
     """As `_under` for an approach of a piece that turns: the load at which it is reached, since the approach grows with
     the load. Where a load a millionth of what flat pieces would take is too much, nothing touches."""
-    distance, tried = contact.approach.distance, []
+    distance, tried = asked.approach, []
 
     def short(log_load: float) -> float:
-        loaded = contact.model_copy(update={"load": float(np.exp(log_load)), "approach": None})
-        tried.append(_under(loaded, pieces, gap, angle))
+        tried.append(_under(replace(asked, load=float(np.exp(log_load)), approach=None), pieces, gap))
         return tried[-1][1].approach - distance
 
     top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
-    least = _least_load(contact, np.ptp(pieces.interface.x))
+    least = _least_load(asked, np.ptp(pieces.interface.x))
     low = top = max(top, np.log(2 * least) if least > 0 else top)
     bottom = max(top - np.log(1e6), np.log(least * (1 + 1e-9)) if least > 0 else -np.inf)
     for _ in range(60):
@@ -121,8 +119,8 @@ def _closed_by(contact, pieces: Compliance, gap, angle: float) -> tuple:
         low, top = top, top + 2
     while low == top or short(low) >= 0:
         if low == bottom:
-            apart = contact.model_copy(update={"load": 0.0, "approach": None, "load_line": None, "holder": None})
-            pieces, still, skin, strips = _under(apart, pieces, gap, angle)
+            apart = replace(asked, load=0.0, approach=None, rotates=False, spring=0.0)
+            pieces, still, skin, strips = _under(apart, pieces, gap)
             open_ = frozen_array(gap - min(distance, gap.min()))
             return pieces, replace(still, gap=open_, approach=distance), skin, strips
         low, top = max(low - 2, bottom), low
@@ -130,10 +128,10 @@ def _closed_by(contact, pieces: Compliance, gap, angle: float) -> tuple:
     return tried[-1]
 
 
-def _least_load(contact, length: float) -> float:
+def _least_load(asked, length: float) -> float:
     """Load [N] below which a free piece tips over under its moment."""
-    line = contact.load_line
-    return 2 * abs(line.moment) / length if line is not None and line.moment and spring_of(contact) == 0 else 0.0
+    tips = asked.rotates and asked.line_moment and asked.spring == 0
+    return 2 * abs(asked.line_moment) / length if tips else 0.0
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:

@@ -8,17 +8,17 @@ from ...core import Compliance, Pressure, frozen_array
 from .skin import borne
 
 
-def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
+def in_strips(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
     """(Compliance of all strips, Pressure of their means over the width, skin or None, StripsState).
 
     The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
     """
-    count, interface = contact.strips.count, pieces.interface
-    skin = law_of(contact)
-    by = contact.approach.distance if contact.approach is not None else None
+    (count, roll), interface = asked.strips, pieces.interface
+    skin = skin_of(asked)
+    by = asked.approach
     one, _, weight = one_strip(pieces, count)
-    state = press_strips(one, interface.x, weight, strip_offsets(contact.width, count), gap, contact.strips.roll,
-                         contact.load if by is None else None, moment if by is None else None, by, angle,
+    state = press_strips(one, interface.x, weight, strip_offsets(asked.width, count), gap, roll,
+                         asked.load if by is None else None, moment if by is None else None, by, angle,
                          spring if by is None else 0.0, skin)
     mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
     answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
@@ -26,17 +26,17 @@ def in_strips(contact, pieces: Compliance, gap, angle: float, moment, spring: fl
     return pieces, answer, skin if smooth(skin) else None, state
 
 
-def law_of(contact):
+def skin_of(asked):
     """The skin between the strips, None where they are bare."""
-    if contact.asperities is None:
+    if asked.skin is None:
         return None
-    if contact.asperities.law == "linear":
+    if asked.skin.law == "linear":
         from ...contact.skin_laws import LinearSkin
 
-        return LinearSkin(contact.asperities.normal_stiffness)
+        return LinearSkin(asked.skin.normal_stiffness)
     from .skin import skin_law
 
-    return skin_law(contact)
+    return skin_law(asked)
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
@@ -73,8 +73,3 @@ def strip_values(patch, peak_of) -> dict:
     out["rotational_stiffness"] = rotational_stiffness(state, pieces.normal * count, patch.x, weight)
     out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state, ratio)
     return out
-
-
-def strip_loads(patch) -> np.ndarray:
-    """Normal load of every strip of a solved patch (s,) [N]."""
-    return patch.strips.force.sum(axis=1)

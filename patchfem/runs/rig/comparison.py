@@ -8,79 +8,77 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError
 from ...dynamics.march.march import hermite_extremes
-from ...model.interfaces import limits, loads_of, viewed
-from ...model.structure import mode_stiffness
+from ...effects import carries, has, refusal
+from ...friction.record import law_from
 from ...response import run_events
-from ...response.measures import harmonic, interface_loop, run_measures, slip_measures, window_amplitudes, window_ends
+from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
-from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
+from ...response.rows import measures_of
+from ...structure.drive_sizes import omega_of, peak_speed
+from .solution import Solution, borne, sampled_loop, seen
 from .strips import other_measures
 
 TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
 
 
-def laws_of(scene, load: float) -> list:
+def laws_of(model, load: float) -> list:
     """A law of dynamics.point_laws per interface; PatchfemError for laws with a memory of bonds."""
     from ...dynamics.comparison import point_laws
 
-    out = []
-    if scene.friction is None:
-        return out
-    for k, n in enumerate(loads_of(scene) if scene.structure.interface else [load]):
-        f, (static, kinetic) = viewed(scene, k).friction, limits(scene, k, n)
-        if f.law == "coulomb":
-            out.append(point_laws.Coulomb(static, kinetic, scene.accuracy.stick_speed or 0.0))
-        elif f.law == "tanh":
-            out.append(point_laws.Tanh(static, f.reference_speed))
-        elif f.law == "elastic-plastic":
-            out.append(point_laws.ElasticPlastic(static, f.bond_length))
+    out, accuracy = [], model.accuracy
+    for one in model.rig.interfaces:
+        f, bears = one.numbers, load if one.load is None else one.load
+        if not carries(f, "comparison"):
+            raise PatchfemError(f"'{accuracy.method}' with law '{f.law}': {refusal('comparison')}; or use method = "
+                                "\"march\"", "accuracy.method")
+        if has(f.law, "set-valued"):
+            out.append(point_laws.Coulomb(*one.limits(bears), accuracy.stick_speed or 0.0))
         else:
-            raise PatchfemError(f"{scene.where('accuracy.method')}: '{scene.accuracy.method}' takes law 'coulomb', "
-                                f"'tanh' or 'elastic-plastic', not '{f.law}'; use method = \"march\"")
+            out.append(point_laws.Smooth(law_from(f, bears).element(bears)))
     return out
 
 
-def run_comparison(scene, settings, modes, drive, patch, frames: int = 0, say=None, progress=None):
-    """march.Raw of a comparison method at settings.steps per cycle; arguments as `march.run_march`."""
-    from ...compiled import load
-    from ...model.structure import start_of
-    from .march import Raw
+def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=None):
+    """Solution of a comparison method at numerics.steps per cycle; arguments as `march.run_march`."""
+    from ...dynamics.march.models import load_kernels
 
-    load("dynamics.comparison.comparison_kernels", say)
-    bears = patch.pressure.load if patch is not None else scene.normal.load if scene.normal is not None else 0.0
-    laws, start, begin = laws_of(scene, bears), start_of(scene, modes), perf_counter()
-    done = _integrated(scene, settings, modes, drive, laws, start)
+    load_kernels(say)
+    rig, modes, drive = model.rig, model.rig.modes, model.rig.drive
+    laws, begin = laws_of(model, borne(model, patch)), perf_counter()
+    done = _integrated(model, numerics, laws)
     response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
-    beyond = np.flatnonzero(np.abs(response.output) > (scene.structure.travel or np.inf))
+    beyond = np.flatnonzero(np.abs(response.output) > rig.travel)
     if beyond.size and 0 < beyond[0] < response.time.size - 1:  # the run ends at the first step beyond the stop
-        cut = replace(settings, cycles=response.time[beyond[0]] / drive.period)
-        done = _integrated(scene, cut, modes, drive, laws, start)
+        cut = replace(numerics, cycles=response.time[beyond[0]] / drive.period)
+        done = _integrated(model, cut, laws)
         response = _with_slip(_with_interfaces(done.response(modes, drive.moving), modes), laws)
-    n, window = settings.steps, settings.window
+    n, window = numerics.steps, numerics.window
     first = max(0, response.time.size - 1 - window * n)
     kept = _cut(response, slice(first, None))
     extremes, phasors = _cycles(response, n)
     last = min(window, len(extremes))
     book = _book(done)
-    values = run_measures(kept, extremes, book, drive, last)
+    span = kept.time[-1] - kept.time[0]
+    work = float(np.trapezoid(kept.force, kept.slide)) * drive.period / span if span > 0 else 0.0
+    spent = book["friction"]
+    values = measures_of(seen(model, patch, kept, extremes[-last:], book, n, loop=sampled_loop(kept, drive, work),
+                              ledger=np.array([[spent], [0.0], [spent], [0.0]])))
     stuck, own = False, {}
-    if scene.friction is None:
-        values.pop("friction_force_peak")
-    else:
-        values |= _rubbing(scene, kept, drive, n, bears) | other_measures(kept, drive, n)
-        values |= {"friction_work": book["friction"], "energy_dissipated": book["friction"], "energy_created": 0.0}
-        stuck = run_events.all_stick(kept, 0.0) and scene.friction.law != "tanh"
+    if model.friction is not None:
+        values |= other_measures(kept, drive, n)
+        stuck = run_events.all_stick(kept, 0.0) and not has(model.friction.law, "creeps")
         rings, own = run_events.rings(kept, modes, drive)
         values |= rings
-    outcome = _outcome(scene, done, response)
+    outcome = _outcome(model, done, response)
     ends = window_ends(extremes, phasors, window)
-    return Raw(values, response, kept, window_amplitudes(extremes, window),
+    return Solution(values, response, kept, window_amplitudes(extremes, window),
                steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
                perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
 
 
-def _integrated(scene, settings, modes, drive, laws, start):
-    accuracy, duration = scene.accuracy, settings.cycles * drive.period
+def _integrated(model, numerics, laws):
+    accuracy, modes, drive, start = model.accuracy, model.rig.modes, model.rig.drive, model.rig.start
+    duration = numerics.cycles * drive.period
     if not laws:
         from ...dynamics.comparison.point_laws import Coulomb
 
@@ -91,15 +89,15 @@ def _integrated(scene, settings, modes, drive, laws, start):
         criterion = accuracy.convergence or "force"
         speed, omega = peak_speed(drive, start), omega_of(drive)
         unit = {"displacement": speed / omega, "velocity": speed, "force": max(law.limit for law in laws)}[criterion]
-        return duhamel.run(modes, drive, laws, duration, settings.steps, criterion,
+        return duhamel.run(modes, drive, laws, duration, numerics.steps, criterion,
                            (accuracy.convergence_tolerance or TOLERANCE) * unit, start=start)
     if accuracy.method == "newmark":
         from ...dynamics.comparison import newmark
 
-        return newmark.run(modes, drive, laws, duration, settings.steps, accuracy.stick_speed, start=start)
+        return newmark.run(modes, drive, laws, duration, numerics.steps, accuracy.stick_speed, start=start)
     from ...dynamics.comparison import euler
 
-    return euler.run(modes, drive, laws, duration, settings.steps, start)
+    return euler.run(modes, drive, laws, duration, numerics.steps, start)
 
 
 def _with_interfaces(response, modes):
@@ -114,9 +112,7 @@ def _with_interfaces(response, modes):
 
 def _with_slip(response, laws):
     """The irreversible slip of elastic-plastic interfaces in place of their slide."""
-    from ...dynamics.comparison.point_laws import ElasticPlastic
-
-    give = np.array([law.length / law.limit if isinstance(law, ElasticPlastic) else 0.0 for law in laws])
+    give = np.array([getattr(law, "compliance", 0.0) for law in laws])
     if not give.any():
         return response
     extra = response.extra
@@ -151,24 +147,7 @@ def _book(done) -> dict:
                    "iterations": float(done.iterations.sum())}
 
 
-def _rubbing(scene, window, drive, n: int, load: float) -> dict:
-    """Measures of the first interface over the window; loops by the trapezoidal rule."""
-    values = slip_measures(window, drive, n) | {"normal_load": load}
-    if not sinusoidal(drive):
-        values.pop("slip_start_phase", None)
-    span = window.time[-1] - window.time[0]
-    if whole(span, drive):
-        weight = np.full(window.time.size, 1.0)
-        weight[[0, -1]] = 0.5
-        omega = omega_of(drive)
-        q, f = (harmonic(window.time, weight, y, omega) for y in (window.slide - window.slide.mean(), window.force))
-        work = float(np.trapezoid(window.force, window.slide)) * drive.period / span
-        values |= interface_loop(window.slide, q, f, work, mode_stiffness(scene))
-    return values
-
-
-def _outcome(scene, done, response):
-    if not np.isfinite(response.slide[-1]) or (scene.accuracy.method == "duhamel" and done.failures):
+def _outcome(model, done, response):
+    if not np.isfinite(response.slide[-1]) or (model.accuracy.method == "duhamel" and done.failures):
         return Outcome.NOT_CONVERGED
-    travel = scene.structure.travel or np.inf
-    return Outcome.EXCEEDS_TRAVEL if np.abs(response.output).max() > travel else None
+    return Outcome.EXCEEDS_TRAVEL if np.abs(response.output).max() > model.rig.travel else None

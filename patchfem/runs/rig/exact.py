@@ -6,62 +6,53 @@ from time import perf_counter
 import numpy as np
 
 from ...core import BaseSine, Outcome, Start
-from ...model.interfaces import limits, loads_of, yaws
-from ...model.structure import mode_stiffness
 from ...response import run_events
 from ...response.levels import Level
-from ...response.measures import (
-    circular_mean,
-    harmonic,
-    interface_loop,
-    ledger_measures,
-    run_measures,
-    swing,
-    window_amplitudes,
-    window_ends,
-)
+from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
 from ...response.outcome import steady_of
+from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
-from ..patch.strips import strip_loads
 from . import levels as rig_levels
-from .strips import as_one, other_measures
+from .solution import Solution, borne, seen
+from .strips import as_one, other_measures, strip_loads
 
 
-def run_exact(scene, settings, modes, drive, load: float, start=None, progress=None, share: float = 1.0, say=None,
-              patch=None):
-    """runs.rig.march.Raw of a Coulomb scene, or of a structure without friction; load [N] of [contact] or [normal];
-    share: of mu N that the law keeps; patch: the solved Patch, of which strips that yaw take their loads."""
-    from .march import Raw
+def run_exact(model, numerics, patch, share: float = 1.0, say=None, progress=None):
+    """Solution of a Coulomb rig, or of a structure without friction.
 
-    begin, forces = perf_counter(), _forces(scene, modes, load, share, patch)
-    if rig_levels.ends(scene):
-        done, levels, slips = _levels(scene, settings, modes, drive, forces, start, progress, say)
+    patch: the solved Patch, or None under [normal] or between masses; share: of mu N that the law keeps.
+    """
+    rig, drive, modes = model.rig, model.rig.drive, model.rig.modes
+    begin, forces = perf_counter(), forces_of(model, patch, share)
+    if rig.levels:
+        done, levels, slips = _levels(model, numerics, patch, forces, progress, say)
     else:
-        done = _go(scene, modes, drive, forces, settings.cycles, settings.window, start, progress, say)
+        done = _go(rig, drive, forces, numerics.cycles, numerics.window, rig.start, progress, say)
         levels, slips = (), None
-        done = _whole(_over_strips(done, patch) if yaws(scene) else done)
-    values, stuck = _values(scene, settings, drive, done, load)
-    rubs = scene.friction is not None
+        done = _whole(_over_strips(done, patch) if rig.strips_slide_apart else done)
+    values, stuck = _values(model, numerics, patch, drive, done)
+    rubs = model.friction is not None
     rings, own = run_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
     values |= rings
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    ends = window_ends(done.amplitudes, done.phasors, settings.window)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
+    ends = window_ends(done.amplitudes, done.phasors, numerics.window)
+    return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
                steady_of(drive, *ends), outcome, [], done.ledger, perf_counter() - begin,
                levels=levels, slips=slips, log=done.log, own=own)
 
 
-def _forces(scene, modes, load: float, share: float, patch=None) -> tuple:
-    """(static, kinetic) friction [N] of every interface (i,)."""
-    if yaws(scene):
-        return tuple(np.array(column) for column in zip(*(limits(scene, 0, n) for n in strip_loads(patch))))
-    if scene.friction is None:
-        return (np.zeros(len(modes.interfaces)),) * 2
-    if scene.structure.interface:
-        pairs = [limits(scene, k, n) for k, n in enumerate(loads_of(scene))]
+def forces_of(model, patch, share: float = 1.0) -> tuple:
+    """(static, kinetic) friction [N] of every interface (i,); share: of mu N that a law without memory keeps."""
+    rig = model.rig
+    if rig.strips_slide_apart:
+        return tuple(np.array(column) for column in zip(*(model.limits(n) for n in strip_loads(patch))))
+    if model.friction is None:
+        return (np.zeros(len(rig.modes.interfaces)),) * 2
+    if rig.names:
+        pairs = [one.limits(one.load) for one in rig.interfaces]
     else:
-        static, kinetic = limits(scene, 0, load)
-        pairs = [(static * share, kinetic if scene.friction.kinetic is not None else static * share)]
+        static, kinetic = model.limits(borne(model, patch))
+        pairs = [(static * share, kinetic if model.friction.kinetic is not None else static * share)]
     return tuple(np.array(column) for column in zip(*pairs))
 
 
@@ -76,16 +67,16 @@ def _over_strips(done, patch):
                    loop=(window.time, weight, window.slide, window.slide_rate, window.force))
 
 
-def _go(scene, modes, drive, forces, cycles: float, window: int, start, progress, say):
-    travel = scene.structure.travel or np.inf
+def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
+    modes, travel = rig.modes, rig.travel
     if modes.omega.size == 1 and len(modes.interfaces) == 1:
-        from ...dynamics.events import sdof
+        from ...dynamics.one_mode import sdof
 
         fast = cycles > sdof.COMPILED_FROM
         if fast:
             from ...compiled import load
 
-            load("dynamics.events.event_kernels", say)
+            load("dynamics.one_mode.event_kernels", say)
         return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
                              start, fast)
     from ...dynamics.events.histories import simulate
@@ -93,37 +84,46 @@ def _go(scene, modes, drive, forces, cycles: float, window: int, start, progress
     return simulate(modes, drive, *forces, cycles, window, travel, progress, start)
 
 
-def _values(scene, settings, drive, done, load: float) -> tuple:
-    """(measures, whether nothing slipped) of the window of an event-driven run."""
-    last = min(settings.window, len(done.amplitudes))
-    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last, done.acceleration)
-    span = done.window.time[-1] - done.window.time[0]
+def _values(model, numerics, patch, drive, done) -> tuple:
+    """(measures, whether nothing slipped) of the window of an event-driven run: what the events tell comes before what
+    the samples tell."""
+    window, apart, known = done.window, model.rig.strips_slide_apart, {}
+    extremes, ledger, loop = done.amplitudes[-min(numerics.window, len(done.amplitudes)):], None, None
+    span = window.time[-1] - window.time[0]
+    if done.acceleration is not None:
+        known["absolute_acceleration_peak"] = done.acceleration
     if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
-        values["relative_displacement_amplitude"] = swing(done.window)
-    if scene.friction is None:
-        values.pop("friction_force_peak")
+        known["relative_displacement_amplitude"] = swing(window)
+    if model.friction is not None:
+        lost, starts = done.ledger["friction"], done.starts
+        ledger = np.array([[lost], [0.0], [lost], [0.0]])
+        known |= {"slip_amplitude": float(window.slip.max() - window.slip.min()) / 2,
+                  "stick_fraction": min(done.stick / span, 1.0),
+                  "slip_start_phase": circular_mean(starts) if starts.size and sinusoidal(drive) else None}
+        loop = _loop(done, drive, span, apart)
+    values = measures_of(seen(model, patch, window, extremes, done.ledger, 400, drive=drive, loop=loop, ledger=ledger,
+                              known=known))
+    if model.friction is None:
         return values, False
-    slip, lost = done.window.slip, done.ledger["friction"]
-    ledger = ledger_measures(np.array([[lost], [0.0], [lost], [0.0]]))
-    ledger.pop("energy_stored")
-    values |= {"slip_amplitude": float(slip.max() - slip.min()) / 2, "stick_fraction": min(done.stick / span, 1.0),
-               "normal_load": load, **ledger}
-    if done.starts.size and sinusoidal(drive):
-        values["slip_start_phase"] = circular_mean(done.starts)
+    if not apart:
+        values |= other_measures(window, drive, 400, done.log)
+        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
+    others = any(run_events.moving(window, drive, done.log)[1:])
+    return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _loop(done, drive, span: float, apart: bool) -> tuple | None:
+    """(slide, first harmonics of slide and force, work per cycle [J]) by the quadrature of the run; None where its
+    window holds no whole cycle. apart: of every strip, as a yaw works besides the mean slide."""
+    if not whole(span, drive):
+        return None
     time, weight, slide, rate, force = done.loop
     power = force * rate
-    if yaws(scene):  # of every strip: a yaw works besides the mean slide
+    if apart:
         power = (done.window.extra["forces"] * done.window.extra["slide_rates"]).sum(axis=1)
-    work = float(weight @ power) * drive.period / span
-    if whole(span, drive):
-        omega = omega_of(drive)
-        q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
-        values |= interface_loop(slide, q, part, work, mode_stiffness(scene))
-    if not yaws(scene):
-        values |= other_measures(done.window, drive, 400, done.log)
-        values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
-    others = any(run_events.moving(done.window, drive, done.log)[1:])
-    return values, done.stick >= span * (1 - 1e-12) and not others
+    omega, work = omega_of(drive), float(weight @ power) * drive.period / span
+    q, part = (harmonic(time, weight, column, omega) for column in (slide - weight @ slide / span, force))
+    return slide, q, part, work
 
 
 def _whole(done):
@@ -134,18 +134,19 @@ def _whole(done):
     return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
 
 
-def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tuple:
+def _levels(model, numerics, patch, forces, progress, say) -> tuple:
     """(EventRun of all levels one after the other, their Levels, slips as `rig_levels.onset` asks)."""
-    cycles, states, parts, levels = rig_levels.ends(scene)[0], [start], [], []
+    rig = model.rig
+    drive, cycles, states, parts, levels = rig.drive, rig.level_cycles, [rig.start], [], []
 
     def go(level, state, watch=None):
         sine = BaseSine(level, omega_of(drive), drive.moving)
-        return _go(scene, modes, sine, forces, cycles, settings.window, state, watch, say), sine
+        return _go(rig, sine, forces, cycles, numerics.window, state, watch, say), sine
 
-    for k, level in enumerate(scene.drive.levels):
-        share = None if progress is None else (lambda part, k=k: progress((k + part) / len(scene.drive.levels)))
+    for k, level in enumerate(rig.levels):
+        share = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
         done, sine = go(level, states[-1], share)
-        values, stuck = _values(scene, settings, sine, done, 0.0)
+        values, stuck = _values(model, numerics, patch, sine, done)
         kept = {name: values[name] for name in rig_levels.KEPT if name in values}
         levels.append(Level(level, stuck, kept, {name: 1e-9 * abs(value) for name, value in kept.items()}))
         parts.append(done)
@@ -154,7 +155,7 @@ def _levels(scene, settings, modes, drive, forces, start, progress, say) -> tupl
             break
 
     def slips(number, level):
-        return not _values(scene, settings, *go(level, states[number + 1])[::-1], 0.0)[1]
+        return not _values(model, numerics, patch, *go(level, states[number + 1])[::-1])[1]
 
     return _joined(parts, cycles * drive.period), tuple(levels), slips
 

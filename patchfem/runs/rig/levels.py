@@ -3,32 +3,24 @@
 from dataclasses import replace
 
 from ...core import Measure
-from ...model import drive as model_drive
 from ...response.levels import KEPT, Level, bracket, hysteresis, jump
-from ...response.measures import run_measures
 
 MOST = 40  # halvings of the bracket of an onset
 
 
-def ends(scene) -> tuple:
-    """Cycles after which the levels of a scene end; () without levels."""
-    drive = scene.drive
-    if drive.kind != "base" or drive.waveform != "levels":
-        return ()
-    each = model_drive.cycles_per_level(scene)
-    return tuple(each * (k + 1) for k in range(len(drive.levels)))
+def ends(rig) -> tuple:
+    """Cycles after which the levels of a rig's drive end; () without levels."""
+    return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
 
 
-def rows(scene, marks, drive, held: float, rubbing) -> tuple:
-    """A Level per Mark of a march; held [m]: slip amplitude below which a level sticks; rubbing(mark): its measures of
-    the interface."""
+def rows(sizes, marks, values, held: float | None) -> tuple:
+    """A Level per size [m s-2] and Mark of a march; values(mark) -> its measures; held [m]: slip amplitude below which
+    a level sticks, None where nothing rubs."""
     out = []
-    for size, mark in zip(scene.drive.levels, marks):
-        values = run_measures(mark.window, mark.amplitudes, mark.ledger, drive, len(mark.amplitudes))
-        if rubbing is not None:
-            values |= rubbing(mark)
-        kept = {name: values[name] for name in KEPT if name in values}
-        out.append(Level(size, rubbing is not None and values["slip_amplitude"] < held, kept, {}))
+    for size, mark in zip(sizes, marks):
+        found = values(mark)
+        kept = {name: found[name] for name in KEPT if name in found}
+        out.append(Level(size, held is not None and found["slip_amplitude"] < held, kept, {}))
     return tuple(out)
 
 
@@ -40,7 +32,7 @@ def with_errors(fine, half, quarter, steps: int) -> tuple:
                  for a, b, c in zip(fine, half, quarter))
 
 
-def onset(scene, levels, slips, tolerance: float) -> tuple | None:
+def onset(levels, slips, tolerance: float) -> tuple | None:
     """(onset [m s-2], half its bracket) by halving between the last level that held and the first that slips.
 
     slips(number of the level that held or -1, level) -> bool runs one more level from the state that it left.

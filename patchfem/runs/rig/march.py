@@ -1,55 +1,19 @@
-"""The coupled run of a scene: patch or point, law and modes, by the exact engine or the march, with its errors."""
+"""A march of a rig: patch or point, law and modes, as a Solution."""
 
-from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
-from ...core import ModalBasis, Outcome, Response
+from ...core import Outcome
 from ...effects import has
-from ...model.accuracy import Settings
-from ...model.interfaces import yaws
-from ...model.structure import mode_stiffness, start_of
-from ...response.measures import (
-    energy_balance,
-    harmonic,
-    interface_loop,
-    ledger_measures,
-    run_measures,
-    slip_measures,
-    step_harmonic,
-    window_amplitudes,
-    window_ends,
-)
+from ...response import run_events
+from ...response.measures import step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
-from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Raw:
-    """One run before its errors are known: values by measure name, histories, amplitudes per window, (steady amplitude,
-    error) or (None, None), snapshots; levels: of a run in levels, slips: as `rig_levels.onset` asks;
-    log: events of the exact engine; notes: warnings of the method; held: slip [m] below which a cycle sticks; own: what
-    the run itself leaves open of its measures."""
-
-    values: dict
-    response: Response
-    window: Response
-    amplitudes: np.ndarray
-    steady: tuple
-    outcome: Outcome | None
-    snapshots: list
-    book: dict
-    seconds: float
-    model: object = None
-    prepare: dict | None = None
-    message: str = ""
-    levels: tuple = ()
-    slips: object = None
-    log: object = None
-    notes: tuple = ()
-    held: float = 0.0
-    own: dict | None = None
+from ...response.rows import measures_of
+from ...structure.drive_sizes import omega_of, peak_speed
+from . import levels as rig_levels
+from .solution import Solution, sampled_loop, seen
+from .strips import joined, other_measures
 
 
 def sampled(values: dict) -> dict:
@@ -59,105 +23,101 @@ def sampled(values: dict) -> dict:
             else 1e-9 * abs(value) for name, value in values.items()}
 
 
-def _ledger(ledger) -> dict:
-    """Measures of the ledger but for what is stored, which depends on the instant at which the run ends."""
-    return {name: value for name, value in ledger_measures(ledger).items() if name != "energy_stored"}
-
-
-def run_march(scene, settings: Settings, modes, drive, patch, frames: int = 0, say=None, progress=None) -> Raw:
-    """One march at settings.steps per cycle."""
+def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """One march at numerics.steps per cycle; patch: the solved Patch or None."""
     from ...dynamics.march import march as hub
-    from ...dynamics.march.march import Mark
-    from ...response import run_events
-    from . import levels as rig_levels
     from .interface import model_of
-    from .strips import joined, other_measures
 
-    travel, marks, start = scene.structure.travel or np.inf, rig_levels.ends(scene), start_of(scene, modes)
-    begin = perf_counter()
-    model = model_of(scene, settings, patch, modes, drive, start)
+    rig, begin = model.rig, perf_counter()
+    contact = model_of(model, numerics, patch)
     reduced = perf_counter() - begin
-    hub.warm_up(modes, drive, model, say)
+    hub.warm_up(rig.modes, rig.drive, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
-    frames = 0 if yaws(scene) else frames  # strips have no common field of shear
-    done = hub.march(modes, drive, model, settings.cycles, settings.steps, settings.window, travel, frames, say,
-                     progress, start, marks)
+    frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
+    done = hub.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
+                     frames, say, progress, rig.start, rig_levels.ends(rig))
     seconds = perf_counter() - begin
-    done = joined(done, patch) if yaws(scene) else done
-    last = min(settings.window, len(done.amplitudes))
-    values = run_measures(done.window, done.amplitudes, done.ledger, drive, last)
-    held, rubbing = 0.0, None
-    if scene.friction is None:
-        values.pop("friction_force_peak")
-    else:
-        held = 1e-15 * peak_speed(drive) * drive.period if model.set_valued else 1e-3 * model.length
-        creeps = has(scene.friction.law, "creeps")  # it never holds, nor sticks
-        held *= not creeps
+    done = joined(done, patch) if rig.strips_slide_apart else done
+    return _Read(model, numerics, patch, contact).solution(done, seconds, {"reduce": reduced, "load": loaded})
 
-        def rubbing(part):
-            others = {} if yaws(scene) else other_measures(part.window, drive, settings.steps)
-            found = _rubbing(scene, settings, modes, drive, patch, part) | others
-            rigid = model.set_valued and found["slip_amplitude"] < held  # what moves is round-off
-            return {name: v for name, v in found.items() if not (rigid and name.startswith("equivalent_"))}
 
-        whole_run = Mark(done.window, done.step_force, done.window_work, done.amplitudes, done.ledger)
-        values |= rubbing(whole_run) | _ledger(done.response.extra["ledger"])
-    rings, own, stuck = {}, {}, False
-    if scene.friction is not None:
-        rings, own = run_events.rings(done.window, modes, drive, None, held)
-        stuck = run_events.all_stick(done.window, held) and not creeps
-        if stuck and model.set_valued:  # what moves in round-off does not slide
-            values["stick_fraction"] = 1.0
-            for name in ("slip_start_phase", "equivalent_stiffness", "equivalent_damping"):
-                values.pop(name, None)
-            moving = modes.mass * peak_speed(drive, start)**2  # its energies are round-off of such a one
-            values["energy_balance"] = energy_balance(done.ledger | {"power": done.ledger["power"] + moving})
-    values |= rings
-    if scene.friction is not None and "normal_load" in done.window.extra:
-        load = done.window.extra["normal_load"]
-        values |= {"normal_load_least": float(load.min()), "normal_load_peak": float(load.max()),
-                   "open_fraction": float(np.mean(load <= 0))}
-    levels, slips = (), None
-    if marks:
-        levels = rig_levels.rows(scene, done.marks, drive, held, rubbing)
+class _Read:
+    """A finished march read off: measures, outcome, levels."""
+
+    def __init__(self, model, numerics, patch, contact):
+        self.model, self.numerics, self.patch, self.contact, rig = model, numerics, patch, contact, model.rig
+        self.held = 0.0  # slip [m] below which a cycle sticks
+        if model.friction is not None:
+            noise = 1e-15 * peak_speed(rig.drive) * rig.drive.period
+            self.held = noise if contact.set_valued else 1e-3 * contact.length
+            self.held *= not has(model.friction.law, "creeps")  # it never holds
+
+    def solution(self, done, seconds: float, prepare: dict) -> Solution:
+        """The Solution of a MarchResult."""
+        rig, window = self.model.rig, self.numerics.window
+        rubs, stuck, rings, own = self.model.friction is not None, False, {}, {}
+        if rubs:
+            rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
+            stuck = run_events.all_stick(done.window, self.held) and not has(self.model.friction.law, "creeps")
+        last = min(window, len(done.amplitudes))
+        values = self.values(done, done.amplitudes[-last:], done.response.extra.get("ledger"), stuck) | rings
+        levels, slips = self._levels(done) if rig.levels else ((), None)
+        outcome = done.outcome or (Outcome.STUCK if stuck else None)
+        ends = window_ends(done.amplitudes, done.phasors, window)
+        return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, window),
+                        steady_of(rig.drive, *ends), outcome, done.snapshots, done.ledger, seconds, self.contact,
+                        prepare, done.message, levels, slips, held=self.held, own=own)
+
+    def values(self, part, extremes, ledger, stuck: bool = False) -> dict:
+        """Measures of a MarchResult or of a Mark of it; ledger (4, k) [J] or None."""
+        drive, book, known = self.model.rig.drive, part.ledger, {}
+        if self.model.friction is None:
+            return measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps))
+        if stuck and self.contact.set_valued:  # what moves in round-off does not slide
+            known = dict.fromkeys(("slip_start_phase", "equivalent_stiffness", "equivalent_damping"))
+            known["stick_fraction"] = 1.0
+            moving = self.model.rig.modes.mass * peak_speed(drive, self.model.rig.start)**2
+            book = book | {"power": book["power"] + moving}  # its energies are round-off of such a one
+        found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps,
+                                 loop=self._loop(part), ledger=ledger, known=known))
+        if self.contact.set_valued and found["slip_amplitude"] < self.held:  # what moves is round-off
+            found = {name: v for name, v in found.items() if not name.startswith("equivalent_")}
+        others = not self.model.rig.strips_slide_apart
+        return found | (other_measures(part.window, drive, self.numerics.steps) if others else {})
+
+    def _loop(self, part) -> tuple | None:
+        """The loop of the first interface, or of all strips; the others have their own."""
+        w, drive = part.window, self.model.rig.drive
+        work = getattr(part, "window_work", None)
+        work = part.work if work is None else work
+        if len(self.model.rig.names) > 1:
+            work = float(part.step_force @ np.diff(w.slide))
+        span = w.time[-1] - w.time[0]
+        work *= drive.period / span if span > 0 else 0.0
+        return sampled_loop(w, drive, work, step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j)
+
+    def _levels(self, done) -> tuple:
+        """(Level per level of the drive, slips as `levels.onset` asks)."""
+        from ...dynamics.march import march as hub
+
+        rig, numerics = self.model.rig, self.numerics
+        rubs = self.model.friction is not None
+        found = rig_levels.rows(rig.levels, done.marks, lambda mark: self.values(mark, mark.amplitudes, None),
+                                self.held if rubs else None)
 
         def slips(number, level):
-            other = rig_levels.drive_with(drive, number + 1, level)
+            other = rig_levels.drive_with(rig.drive, number + 1, level)
             run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
-                modes, other, model, settings.steps, travel, start)
-            return run.slip_amplitude(round(marks[0]), settings.window) >= held
-    outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    ends = window_ends(done.amplitudes, done.phasors, settings.window)
-    return Raw(values, done.response, done.window, window_amplitudes(done.amplitudes, settings.window),
-               steady_of(drive, *ends), outcome, done.snapshots, done.ledger, seconds, model,
-               {"reduce": reduced, "load": loaded}, done.message, levels, slips, held=held, own=own)
+                rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start)
+            return run.slip_amplitude(round(rig.level_cycles), numerics.window) >= self.held
+
+        return found, slips
 
 
-def _rubbing(scene, settings: Settings, modes: ModalBasis, drive, patch, part) -> dict:
-    """Measures of the interface in a Mark of a march."""
-    w, omega = part.window, omega_of(drive)
-    values = slip_measures(w, drive, settings.steps)
-    if not sinusoidal(drive):
-        values.pop("slip_start_phase", None)
-    values["normal_load"] = patch.pressure.load if patch is not None else scene.normal.load
-    weight = np.full(w.time.size, 1.0)
-    weight[[0, -1]] = 0.5
-    span = w.time[-1] - w.time[0]
-    work = part.work  # of all strips; of interfaces only the first, the others have their own
-    if len(scene.structure.interface) > 1:
-        work = float(part.step_force @ np.diff(w.slide))
-    work *= drive.period / span if span > 0 else 0.0
-    q = harmonic(w.time, weight, w.slide - w.slide.mean(), omega)
-    if whole(span, drive):
-        values |= interface_loop(w.slide, q, step_harmonic(w.time, part.step_force, omega), work,
-                                 mode_stiffness(scene))
-    return values
-
-
-def created_warning(scene, book: dict, cycles: float) -> list:
+def created_warning(model, book: dict, cycles: float) -> list:
     """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
-    if scene.friction is None or scene.friction.reading != "report":
+    if model.friction is None or model.friction.reading != "report":
         return []
     made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
     if made <= 1e-9 * work or made <= 0:

@@ -10,37 +10,33 @@ from time import perf_counter
 import numpy as np
 
 from ...core import BaseSine, Measure, Outcome, PatchfemError
-from ...model.structure import mode_stiffness
-from ...response.measures import harmonic, interface_loop, run_measures, slip_measures
+from ...model.engine import no_closed_form
+from ...response.rows import measures_of
+from .solution import Solution, sampled_loop, seen
 from .strips import other_measures
 
 SAMPLES = 1024  # of the cycle that measures are read off
 POINTS = 121  # of a curve by the event map
 
 
-def refuse(scene, drive) -> None:
+def refuse(rig) -> None:
     """PatchfemError where no steady motion can be asked for."""
-    where, waveform = scene.where("accuracy.method"), scene.drive.waveform
-    if scene.drive.kind == "free" or waveform not in ("sine", "sweep", "levels"):
-        raise PatchfemError(f"{where}: 'harmonic' finds the steady motion under a sine, or its curve over a sweep or "
-                            "over levels; use method = \"march\"")
-    if waveform == "sweep" and drive.displacement is not None:
-        raise PatchfemError(f"{where}: 'harmonic' keeps the acceleration over a sweep; give drive.acceleration")
+    if rig.kind == "free" or rig.waveform not in ("sine", "sweep", "levels"):
+        raise PatchfemError("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over "
+                            "levels; use method = \"march\"", "accuracy.method")
+    if rig.waveform == "sweep" and rig.drive.displacement is not None:
+        raise PatchfemError("'harmonic' keeps the acceleration over a sweep; give drive.acceleration",
+                            "accuracy.method")
 
 
-def steady(scene, settings, modes, drive, patch, load: float, say=None):
-    """(march.Raw, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on
-    a curve over a sweep or over levels, whose sine is extra["at"]."""
-    refuse(scene, drive)
-    from ...model.engine import no_closed_form
-
+def steady(model, numerics, patch, say=None):
+    """(Solution, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on a curve
+    over a sweep or over levels, whose sine is extra["at"]."""
+    drive = model.rig.drive
+    refuse(model.rig)
     sine = drive if isinstance(drive, BaseSine) else None
-    shear = scene.contact.gives_way if scene.contact is not None else ""
-    at_sine = sine or BaseSine(1.0, 1.0, drive.moving)
-    if scene.friction is None or not no_closed_form(scene, at_sine, shear):
-        finder = _Events(scene, settings, modes, load, say)
-    else:
-        finder = _Balance(scene, settings, modes, drive, patch, say)
+    exact = model.friction is None or not no_closed_form(model, steady=True)
+    finder = (_Events if exact else _Balance)(model, numerics, patch, say)
     if sine is not None:
         return finder.point(sine)
     curve, best, near = finder.curve(drive)
@@ -59,11 +55,11 @@ def drives_of(drive, count: int) -> list:
 class _Events:
     """Coulomb interfaces, or none at all, by the event map."""
 
-    def __init__(self, scene, settings, modes, load, say):
-        from .exact import _forces
+    def __init__(self, model, numerics, patch, say):
+        from .exact import forces_of
 
-        self.scene, self.settings, self.modes, self.load, self.say = scene, settings, modes, load, say
-        self.forces = _forces(scene, modes, load, 1.0)
+        self.model, self.numerics, self.modes, self.patch, self.say = model, numerics, model.rig.modes, patch, say
+        self.forces = forces_of(model, patch)
 
     def found(self, drive, start=None):
         """dynamics.steady_events.Steady."""
@@ -77,8 +73,9 @@ class _Events:
 
         begin = perf_counter()
         found = self.found(drive, near)
-        few = replace(self.settings, cycles=2.0, window=1)
-        raw = run_exact(self.scene, few, self.modes, drive, self.load, found.start)
+        few = replace(self.numerics, cycles=2.0, window=1)
+        here = replace(self.model.rig, drive=drive, start=found.start, levels=())
+        raw = run_exact(replace(self.model, rig=here), few, self.patch)
         outcome = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}.get(found.regime, Outcome.STEADY)
         extra = {"regime": found.regime, "multipliers": found.multipliers, "residual": found.residual}
         raw = replace(raw, outcome=outcome, book=raw.book | {"iterations": 0.0}, seconds=perf_counter() - begin)
@@ -100,8 +97,8 @@ class _Events:
         """The curve of one mode by its own map, compiled."""
         from ...compiled import load
 
-        load("dynamics.events.steady_kernels", self.say)
-        from ...dynamics.events.steady import response
+        load("dynamics.one_mode.steady_kernels", self.say)
+        from ...dynamics.one_mode.steady import response
 
         found = response(self.modes, drives, float(self.forces[0][0]), float(self.forces[1][0]))
         names = [f"{stops:g} stops" if str(regime) == "stops" else str(regime)
@@ -119,7 +116,7 @@ class _Events:
 class _Balance:
     """Laws with memory and springs that bend, by harmonic balance."""
 
-    def __init__(self, scene, settings, modes, drive, patch, say):
+    def __init__(self, model, numerics, patch, say):
         from ...compiled import load
         from .interface import contact_model
 
@@ -127,19 +124,19 @@ class _Balance:
         from ...dynamics.harmonic.forces import Group
         from ...dynamics.harmonic.laws import Interlock, Spring
 
-        structure = scene.structure
-        if len(modes.interfaces) > 1:
-            raise PatchfemError(f"{scene.where('accuracy.method')}: 'harmonic' with several interfaces of laws other "
-                                "than 'coulomb': not yet built; use method = \"march\"")
+        rig = model.rig
+        if len(rig.modes.interfaces) > 1:
+            raise PatchfemError("'harmonic' with several interfaces of laws without an exact solution: not yet built; "
+                                "use method = \"march\"", "accuracy.method")
         parts = []
-        if scene.friction is not None:
-            parts.append((0, contact_model(scene, settings, patch, drive)))
-        if structure.bonded is not None and structure.bonded.wavelength is not None:
-            parts.append((0, Interlock(structure.bonded.stiffness, structure.bonded.wavelength)))
-        if structure.stiffening is not None:
-            parts.append((modes.output, Spring(0.0, structure.stiffening.cubic)))
-        self.scene, self.settings, self.modes, self.patch = scene, settings, modes, patch
-        self.group, self.tolerance = Group(modes, parts), scene.accuracy.tolerance
+        if model.friction is not None:
+            parts.append((0, contact_model(model, numerics, patch)))
+        if rig.interlock is not None:
+            parts.append((0, Interlock(*rig.interlock)))
+        if rig.cubic is not None:
+            parts.append((rig.modes.output, Spring(0.0, rig.cubic)))
+        self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
+        self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
 
     def point(self, drive, near=None) -> tuple:
         """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle;
@@ -147,10 +144,9 @@ class _Balance:
         from ...dynamics.harmonic.balance import regime
         from ...dynamics.harmonic.point import point
         from ...dynamics.harmonic.stability import with_stability
-        from .march import Raw
 
         begin = perf_counter()
-        found = point(self.modes, drive, self.group, self.scene.accuracy.harmonics, self.tolerance,
+        found = point(self.modes, drive, self.group, self.harmonics, self.tolerance,
                       start=near)
         fewer = point(self.modes, drive, self.group, max(1, found.harmonics // 2), self.tolerance, start=near and found)
         stable = with_stability(found, self.modes)
@@ -166,8 +162,8 @@ class _Balance:
         extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
                  "residual": found.residual, "harmonics": found.harmonics}
         amplitude = np.array([values["relative_displacement_amplitude"]])
-        raw = Raw(values, response, response, amplitude, (None, None), Outcome.STUCK if held else Outcome.STEADY, [],
-                  book, perf_counter() - begin)
+        outcome = Outcome.STUCK if held else Outcome.STEADY
+        raw = Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin)
         return raw, errors, extra
 
     def _measured(self, found, drive) -> tuple:
@@ -182,18 +178,12 @@ class _Balance:
         top = found.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        values = run_measures(response, extremes, book, drive, 1)
-        values["drift_per_cycle"] = 0.0
-        if self.scene.friction is None:
-            values.pop("friction_force_peak")
-            return values, response, book
-        values |= slip_measures(response, drive, SAMPLES) | other_measures(response, drive, SAMPLES)
-        weight = np.full(response.time.size, 1.0)
-        weight[[0, -1]] = 0.5
-        q, f = (harmonic(response.time, weight, y, drive.omega) for y in (response.slide, response.force))
-        bears = self.patch.pressure.load if self.patch is not None else self.scene.normal.load
-        values |= interface_loop(response.slide, q, f, book["friction"], mode_stiffness(self.scene))
-        return values | {"normal_load": bears}, response, book
+        known = {"drift_per_cycle": 0.0}
+        values = measures_of(seen(self.model, self.patch, response, extremes, book, SAMPLES, drive=drive, known=known,
+                                  loop=sampled_loop(response, drive, book["friction"])))
+        if self.model.friction is not None:
+            values |= other_measures(response, drive, SAMPLES)
+        return values, response, book
 
     def curve(self, drive) -> tuple:
         """(curve as arrays by name through its folds, the sine of its largest amplitude, the point there)."""
@@ -201,13 +191,13 @@ class _Balance:
 
         if hasattr(drive, "low"):
             first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
-            branch = response(self.modes, first, self.group, (drive.low, drive.high), self.scene.accuracy.harmonics,
+            branch = response(self.modes, first, self.group, (drive.low, drive.high), self.harmonics,
                               self.tolerance, True)
         else:
             sizes = [s.amplitude for s in drive.segments]
             first = BaseSine(sizes[0], drive.segments[0].omega, drive.moving)
             branch = levels(self.modes, first, self.group, sizes if len(sizes) != 2 else [sizes[0], np.mean(sizes),
-                            sizes[1]], self.scene.accuracy.harmonics, self.tolerance, True)
+                            sizes[1]], self.harmonics, self.tolerance, True)
         amplitude = branch.amplitudes(self.modes.output)
         curve = {"frequency": np.array([p.omega / (2 * np.pi) for p in branch.points]),
                  "level": np.array([p.level for p in branch.points]), "amplitude": amplitude,

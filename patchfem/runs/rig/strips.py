@@ -4,7 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..patch.strips import strip_loads
+
+def strip_loads(patch) -> np.ndarray:
+    """Normal load of every strip of a solved patch (s,) [N]."""
+    return patch.strips.force.sum(axis=1)
 
 
 def joined(done, patch):

@@ -1,19 +1,16 @@
 """A scene whose contact acts on the modes with its whole wrench, or whose load is prescribed in time."""
 
-
 import numpy as np
 
-from ...core import ModalBasis, PatchfemError
-from ...model.law import acting
-from ...model.load import load_at
+from ...core import PatchfemError
+from ...model.model import Model
 
 
-def rubbing_of(scene, speed: float):
-    """The dynamics.march.varying_load.Rubbing of [friction]; `speed` [m/s] as in `runs.rig.march.law_of`."""
+def rubbing_of(model: Model):
+    """The dynamics.march.varying_load.Rubbing of the law of a model."""
     from ...dynamics.march import varying_load as wrench
-    from ...model.law import law_of
 
-    f = acting(scene).friction
+    f = model.friction
     if f.law == "coulomb":
         return wrench.coulomb(f.static, f.kinetic)
     if f.law == "tanh":
@@ -21,46 +18,36 @@ def rubbing_of(scene, speed: float):
     if f.law == "elastic-plastic":
         return wrench.plastic(f.static, f.bond_length)
     if f.law != "nonlocal":
-        raise PatchfemError(f"{scene.path}: friction.law: '{f.law}' under a load that changes: not yet built")
-    return wrench.bonds(law_of(scene, speed))
+        raise PatchfemError(f"friction.law: '{f.law}' under a load that changes: not yet built", "")
+    return wrench.bonds(model.bonds)
 
 
-def atlas_of(scene, patch):
-    """The atlas of the patch of a scene, None under [normal]."""
-    if patch is None:
-        return None
-    from ...dynamics.march import varying_load as wrench
-    from ...model.load import spring_of
-
-    return wrench.atlas_of(patch, spring_of(scene.contact))
-
-
-def model_of(scene, modes: ModalBasis, patch, speed: float, count: int | None = None):
-    """The WrenchModel of a rig whose load changes; patch: the solved Patch or None for [normal]; count:
-    how many shear modes stand for pieces that give way, None: by the tolerance."""
+def model_of(model: Model, patch, count: int | None = None):
+    """The WrenchModel of a rig whose load changes; patch: the solved Patch or None under [normal]; count: how many
+    shear modes stand for pieces that give way, None: by the tolerance."""
     from ...dynamics.march import varying_load as wrench
 
-    load = None if patch is not None else lambda t: load_at(scene, t)
-    law, shear = rubbing_of(scene, speed), None
-    if scene.contact is not None and scene.contact.gives_way:
+    load, atlas = (model.point.at, None) if patch is None else (None, wrench.atlas_of(patch, model.patch.spring))
+    law, shear = rubbing_of(model), None
+    if model.soft:
         weight = patch.pieces.interface.weight
         shear = wrench.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, count,
-                                scene.accuracy.tolerance)
-    return wrench.wrench_model(modes, law, atlas_of(scene, patch), load, shear)
+                                model.accuracy.tolerance)
+    return wrench.wrench_model(model.rig.modes, law, atlas, load, shear)
 
 
-def shear_note(scene, model) -> list:
+def shear_note(model: Model, contact) -> list:
     """The sentence on the shear modes of a run whose load changes; empty where none stand for the pieces."""
-    if model is None or model.reduction is None:
+    if contact is None or contact.reduction is None:
         return []
-    kept, nodes = model.reduction.stiffness.size, model.atlas.x.size
-    return [f"{scene.contact.gives_way}: the load changes with the motion, so no exact set of elements exists; {kept} "
+    kept, nodes = contact.reduction.stiffness.size, contact.atlas.x.size
+    return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
             f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
 
 
-def frames_of(scene, patch, raw) -> dict:
+def frames_of(model: Model, patch, raw) -> dict:
     """Interface frames (f, x) of a run, the pressed state first; status 0 open, 1 stick, 2 slip."""
-    law, atlas, weight = raw.model.law, raw.model.atlas, patch.pieces.interface.weight
+    law, atlas, weight = raw.contact.law, raw.contact.atlas, patch.pieces.interface.weight
     shots = raw.snapshots
     time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
     nodal = np.stack([patch.pressure.sigma_n * weight] + [shot["nodal"] for shot in shots])

@@ -55,8 +55,6 @@ def _quadrature(draft: Draft, kind: str) -> None:
         draft.say(key, "'recursion' sums reading 'stretch' with order = 1 alone; use 'auto' or 'merged'")
     elif engine != "recursion" and shear:
         draft.say(key, f"'{engine}' beside {shear}: every point has its own path there; use 'recursion' or 'auto'")
-    elif engine == "merged" and kind == "bench":
-        draft.say(key, f"'{engine}' in a bench: use 'auto', 'direct' or 'truncated'; not yet built")
 
 
 def method_unused(kind: str) -> tuple[str, ...]:

@@ -4,28 +4,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import BaseSine, ModalBasis, Start
-from patchfem.dynamics.events import event_list, histories, sdof
+from patchfem.dynamics.events import event_list, histories
+from patchfem.dynamics.one_mode import sdof
 from patchfem.response.run_events import of_log
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 from patchfem.structure.drives import Piecewise, levels
 
-RIG = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "coulomb"
-static = 0.3
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
+RIG = POINT + COULOMB + MODE + """\
 [drive]
 kind = "base"
 waveform = "levels"
@@ -68,15 +58,12 @@ def test_exact_borders_of_levels_are_listed_by_both():
 
 def test_exact_levels_of_a_scene_are_those_of_one_run():
     """The scene runs level after level; the list is that of one run through all segments."""
-    scene = loads(RIG)
-    found = run(plan(scene), estimate=False).extra["events"]
-    from patchfem.model.drive import drive_of
-    from patchfem.model.structure import modes_of
-
-    drive = drive_of(scene)
+    result = run(plan(loads(RIG)), estimate=False)
+    found, model = result.extra["events"], result.plan.model
+    drive = model.rig.drive
     assert isinstance(drive, Piecewise)
-    limit = 0.3 * scene.normal.load
-    whole = of_log(sdof.simulate(modes_of(scene), drive, limit, limit, 100, 10).log)
+    limit = 0.3 * model.point.load
+    whole = of_log(sdof.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
     assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()
     assert found.time == pytest.approx(whole.time, abs=1e-10)
     assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)

@@ -15,10 +15,11 @@ from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
 from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError, Segment, Start
-from patchfem.dynamics.events import histories, orbit_kernels, sdof_kernels, slip_kernels
-from patchfem.dynamics.events.sdof import events as event_list
-from patchfem.dynamics.events.sdof import simulate
-from patchfem.dynamics.events.sdof_samples import Scene, states
+from patchfem.dynamics.events import histories
+from patchfem.dynamics.one_mode import orbit_kernels, sdof_kernels, slip_kernels
+from patchfem.dynamics.one_mode.sdof import events as event_list
+from patchfem.dynamics.one_mode.sdof import simulate
+from patchfem.dynamics.one_mode.sdof_samples import OneMode, states
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Piecewise, Recorded, levels, release
 
@@ -28,7 +29,7 @@ PEAK = 0.28704671337871602595  # amplitude over a/omega^2 at resonance, damping 
 
 @lru_cache(maxsize=1)
 def events():
-    return load("dynamics.events.event_kernels")
+    return load("dynamics.one_mode.event_kernels")
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):
@@ -133,7 +134,7 @@ def test_exact_motion_in_40_digits(omega, decay, om):
         size = [abs(v0) * u + u * u, abs(v0) + u, abs(v0) * 2 * decay + 1]
         assert np.all(np.abs(np.array(found) - exact) <= 2e-14 * np.array(size))
         rows = np.array([[0.0, 0.0, u, 1.0, 0.0, v0, g0, bc, bs, 0.0]])
-        scene = Scene(None, omega, decay, (1.0, 1.0), np.array([[0.0, 9e9, 0.0, 1.0, om, 0.0]]), 1.0, 1.0, None)
+        scene = OneMode(None, omega, decay, (1.0, 1.0), np.array([[0.0, 9e9, 0.0, 1.0, om, 0.0]]), 1.0, 1.0, None)
         many = states(np.array([u]), rows, np.array([0]), scene)[:, 0]
         assert np.all(np.abs(many - exact) <= 2e-14 * np.array(size))
 

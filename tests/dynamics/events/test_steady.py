@@ -12,19 +12,19 @@ from scipy.integrate import solve_ivp
 from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
-from patchfem.dynamics.events import orbit_kernels, sdof_kernels, slip_kernels
-from patchfem.dynamics.events.steady import Regime, jenkins_point, point, response
+from patchfem.dynamics.one_mode import orbit_kernels, sdof_kernels, slip_kernels
+from patchfem.dynamics.one_mode.steady import Regime, jenkins_point, point, response
 from patchfem.structure.drives import levels
 
 
 @lru_cache(maxsize=1)
 def events():
-    return load("dynamics.events.event_kernels")
+    return load("dynamics.one_mode.event_kernels")
 
 
 @lru_cache(maxsize=1)
 def kernels():
-    return load("dynamics.events.steady_kernels")
+    return load("dynamics.one_mode.steady_kernels")
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):

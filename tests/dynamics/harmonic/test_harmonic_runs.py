@@ -3,21 +3,19 @@
 import numpy as np
 import pytest
 from harmonic_cases import five, many, march, plain_jenkins, sdof
-from scene_texts import STRUCTURE
+from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged
 from patchfem.dynamics.harmonic.balance import periodic_response, regime
 from patchfem.dynamics.harmonic.branch import response
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring, Stretch, synthesis
 from patchfem.dynamics.harmonic.point import group_of, point
-from patchfem.model.drive import drive_of
-from patchfem.model.structure import modes_of
 from patchfem.response.measures import acceleration_peak, harmonic, interface_loop, slip_measures
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-SCENE = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "{law}"\nstatic = 0.3\nbond_length = "20 um"\n' + STRUCTURE + \
+SCENE = POINT + NONLOCAL.replace("nonlocal", "{law}").replace("1 um", "20 um") + STRUCTURE + \
     '[accuracy]\nsteps_per_cycle = 1000\nmethod = "march"\n'
 LOAD = 26 * 4.4482216152605
 DRIVE = BaseSine(1.0, 1.0)
@@ -27,8 +25,8 @@ DRIVE = BaseSine(1.0, 1.0)
 def test_exact_measures_of_a_run_of_a_scene(law):
     """The last ten of 300 cycles of a marched run at 5 g and the measures of the balance."""
     scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
-    found = run(plan(scene), estimate=False).measures
-    modes, drive = modes_of(scene), drive_of(scene)
+    result = run(plan(scene), estimate=False)
+    found, modes, drive = result.measures, result.plan.model.rig.modes, result.plan.model.rig.drive
     limit = 0.3 * LOAD
     p = point(modes, drive, Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else Stretch(limit, 20e-6),
               tolerance=1e-5)

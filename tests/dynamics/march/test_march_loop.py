@@ -6,10 +6,9 @@ from friction_paths import random_walk, upper_pressure, walk
 from march_paths import OMEGA, follow, one_mode
 from scipy.integrate import solve_ivp
 
-from patchfem.compiled import load_kernels
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march.march import GOAL, march, plant_of
-from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
+from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature

@@ -11,11 +11,11 @@ from varying_load_cases import LAWS, LOAD, MASS, STILL, balance, crowned, elasti
 from patchfem.compiled import load
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
-from patchfem.dynamics.march import varying_load as wrench
+from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion, pressed
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.model.interfaces import strip_rows
+from patchfem.model.structure import strip_rows
 
 
 @pytest.mark.parametrize("row", [0, 1])
@@ -26,11 +26,11 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
     stiff = np.linalg.inv(atlas.c)
     k = stiff.sum() if row == 0 else atlas.x @ stiff @ atlas.x
     omega = np.sqrt((400 * np.pi)**2 + k * part**2 / MASS)
-    assert wrench.contact_frequencies(basis, atlas) == pytest.approx([omega], rel=1e-12)
+    assert varying_load.contact_frequencies(basis, atlas) == pytest.approx([omega], rel=1e-12)
     size = 1e-8 / part if row == 0 else 1e-8 / (part * atlas.x[-1])
     errors = []
     for steps in (200, 400, 800):
-        done = wrench.march(basis, BaseSine(0.0, 2000 * np.pi), atlas, LAWS["coulomb"], 1, steps, 1,
+        done = varying_load.march(basis, BaseSine(0.0, 2000 * np.pi), atlas, LAWS["coulomb"], 1, steps, 1,
                             start=Start([size], [0.0]))
         response = done.response
         errors.append(np.abs(response.modal[:, 0] - size * np.cos(omega * response.time)).max() / size)
@@ -44,7 +44,7 @@ def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
 def test_exact_energy_stays_while_the_block_bounces():
     """5000 steps of heave and pitch that leave the contact and land again: constant to 1e-12."""
     basis = modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
-    done = wrench.march(basis, STILL, crowned(), LAWS["coulomb"], 10, 500, 10,
+    done = varying_load.march(basis, STILL, crowned(), LAWS["coulomb"], 10, 500, 10,
                         start=Start([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]))
     total, force = mechanical(done.response, basis), done.response.extra["normal_load"]
     assert np.ptp(total) <= 1e-12 * total[0] and done.outcome is None
@@ -56,7 +56,7 @@ def test_exact_nodal_forces_are_those_of_the_unilateral_solve():
     """At every frame of a ramp of tilt: the forces of a fresh solve at the approach and rotation of the moment."""
     atlas, slow = crowned(), BaseSine(200.0, 2 * np.pi * 2)
     basis = modes([40.0], [1.0], [0.0], [400.0], 0.5)
-    done = wrench.march(basis, slow, atlas, LAWS["plastic"], 1, 200, 1, frames=40)
+    done = varying_load.march(basis, slow, atlas, LAWS["plastic"], 1, 200, 1, frames=40)
     sets = set()
     for shot in done.snapshots:
         gap = atlas.opening + shot["heave"] + shot["turn"] * atlas.x
@@ -92,7 +92,7 @@ def test_exact_coulomb_block_under_a_swinging_load():
                        normal=basis.normal, pitch=basis.pitch)
     drive, start = BaseSine(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
     want = brute_block(basis, drive, stiff, 0.3, start, 2, 100_000)
-    done = wrench.march(basis, drive, atlas, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0]))
+    done = varying_load.march(basis, drive, atlas, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0]))
     size = np.abs(want).max()
     at = np.round(done.response.time * 100_000 / drive.period).astype(int)[1:] - 1
     assert np.abs(done.response.slide[1:] - want[at]).max() <= 1e-3 * size
@@ -107,7 +107,7 @@ def test_order_two_where_modes_carry_both(name):
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     drive, ends = BaseSine(40.0, 2 * np.pi * 143), []
     for steps in (1600, 3200, 6400, 12800):
-        done = wrench.march(basis, drive, crowned(), LAWS[name], 1, steps, 1)
+        done = varying_load.march(basis, drive, crowned(), LAWS[name], 1, steps, 1)
         ends.append(np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega]))
         assert done.outcome is None
     change = np.abs(np.diff(ends, axis=0)).max(axis=1)
@@ -120,7 +120,7 @@ def test_order_the_accelerometer_feels_the_normal_forces():
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     drive, errors = BaseSine(40.0, 2 * np.pi * 143), []
     for steps in (6400, 12800):
-        r = wrench.march(basis, drive, crowned(), LAWS["tanh"], 1, steps, 1).response
+        r = varying_load.march(basis, drive, crowned(), LAWS["tanh"], 1, steps, 1).response
         slope = np.gradient(r.output_rate, r.time) + drive.values(r.time)
         errors.append(np.median(np.abs(r.acceleration - slope)[1:-1]) / np.abs(slope).max())
     assert errors[1] <= 1e-4 and errors[0] / errors[1] > 3
@@ -130,7 +130,7 @@ def test_exact_no_friction_without_load():
     """Lift-off and return: nothing holds the slide in flight, the bonds are gone, and the load comes back."""
     basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
     for name in ("coulomb", "plastic", "bonds"):
-        done = wrench.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), LAWS[name], 6, 400, 6,
+        done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), LAWS[name], 6, 400, 6,
                             start=Start([0, 5e-7], [0, 0.0]))
         r = done.response
         apart = r.extra["normal_load"] == 0
@@ -148,7 +148,7 @@ def test_always_nothing_creates_energy(name, seed, steps):
     basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
                   rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)
     drive = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
-    done = wrench.march(basis, drive, crowned(), LAWS[name], 3, steps, 3,
+    done = varying_load.march(basis, drive, crowned(), LAWS[name], 3, steps, 3,
                         start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)))
     r = done.response
     assert done.outcome is None, done.message
@@ -200,7 +200,7 @@ def test_exact_a_prescribed_load_is_a_bench_load_in_a_rig():
     def weight(t):
         return np.maximum(100 + 150 * np.cos(2 * np.pi * 90 * t + 0.3), 0.0)
 
-    done = wrench.march(basis, drive, None, LAWS["bonds"], 4, steps, 4, load=weight)
+    done = varying_load.march(basis, drive, None, LAWS["bonds"], 4, steps, 4, load=weight)
     from patchfem.dynamics.propagator import propagator
 
     p, law = propagator(basis, drive, steps), Recursion(Bonds(0.3, 1e-6))
@@ -244,9 +244,9 @@ def test_exact_strips_slide_by_yaw():
 
 def test_refuses_heave_on_one_rigid_point():
     with pytest.raises(PatchfemError, match=r"\[contact\] in place of \[normal\]"):
-        wrench.march(modes([100.0], [1.0], [1.0], [0.0]), STILL, None, LAWS["coulomb"], 1, 100, load=np.ones_like)
+        varying_load.march(modes([100.0], [1.0], [1.0], [0.0]), STILL, None, LAWS["coulomb"], 1, 100, load=np.ones_like)
 
 
 def test_refuses_laws_that_do_not_know_a_changing_load():
     with pytest.raises(PatchfemError, match="not yet built"):
-        wrench.bonds(Bonds(0.3, 1e-6, 0.0))
+        varying_load.bonds(Bonds(0.3, 1e-6, 0.0))

@@ -9,7 +9,7 @@ from varying_load_cases import LAWS, LOAD, MASS, balance, crowned, modes
 
 from patchfem.core import BaseSine, PatchfemError, Start
 from patchfem.dynamics.march import march as plain
-from patchfem.dynamics.march import varying_load as wrench
+from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion, advance
@@ -28,7 +28,7 @@ def reduced(atlas, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3
     """Shear modes on the nodes of an atlas, as many as there are nodes where no count is given."""
     force = atlas.reference.forces(0.0, 0.0)
     count = atlas.x.size if count is None else count
-    return wrench.shear_of(giving(atlas.x, depth), law, force, np.ones(force.size), count or None, tolerance)
+    return varying_load.shear_of(giving(atlas.x, depth), law, force, np.ones(force.size), count or None, tolerance)
 
 
 def dense(basis, drive, law, atlas, response, steps: int) -> tuple:
@@ -82,7 +82,7 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
     basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
     drive, atlas, law, steps = BaseSine(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
-    done = wrench.march(basis, drive, atlas, law, 1, steps, 1, start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
+    done = varying_load.march(basis, drive, atlas, law, 1, steps, 1, start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
                         shear=reduced(atlas, law))
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
     slides, forces, loads = dense(single, drive, SOFT[name], atlas, done.response, steps)
@@ -107,7 +107,7 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
         bonds = {"bonds": Bonds(0.3, 1e-6), "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)}
         model = plain.points_model(bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21))
     want = plain.march(basis, drive, model, 3, 1600, 3).response
-    got = wrench.march(basis, drive, atlas, law, 3, 1600, 3, shear=reduced(atlas, law)).response
+    got = varying_load.march(basis, drive, atlas, law, 3, 1600, 3, shear=reduced(atlas, law)).response
     assert np.abs(got.force).max() > 0.7 * 0.3 * LOAD and 3e-6 < np.abs(got.slide).max() < 2e-5
     assert got.slide == pytest.approx(want.slide, abs=1e-6 * np.abs(want.slide).max())
     assert got.force == pytest.approx(want.force, abs=5e-6 * 0.3 * LOAD)
@@ -118,7 +118,7 @@ def test_exact_pieces_spring_back_when_they_part():
     basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
     for name in ("plastic", "bonds"):
         law = LAWS[name]
-        done = wrench.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), law, 6, 400, 6,
+        done = varying_load.march(basis, BaseSine(30.0, 2 * np.pi * 143), crowned(), law, 6, 400, 6,
                             start=Start([0, 5e-7], [0, 0.0]), shear=reduced(crowned(), law))
         r = done.response
         apart = r.extra["normal_load"] == 0
@@ -139,7 +139,7 @@ def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, de
     basis = modes(rng.uniform(50, 900, n), rng.normal(size=n), rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
                   rng.normal(size=n) * rng.choice([0, 50.0, 300.0]), 0.01)
     drive, law = BaseSine(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143), LAWS[name]
-    done = wrench.march(basis, drive, crowned(), law, 3, steps, 3, shear=reduced(crowned(), law, count, depth),
+    done = varying_load.march(basis, drive, crowned(), law, 3, steps, 3, shear=reduced(crowned(), law, count, depth),
                         start=Start(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n)))
     r = done.response
     assert done.outcome is None, done.message
@@ -157,7 +157,7 @@ def test_exact_a_fork_goes_on_by_itself(count):
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     law, drive = LAWS["bonds"], BaseSine(60.0, 2 * np.pi * 143)
     shear = reduced(crowned(), law, count) if count else None
-    run = plain.fresh(basis, drive, wrench.wrench_model(basis, law, crowned(), None, shear), 200)
+    run = plain.fresh(basis, drive, varying_load.wrench_model(basis, law, crowned(), None, shear), 200)
     run.cycle(200, 0, [])
     twin = run.fork(drive)
     first, second = run.cycle(200, 0, [])[1], twin.cycle(200, 0, [])[1]
@@ -168,11 +168,11 @@ def test_refuses_shear_beside_a_set_valued_law():
     law = LAWS["plastic"]
     for other in ("coulomb", "tanh"):
         with pytest.raises(PatchfemError, match="elastic-plastic"):
-            wrench.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
+            varying_load.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
                                 shear=reduced(crowned(), law, 4))
     few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
     with pytest.raises(PatchfemError, match="span every node"):
-        wrench.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
+        varying_load.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
 
 
 @pytest.mark.parametrize("name", ["plastic", "bonds"])
@@ -182,7 +182,7 @@ def test_order_two_of_pieces_that_give_way(name):
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     drive, law, ends = BaseSine(40.0, 2 * np.pi * 143), LAWS[name], []
     for steps in (800, 1600, 3200, 6400):
-        done = wrench.march(basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8))
+        done = varying_load.march(basis, drive, crowned(), law, 1, steps, 1, shear=reduced(crowned(), law, 8))
         ends.append(np.concatenate([done.response.modal[-1], done.response.modal_rate[-1] / basis.omega]))
     change = np.abs(np.diff(ends, axis=0)).max(axis=1)
     assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()

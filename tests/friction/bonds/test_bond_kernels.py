@@ -11,6 +11,7 @@ from scipy.special import gammainc
 from patchfem.dynamics.march.models import growth_numbers
 from patchfem.friction.bonds import bond_kernels, bond_math_kernels
 from patchfem.friction.bonds.bond_list import law_numbers, room, share_table
+from patchfem.friction.bonds.engines import choose
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
@@ -83,7 +84,7 @@ def test_exact_direct_of_stretch_order_one_is_the_recursion(growth):
     assert got.stored == pytest.approx(run.stored[:, 0], abs=1e-11)
 
 
-@pytest.mark.parametrize("order, within", [(-0.5, 5e-4), (0.0, 1e-5), (1.0, 1e-5), (2.0, 1e-5)])
+@pytest.mark.parametrize("order, within", [(-0.5, 1e-4), (0.0, 1e-5), (1.0, 1e-5), (2.0, 1e-5)])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
 def test_exact_direct_of_growing_bonds_is_the_sum_by_hand(order, within, initial):
     law = Bonds(1.0, 1.0, order, "report", initial=initial, **GROWTH)
@@ -92,6 +93,26 @@ def test_exact_direct_of_growing_bonds_is_the_sum_by_hand(order, within, initial
     for k in (5, 20, 40, 60):
         assert got.after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, 0.4)[0], abs=within)
     assert got.ahead == pytest.approx(got.after, abs=within)
+
+
+@pytest.mark.parametrize("order", [-0.5, -0.9])
+def test_exact_young_growing_bonds_of_negative_order_are_the_sum_by_hand(order):
+    """A young bond's length is proportional to its path, so its force is smooth: a rule made for the power of the path
+    was 7e-5 to 2e-4 off here and only of first order in the step."""
+    law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
+    path, dt = 1.5 * np.sin(2 * np.pi * np.arange(276) / 200), 2 * np.pi / 200
+    after = follow_list(law, path, dt).after
+    for k in (30, 75, 140, 190, 275):
+        assert after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, dt)[0], abs=2e-6)
+
+
+@pytest.mark.parametrize("order", [-0.5, -0.9])
+def test_exact_bonds_of_negative_order_that_grew_at_rest(order):
+    """Full-grown bonds at R = 0, where their force has no bound, sum to P(p + 1, R/eps_0)."""
+    law = Bonds(1.0, 1.0, order, "report", ratio=0.5, rest_growth=1.0, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
+    path = np.append(np.linspace(0, 0.2, 41), 0.2)
+    after = follow_list(law, path, np.append(np.full(40, 0.1), 1e4)).after
+    assert after[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=1e-5 if order > -0.9 else 1e-3)
 
 
 def test_exact_direct_through_a_dwell_of_growing_bonds():
@@ -209,6 +230,19 @@ def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, readin
     got, whole = follow_list(law, path, 0.05, 0.05), follow_list(law, path, 0.05)
     assert got.tally[10] <= 250
     assert np.abs(got.after - whole.after).max() <= (1e-3 if order == 2 else 2.5e-3)
+
+
+@pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("steps, rest, slip", [(400, 0.003, 0.5), (400, 0.03, 3.0), (1600, 0.03, 3.0)])
+def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order, steps, rest, slip):
+    """Bonds that ripen over many strokes of a tenth of a bond length: strips joined by width alone, however much their
+    bonds differed in length, were 4e-3 off where 1e-4 was claimed."""
+    law = Bonds(1.0, 1.0, order, "report", 0.5, 0.05 * rest, slip, 5e-5, 0.0)
+    chosen = choose(law, 1e-3, 0.1, steps / 2, "merged")
+    path, dt = 0.05 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps), 2 * np.pi / steps
+    got, whole = follow_list(law, path, dt, chosen.merge), follow_list(law, path, dt)
+    assert np.abs(got.after - whole.after).max() <= chosen.error
+    assert got.tally[10] < 0.5 * whole.tally[10]
 
 
 @settings(max_examples=15, deadline=None)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from friction_paths import random_walk, triangle, upper_pressure, walk
 from march_paths import OMEGA, follow, one_mode
+from scene_texts import DRIVE, KILOGRAM
 
 from patchfem.core import BaseSine
 from patchfem.dynamics.march.march import march
@@ -15,7 +16,7 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.model.accuracy import choose as settings_of
 from patchfem.model.accuracy import quadrature_of
-from patchfem.model.drive import drive_of
+from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.march import created_warning
@@ -33,18 +34,7 @@ order = {order}
 bond_length = "1 um"
 initial_bonds = 0.0
 {growth}
-[structure]
-moving_mass = "1 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 3
+""" + KILOGRAM + DRIVE.replace("cycles = 30", "cycles = 3") + """\
 [accuracy]
 quadrature = "{engine}"
 """
@@ -115,12 +105,14 @@ def test_exact_steady_loop_of_order_two_creates_energy():
     assert contact.tally[6] > 0
 
 
-@pytest.mark.parametrize("order", [0.0, 0.5, 2.0, 3.0])
-def test_always_the_stretch_reading_creates_next_to_nothing(order):
-    """Orders p >= 0 never create energy; what the sums' own errors look like stays below 1e-5 of the work."""
-    path = random_walk(8, 400, 0.2)
-    _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=0.0), 1.0, np.inf, 0.0), path, 1.0)
-    assert bad == 0 and contact.tally[6] <= 1e-5 * contact.tally[7]
+@pytest.mark.parametrize("order, initial, size", [(0.0, 0.0, 0.2), (0.5, 0.0, 0.2), (2.0, 0.0, 0.2), (3.0, 0.0, 0.2),
+                                                  (0.0, 1.0, 0.1), (0.0, 1.0, 0.01), (0.5, 1.0, 0.004)])
+def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size):
+    """Orders p >= 0 never create energy. The path mean of the force by Simpson's rule or Gauss points created up to 5 %
+    of the work in the last rows, where the force jumps or has a cusp inside a step; the mean from the energy none."""
+    path = random_walk(8, 400, size)
+    _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0)
+    assert bad == 0 and contact.tally[6] <= 1e-7 * contact.tally[7]
 
 
 @pytest.mark.parametrize("order", [-0.5, -0.9])
@@ -176,9 +168,10 @@ def test_exact_engine_of_a_scene(tmp_path):
     for engine, order, reading, kind in (("auto", 1, "stretch", "element"), ("direct", 1, "stretch", "list"),
                                          ("merged", 2, "stretch", "list"), ("truncated", 0, "report", "list"),
                                          ("recursion", 1, "stretch", "element")):
-        found = rig(tmp_path, engine, reading, order)
-        assert contact_model(found, settings_of(found), None, drive_of(found)).contact == f"contact_{kind}_kernels"
-        used = quadrature_of(found, settings_of(found), drive_of(found)).engine
+        found = build(rig(tmp_path, engine, reading, order))
+        numerics = settings_of(found)
+        assert contact_model(found, numerics, None).contact == f"dynamics.contacts.{kind}_kernels"
+        used = quadrature_of(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"sum over bonds by {used}" in line for line in plan(found).verdict)
 
@@ -191,8 +184,8 @@ def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
 
 
 def test_exact_warning_of_energy_created(tmp_path):
-    found = rig(tmp_path)
+    found = build(rig(tmp_path))
     assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
         "the printed law created 5e-07 J per cycle, 0.2 % of what it dissipated; reading = \"stretch\" creates none"]
     assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
-    assert created_warning(rig(tmp_path, reading="stretch"), {"created": 1.0, "dissipated": 1.0}, 4) == []
+    assert created_warning(build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4) == []

@@ -17,16 +17,16 @@ from scipy.special import gammainc
 
 from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude
-from patchfem.compiled import load_kernels
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march.march import GOAL, march, plant_of
-from patchfem.dynamics.march.models import growth_numbers, jenkins_model, points_model
+from patchfem.dynamics.march.models import growth_numbers, jenkins_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds import point_kernels
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import BondState, Recursion
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
@@ -329,7 +329,7 @@ bond_length = "2 um"
 [slide]
 {slide}
 """
-    return law_bench.run(scene.loads(text, "bench.toml"), None, steps).values
+    return law_bench.run(build(scene.loads(text, "bench.toml")), None, steps).values
 
 
 @pytest.mark.parametrize("keys, steps, area", [

@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_texts import GROWING, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
+from scene_texts import GROWING, NONLOCAL, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.integrate import dblquad
 
 from patchfem.friction.bonds.spread import pad_factor
-from patchfem.model.law import acting, bonds_of
+from patchfem.model.law import acting
+from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
 
-NONLOCAL = '[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n'
+LONGER = NONLOCAL.replace("1 um", "2 um")
 SPREAD = ["friction.spread=4 mm"]
 
 
@@ -44,7 +45,7 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
     share = pad_factor(12.7e-3, 4e-3)
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
     for text in (point, SMALL_PATCH):
-        whole, less = (bench.run(loads(text + NONLOCAL + law + TRIANGLE, sets=sets), patch_of(text), 80)
+        whole, less = (bench.run(build(loads(text + LONGER + law + TRIANGLE, sets=sets)), patch_of(text), 80)
                        for sets in ([], SPREAD))
         assert less.force == pytest.approx(share * whole.force, rel=1e-12, abs=1e-12 * np.abs(whole.force).max())
         assert less.values["loop_area"] == pytest.approx(share * whole.values["loop_area"], rel=1e-12)
@@ -56,27 +57,28 @@ def patch_of(text):
         return None
     from patchfem.runs.patch.ladder import solve_all
 
-    return solve_all(loads(SMALL_PATCH + NONLOCAL + TRIANGLE), False)[0]
+    return solve_all(build(loads(SMALL_PATCH + LONGER + TRIANGLE)).patch, 1e-3, False)[0]
 
 
 def test_exact_a_growing_law_keeps_its_ratio_of_lengths():
     scene = loads(SMALL_PATCH + GROWING + TRIANGLE, sets=SPREAD)
-    before, after = bonds_of(loads(SMALL_PATCH + GROWING + TRIANGLE)), bonds_of(scene)
+    model = build(scene)
+    before, after = build(loads(SMALL_PATCH + GROWING + TRIANGLE)).bonds, model.bonds
     assert after.ratio == pytest.approx(before.ratio, rel=1e-15) and after.length == before.length
     assert after.static == pytest.approx(pad_factor(12.7e-3, 4e-3) * before.static, rel=1e-15)
-    assert acting(acting(scene)).friction == acting(scene).friction
+    assert acting(model.friction, model.pad, scene.where) == model.friction and model.friction.spread is None
 
 
 def test_exact_strips_share_the_whole_width():
     sets = ["contact.strips.count=4"]
-    one, four = (acting(loads(SMALL_PATCH + NONLOCAL + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
+    one, four = (build(loads(SMALL_PATCH + LONGER + TRIANGLE, sets=SPREAD + more)).friction for more in ([], sets))
     assert one.static == four.static == pytest.approx(0.3 * pad_factor(12.7e-3, 4e-3), rel=1e-15)
 
 
 @pytest.mark.parametrize("more", ["", SHEAR])
 def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
     share = pad_factor(12.7e-3, 4e-3)
-    text = SMALL_PATCH + more + NONLOCAL + SHORT
+    text = SMALL_PATCH + more + LONGER + SHORT
     one, two = (run(plan(loads(text, sets=[*sets, "accuracy.steps_per_cycle=400"])), estimate=False).measures
                 for sets in (SPREAD, [f"friction.static={0.3 * share!r}"]))
     assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
@@ -87,14 +89,14 @@ def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
 
 def test_refuses_spread_without_a_width_and_for_laws_without_bonds():
     with pytest.raises(SceneError, match=r"normal.width: missing.*friction.spread needs it"):
-        loads(POINT + NONLOCAL + TRIANGLE, sets=SPREAD)
+        loads(POINT + LONGER + TRIANGLE, sets=SPREAD)
     for law in ("coulomb", "tanh", "elastic-plastic"):
         with pytest.raises(SceneError, match=f"friction.spread: law '{law}' has no bonds to spread") as caught:
-            loads(SMALL_PATCH + NONLOCAL + TRIANGLE, sets=[*SPREAD, f"friction.law={law}",
+            loads(SMALL_PATCH + LONGER + TRIANGLE, sets=[*SPREAD, f"friction.law={law}",
                                                      "friction.reference_speed=1 mm/s"])
         assert len(caught.value.mistakes) == 1
 
 
 def test_exact_a_width_without_spread_is_remarked():
-    scene = loads(POINT + NONLOCAL + TRIANGLE, sets=["normal.width=1 mm"])
+    scene = loads(POINT + LONGER + TRIANGLE, sets=["normal.width=1 mm"])
     assert scene.remarks == ["normal.width has no meaning without friction.spread and is not used"]

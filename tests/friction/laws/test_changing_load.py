@@ -14,7 +14,7 @@ from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
-from patchfem.model.load import load_at, refined
+from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -111,13 +111,13 @@ CONSTANT = 'kind = "constant"\nspeed = "1 mm/s"\ndistance = "20 um"'
 
 @pytest.mark.parametrize("amplitude", ["40 N", "150 N"])
 def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
-    scene = bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", amplitude))
+    model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", amplitude)))
     height = float(amplitude.split()[0])
     load = lambda t: max(100 + height * np.cos(2 * np.pi * 300 * t + 0.5), 0.0)  # noqa: E731
     wanted = 0.3e-3 * quad(load, 0, 0.02, limit=500, epsabs=1e-12)[0]
-    errors = [abs(law_bench.run(scene, None, steps).values["friction_work"] / wanted - 1) for steps in (40, 80)]
+    errors = [abs(law_bench.run(model, None, steps).values["friction_work"] / wanted - 1) for steps in (40, 80)]
     assert errors[1] <= 3e-4 and errors[1] < errors[0] / 3
-    found = law_bench.run(scene, None, 40)
+    found = law_bench.run(model, None, 40)
     assert found.force == pytest.approx(0.3 * found.load * (found.slide > 0), abs=1e-12)
     if height > 100:
         assert (found.load == 0).any() and found.values["friction_ratio_peak"] == pytest.approx(0.3)
@@ -125,9 +125,9 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
 
 def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
     """At v: m = N, z' = v (N - z/eps), s2' = v (2 z - s2/eps), the rule for a falling N in between: order 1."""
-    scene = bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING)
+    model = build(bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING))
     time = np.linspace(0, 0.02, 400_001)
-    load, z, s2 = load_at(scene, time), np.zeros(time.size), 0.0
+    load, z, s2 = model.point.at(time), np.zeros(time.size), 0.0
     x = 1e-3 * 0.5e-7 / 2e-6  # v dt/eps; lengths in eps, loads in N
     for k in range(1, time.size):
         mean, last = (load[k] + load[k - 1]) / 2, z[k - 1]
@@ -139,15 +139,15 @@ def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
             z[k], s2 = keep * z[k], keep * s2
     errors = []
     for steps in (50, 100, 200):
-        found = law_bench.run(scene, None, steps)
+        found = law_bench.run(model, None, steps)
         errors.append(np.abs(found.force / 0.3 - np.interp(found.time, time, z)).max() / 100)
         assert found.values["energy_balance"] <= 1e-13 and found.values["energy_created"] == 0
     assert errors[2] <= 3e-3 and 1.8 <= errors[0] / errors[1] <= 2.2 and 1.8 <= errors[1] / errors[2] <= 2.2
 
 
 def test_exact_samples_hold_the_instants_without_load():
-    scene = bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N"))
-    time, slide = refined(scene, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16)
+    model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N")))
+    time, slide = model.point.refined(model.slide, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16)
     turns = (np.arange(-1, 8)[:, None] + np.array([1, -1]) * np.arccos(-100 / 150) / (2 * np.pi)).ravel()
     edges = (turns - 0.5 / (2 * np.pi)) / 300
     edges = edges[(edges > 0) & (edges < 0.02)]
@@ -166,7 +166,7 @@ def test_exact_a_scene_under_a_swinging_load_runs_with_errors():
 def test_refuses_a_load_too_fast_to_resolve():
     scene = loads(BENCH, "a.toml", ["normal.amplitude=1 N", "normal.frequency=1000000 kHz", "slide.cycles=1000"])
     with pytest.raises(Missing, match=r"lower normal\.frequency"):
-        law_bench.run(scene, None, 400)
+        law_bench.run(build(scene), None, 400)
 
 
 @pytest.mark.parametrize("order, reading", [(1.0, "report"), (2.0, "report"), (0.0, "report"), (0.5, "stretch")])

@@ -7,7 +7,7 @@ import pytest
 from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
-from scene_texts import POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
+from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
 from scipy.integrate import quad
 from scipy.special import gamma, gammainc
 
@@ -17,6 +17,7 @@ from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.convolution import Convolution, average, limits
 from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
@@ -24,7 +25,6 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
-COULOMB = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 FLAT = SMALL_PATCH.split("[contact.tilt]")[0]
 CROWN = "[contact.crown]\nradius = \"20 m\"\n"
 
@@ -190,9 +190,9 @@ def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edge
 # ---- scenes
 
 def bench_of(text, *sets, steps=64):
-    scene = loads(text, sets=sets)
-    patch = solve_all(scene, False)[0] if scene.contact is not None else None
-    return patch, bench.run(scene, patch, steps, 4)
+    model = build(loads(text, sets=sets))
+    patch = solve_all(model.patch, 1e-3, False)[0] if model.patch is not None else None
+    return patch, bench.run(model, patch, steps, 4)
 
 
 def test_exact_one_point_is_coulomb():

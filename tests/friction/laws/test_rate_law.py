@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_texts import DRIVE, MODE, POINT
 from scipy.integrate import quad, solve_ivp
 
 from patchfem.core import Outcome
@@ -11,10 +12,9 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, loads
 
 LOAD, LIMIT, MASS, OMEGA = 115.653761996773, 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
-LAW = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'
-RIG = LAW + ('[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
-             'damping = 0.003\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "{} m/s^2"\n'
-             'cycles = {}\n[accuracy]\nsteps_per_cycle = {}\n')
+LAW = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'
+RIG = LAW + MODE + DRIVE.replace("5 g", "{} m/s^2").replace("cycles = 30", "cycles = {}") + \
+    "[accuracy]\nsteps_per_cycle = {}\n"
 
 
 def found(text):
@@ -104,8 +104,7 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
 
 
 def test_exact_the_compiled_step_is_the_plain_one():
-    from patchfem.compiled import load_kernels
-    from patchfem.dynamics.march.models import rate_model
+    from patchfem.dynamics.march.models import load_kernels, rate_model
 
     hub, model = load_kernels(None), rate_model(2.5, 1e-3)
     contact, work = model.build(hub)

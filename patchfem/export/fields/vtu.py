@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..core import Missing, PatchfemError
+from ...core import Missing, PatchfemError
 from .vtkhdf import Frame, Series
 
 BLOCK = 1 << 20  # bytes of a compressed block

@@ -1,5 +1,5 @@
 """One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in
-segments. Short scenes run as plain Python (no compiled code is loaded), long ones compiled.
+segments. Short blocks run as plain Python (no compiled code is loaded), long ones compiled.
 """
 
 from itertools import pairwise
@@ -8,17 +8,17 @@ from math import ceil, inf, pi
 import numpy as np
 
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
+from ..events.event_list import BORDER, ROOM, EventLog
+from ..events.histories import LEAST, SAMPLES, EventRun
 from . import sdof_kernels
-from .event_list import BORDER, ROOM, EventLog
-from .histories import LEAST, SAMPLES, EventRun
-from .sdof_samples import Scene, force, panels, peak_acceleration, peak_force, position, response, states
+from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, position, response, states
 
 COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
 CORNERS = 400_000  # corners kept from before the window
 
 
-def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: float) -> Scene:
+def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: float) -> OneMode:
     """The mode, friction [N] and drive over the mass. PatchfemError where they are not one mode with one interface, the
     drive has no closed form, or kinetic friction exceeds static."""
     if modes.omega.size != 1 or modes.interfaces.shape[0] != 1:
@@ -44,7 +44,7 @@ def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: 
         else:
             table.append((part.start, end, -base * part.constant, -base * part.amplitude, part.omega,
                           part.phase % (2 * pi)))
-    return Scene(modes, w, float(modes.dampers[0, 0]) / 2, (static * share, kinetic * share if static > 0 else 0.0),
+    return OneMode(modes, w, float(modes.dampers[0, 0]) / 2, (static * share, kinetic * share if static > 0 else 0.0),
                  np.array(table, float), slide, float(modes.output[0]), drive)
 
 
@@ -57,15 +57,15 @@ def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: fl
     the output passes `travel` [m]; the run ends there. PatchfemError as `scene_of`; NotConverged where an event could
     not be located or events pile up.
     """
-    scene = scene_of(modes, drive, static, kinetic, cycles * drive.period)
+    block = scene_of(modes, drive, static, kinetic, cycles * drive.period)
     engine = sdof_kernels
     if compiled:
         from . import event_kernels as engine
     z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
-    far = travel / abs(scene.output) if scene.output else inf
+    far = travel / abs(block.output) if block.output else inf
     if abs(z) > far:
         raise PatchfemError("initial: the motion starts beyond structure.travel; start inside it")
-    run = _Run(scene, drive.period, cycles, window)
+    run = _Run(block, drive.period, cycles, window)
     run.go(engine, z, v, far, progress)
     return run.collect()
 
@@ -74,14 +74,14 @@ def events(modes: ModalBasis, drive, static: float, kinetic: float, cycles: floa
            compiled: bool = False, most: int = 100_000) -> np.ndarray:
     """The first `most` events of a run: (k, 5) time [s], drive phase [rad], z [m], z' [m/s] and what begins there,
     +-1 a slip, 0 a stick; the first row is the start. Errors as `simulate`."""
-    scene = scene_of(modes, drive, static, kinetic, cycles * drive.period)
+    block = scene_of(modes, drive, static, kinetic, cycles * drive.period)
     engine = sdof_kernels
     if compiled:
         from . import event_kernels as engine
     z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
     rows, state, book = np.zeros((most, sdof_kernels.ROW)), np.zeros(9), np.zeros(10)
-    engine.enter(state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
-    code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, (drive.period, inf, 0.0, 0.0),
+    engine.enter(state, block.segments, 0, 0.0, 0.0, z, v, 1.0, *block.friction, block.w**2)
+    code, used = engine.march((block.w, block.decay), block.friction, block.segments, (drive.period, inf, 0.0, 0.0),
                               state, rows, np.empty((0, 2)), book)
     _check(code, rows[max(used - 1, 0), 0])
     rows = rows[:used]
@@ -98,8 +98,8 @@ def _check(code: int, time: float) -> None:
 class _Run:
     """Events as they come, a chunk at a time: what is summed is summed, the rest is forgotten before the window."""
 
-    def __init__(self, scene: Scene, period: float, cycles: float, window: int):
-        self.scene, self.period, self.duration, self.window = scene, period, cycles * period, window
+    def __init__(self, block: OneMode, period: float, cycles: float, window: int):
+        self.block, self.period, self.duration, self.window = block, period, cycles * period, window
         number = int(np.ceil(cycles - 1e-9))
         self.extremes = np.tile([inf, -inf], (number, 1))
         self.phasors = np.zeros(number, complex)
@@ -109,13 +109,13 @@ class _Run:
 
     def go(self, engine, z: float, v: float, far: float, progress) -> None:
         """All events from state (z, v)."""
-        scene, rows, code = self.scene, np.zeros((CHUNK, sdof_kernels.ROW)), sdof_kernels.FULL
+        block, rows, code = self.block, np.zeros((CHUNK, sdof_kernels.ROW)), sdof_kernels.FULL
         self.state, clock = np.zeros(9), (self.period, far, 0.0, 1.0)
-        self.begun = 0.5 * scene.modes.mass * (v * v + scene.w**2 * z * z)
-        engine.enter(self.state, scene.segments, 0, 0.0, 0.0, z, v, 1.0, *scene.friction, scene.w**2)
+        self.begun = 0.5 * block.modes.mass * (v * v + block.w**2 * z * z)
+        engine.enter(self.state, block.segments, 0, 0.0, 0.0, z, v, 1.0, *block.friction, block.w**2)
         self.before = (np.sign(v), 0.0)
         while code == sdof_kernels.FULL:
-            code, used = engine.march((scene.w, scene.decay), scene.friction, scene.segments, clock, self.state, rows,
+            code, used = engine.march((block.w, block.decay), block.friction, block.segments, clock, self.state, rows,
                                       self.extremes, self.book)
             _check(code, rows[max(used - 1, 0), 0])
             if used:
@@ -128,8 +128,8 @@ class _Run:
 
     def take(self, rows) -> None:
         """Sum what a chunk of phases adds."""
-        scene, beta = self.scene, self.scene.w**2
-        z, v, _ = states(0.5 * rows[:, 2], rows, np.arange(len(rows)), scene)
+        block, beta = self.block, self.block.w**2
+        z, v, _ = states(0.5 * rows[:, 2], rows, np.arange(len(rows)), block)
         self.peak = max(self.peak, float((v * v + beta * z * z).max()),
                         float((rows[:, 5]**2 + beta * rows[:, 4]**2).max()))
         self._add_phasors(rows)
@@ -143,14 +143,14 @@ class _Run:
 
     def _note(self, rows) -> None:
         """Keep the changes of direction and of segment as rows (time, phase, interface, what, slide)."""
-        rows, slide = rows[rows[:, 2] > 0], self.scene.slide
+        rows, slide = rows[rows[:, 2] > 0], self.block.slide
         if not len(rows):
             return
         way, segment = (np.concatenate([[first], rows[:, k]]) for first, k in zip(self.before, (3, 9)))
         self.before = way[-1], segment[-1]
         old, new = np.sign(slide) * way[:-1], np.sign(slide) * way[1:]
         what = np.where(new == 0, 0, np.where(old == 0, 1, 2)) * new
-        turned = (old != new) & (self.scene.friction[0] > 0)
+        turned = (old != new) & (self.block.friction[0] > 0)
         crossed = segment[1:] != segment[:-1]
         zero = np.zeros(len(rows))
         found = np.stack([rows[:, 0], rows[:, 1], zero, what, slide * rows[:, 4]], axis=1)
@@ -176,31 +176,31 @@ class _Run:
             return
         time = number * per
         owner = np.maximum(np.searchsorted(rows[:, 0], time + 1e-9 * per, side="right") - 1, 0)
-        z = position(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.scene)
-        turn = np.exp(-2j * pi * np.arange(64) / 64)[number % 64] * (self.scene.output / 32)
+        z = position(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.block)
+        turn = np.exp(-2j * pi * np.arange(64) / 64)[number % 64] * (self.block.output / 32)
         np.add.at(self.phasors, np.minimum(number // 64, len(self.phasors) - 1), z * turn)
 
     def collect(self) -> EventRun:
         """Everything that is kept."""
-        scene, mass, end = self.scene, self.scene.modes.mass, self.end
+        block, mass, end = self.block, self.block.modes.mass, self.end
         first = max(0.0, end - self.window * self.period)
         wide = self.sample(first, end)
         full = self._with_corners(self._with_cycle(wide, first), max(0.0, end - max(2, self.window) * self.period))
         rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > first)]
         low, high = np.maximum(rows[:, 0], first) - rows[:, 0], np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0]
-        owner, tau, weight = panels(low, high, scene.fastest)
-        z, v, _ = states(tau, rows, owner, scene)
-        loop = (rows[owner, 0] + tau, weight, scene.slide * z, scene.slide * v, force(tau, rows, owner, scene))
-        stored = 0.5 * mass * (self.state[4]**2 + scene.w**2 * self.state[3]**2)
+        owner, tau, weight = panels(low, high, block.fastest)
+        z, v, _ = states(tau, rows, owner, block)
+        loop = (rows[owner, 0] + tau, weight, block.slide * z, block.slide * v, force(tau, rows, owner, block))
+        stored = 0.5 * mass * (self.state[4]**2 + block.w**2 * self.state[3]**2)
         book = dict(zip(("work_in", "viscous", "power", "friction"), (mass * self.book[:4]).tolist()))
         book |= {"stored": float(stored) - self.begun, "peak_stored": max(0.5 * mass * self.peak, float(stored))}
         seen = np.isfinite(self.extremes[:, 0])
-        amplitudes = np.sort(scene.output * self.extremes[seen], axis=1)
-        count = 1 if scene.friction[0] == 0 else int(self.book[4])
+        amplitudes = np.sort(block.output * self.extremes[seen], axis=1)
+        count = 1 if block.friction[0] == 0 else int(self.book[4])
         stuck = float((high - low)[rows[:, 3] == 0].sum())
         return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
-                        self._starts(first), peak_acceleration(low, high, rows, scene), end / self.period, self.log(),
-                        force_peaks=np.array([peak_force(low, high, rows, scene)]))
+                        self._starts(first), peak_acceleration(low, high, rows, block), end / self.period, self.log(),
+                        force_peaks=np.array([peak_force(low, high, rows, block)]))
 
     def _starts(self, first: float):
         rows = self.recent
@@ -209,14 +209,14 @@ class _Run:
 
     def sample(self, first: float, end: float) -> Response:
         """Uniform samples on [first, end] and both sides of every event."""
-        rows, scene = self.recent, self.scene
+        rows, block = self.recent, self.block
         grid = np.linspace(first, end, max(LEAST, round((end - first) / self.period * SAMPLES) + 1))
-        events = rows[(rows[:, 0] > first) & (rows[:, 0] < end), 0] if scene.friction[0] > 0 else np.empty(0)
+        events = rows[(rows[:, 0] > first) & (rows[:, 0] < end), 0] if block.friction[0] > 0 else np.empty(0)
         time = np.sort(np.concatenate([grid, events, np.nextafter(events, -np.inf)]))
         time = time[np.concatenate([[True], np.diff(time) > 0])]
         owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)
         tau = np.clip(time - rows[owner, 0], 0.0, rows[owner, 2])
-        return response(time, *states(tau, rows, owner, scene), force(tau, rows, owner, scene), scene)
+        return response(time, *states(tau, rows, owner, block), force(tau, rows, owner, block), block)
 
     def _with_cycle(self, wide: Response, first: float) -> Response:
         """The cycle before a window of one, so that two are kept whole."""
@@ -230,8 +230,8 @@ class _Run:
         if not len(rows):
             return wide
         tau, owner = np.zeros(len(rows)), np.arange(len(rows))
-        early = response(rows[:, 0].copy(), *states(tau, rows, owner, self.scene),
-                         force(tau, rows, owner, self.scene), self.scene)
+        early = response(rows[:, 0].copy(), *states(tau, rows, owner, self.block),
+                         force(tau, rows, owner, self.block), self.block)
         return _chained(early, wide)
 
 

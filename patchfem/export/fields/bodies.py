@@ -8,7 +8,7 @@ import numpy as np
 def write_fields(result, path: Path) -> dict:
     """Both bodies and the interface, frame by frame, of one pair; the pressed state for the report's picture, which is
     drawn for tensor grids only."""
-    from ..elasticity.elasticity import Piece
+    from ...elasticity.elasticity import Piece
     from .vtkhdf import bodies, write_series
 
     patch, fields = result.patch, result.fields
@@ -53,7 +53,7 @@ def _loads(patch, fields: dict, side: str) -> tuple:
 
 def _motions(patch, loads: list) -> list:
     """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
-    from ..elasticity import elasticity, substructure
+    from ...elasticity import elasticity, substructure
 
     pair = patch.pair
     how = elasticity.displacement if isinstance(pair.piece, elasticity.Piece) else substructure.displacement
@@ -66,9 +66,9 @@ def _motions(patch, loads: list) -> list:
 def _body(patch, fields: dict, side: str, u) -> dict:
     """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
     u: of `_motions`."""
-    from ..elasticity import coating_bond
-    from ..elasticity.elasticity import von_mises
-    from ..elasticity.recovery import cells_of, indicator, recovery
+    from ...elasticity import coating_bond
+    from ...elasticity.elasticity import von_mises
+    from ...elasticity.recovery import cells_of, indicator, recovery
 
     lower = side == "lower"
     piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
@@ -92,13 +92,13 @@ def _body(patch, fields: dict, side: str, u) -> dict:
 
 def _inside(piece, grid, u) -> tuple:
     """(points (n, 2) as x and depth, blocks of cells, interface nodes, cell stress) of a piece displaced by u."""
-    from ..elasticity import elasticity
+    from ...elasticity import elasticity
 
     if isinstance(piece, elasticity.Piece):
         rows = grid.depth.size
         points = np.stack([np.repeat(grid.x, rows), np.tile(grid.depth, grid.x.size)], axis=1)
         return points, [piece.cells], np.arange(0, len(points), rows), elasticity.cell_stress(piece, u)[0]
-    from ..elasticity import substructure
+    from ...elasticity import substructure
 
     blocks = [block for block in (grid.triangles, grid.quads) if len(block)]
     return grid.points, blocks, grid.interface, substructure.cell_stress(piece, u)[0]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from friction_paths import random_walk, triangle
 from list_paths import follow_list, list_arrays
-from test_friction_hub import OMEGA, one_mode
+from march_paths import OMEGA, one_mode
 
 from patchfem.core import BaseSine
 from patchfem.dynamics.march.march import march

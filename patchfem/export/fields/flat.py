@@ -5,8 +5,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+from ..pictures import BLUE, ORANGE, STYLE, axis_unit
 from .panels import Panel, borders, curves, panels
-from .pictures import BLUE, ORANGE, STYLE, axis_unit
 from .vtkhdf import Frame
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ..core import Missing, PatchfemError
+from ...core import Missing, PatchfemError
 
 NAME = "fields.vtkhdf"
 LINE, TRIANGLE, QUAD = 3, 5, 9

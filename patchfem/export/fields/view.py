@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import Missing, PatchfemError
+from ...core import Missing, PatchfemError
+from ..pictures import axis_unit
 from .panels import Panel, borders, curves, panels
-from .pictures import axis_unit
 from .vtkhdf import Frame, Series
 
 ENDINGS = (".png", ".svg", ".pdf")

@@ -11,7 +11,7 @@ PANEL, WEIGHT = np.polynomial.legendre.leggauss(12)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Scene:
+class OneMode:
     """One mode as the event engine has it: w, decay, friction (static, kinetic) over the mass, segments (s, 6), drive
     force over the mass; slide and output per coordinate, mass, and what the drive's acceleration is."""
 
@@ -114,8 +114,8 @@ def _series(u, v0, g0, bc, bs, mode, om) -> tuple:
     return shift, speed, drive - alpha * speed - beta * shift
 
 
-def _one(u, rows, owner, scene, om, parts) -> np.ndarray:
-    mode = oscillator(scene.w, scene.decay, om)
+def _one(u, rows, owner, block, om, parts) -> np.ndarray:
+    mode = oscillator(block.w, block.decay, om)
     out, short = np.empty((parts, u.size)), u * mode[6] < REACH
     if short.any():
         out[:, short] = _series(u[short], *(rows[owner[short], k] for k in (5, 6, 7, 8)), mode, om)[:parts]
@@ -131,50 +131,50 @@ def _one(u, rows, owner, scene, om, parts) -> np.ndarray:
     return out
 
 
-def position(u, rows, owner, scene: Scene):
+def position(u, rows, owner, block: OneMode):
     """z alone, as `states`."""
-    return _states(u, rows, owner, scene, 1)[0]
+    return _states(u, rows, owner, block, 1)[0]
 
 
-def states(u, rows, owner, scene: Scene) -> tuple:
+def states(u, rows, owner, block: OneMode) -> tuple:
     """(z, v, z'') at times u (k,) after the starts of the phases rows[owner], rows (p, 10), owner (k,)."""
-    return _states(u, rows, owner, scene, 3)
+    return _states(u, rows, owner, block, 3)
 
 
-def _states(u, rows, owner, scene, parts):
+def _states(u, rows, owner, block, parts):
     out = np.zeros((parts, u.size))
     out[0] = rows[owner, 4]
     way, segment = rows[owner, 3], rows[owner, 9]
-    for om in {float(om) for om in scene.segments[:, 4]}:
-        mine = np.flatnonzero((way != 0) & (scene.segments[:, 4] == om)[segment.astype(int)])
+    for om in {float(om) for om in block.segments[:, 4]}:
+        mine = np.flatnonzero((way != 0) & (block.segments[:, 4] == om)[segment.astype(int)])
         if mine.size:
-            out[:, mine] += way[mine] * _one(u[mine], rows, owner[mine], scene, om, parts)
+            out[:, mine] += way[mine] * _one(u[mine], rows, owner[mine], block, om, parts)
     return out
 
 
-def pull(u, rows, owner, scene: Scene) -> tuple:
+def pull(u, rows, owner, block: OneMode) -> tuple:
     """(drive force over the mass, its first and second derivative) at times u (k,) after the starts of phases."""
-    _, _, push, b, om, _ = scene.segments[rows[owner, 9].astype(int)].T
+    _, _, push, b, om, _ = block.segments[rows[owner, 9].astype(int)].T
     angle = rows[owner, 1] + om * u
     wave = b * np.sin(angle)
     return push + wave, b * om * np.cos(angle), -om * om * wave
 
 
-def force(u, rows, owner, scene: Scene):
+def force(u, rows, owner, block: OneMode):
     """Friction force [N]: kinetic in slip, what holds the interface in stick."""
-    if scene.slide == 0 or scene.friction[0] == 0:
+    if block.slide == 0 or block.friction[0] == 0:
         return np.zeros(u.size)
-    held, way = pull(u, rows, owner, scene)[0] - scene.w**2 * rows[owner, 4], rows[owner, 3]
-    return np.where(way == 0, held, way * scene.friction[1]) * (scene.modes.mass / scene.slide)
+    held, way = pull(u, rows, owner, block)[0] - block.w**2 * rows[owner, 4], rows[owner, 3]
+    return np.where(way == 0, held, way * block.friction[1]) * (block.modes.mass / block.slide)
 
 
-def response(time, z, v, gain, pushed, scene: Scene) -> Response:
+def response(time, z, v, gain, pushed, block: OneMode) -> Response:
     """The histories of a run from z, v, z'' (k,) and the friction force `pushed` [N]."""
-    base = scene.drive.values(time)
-    moving = base if getattr(scene.drive, "moving", True) else 0.0
-    slide = scene.slide * z
-    return Response(time, z[:, None], v[:, None], slide, scene.slide * v, scene.output * z, scene.output * v,
-                    scene.output * gain + moving, base, pushed, slide)
+    base = block.drive.values(time)
+    moving = base if getattr(block.drive, "moving", True) else 0.0
+    slide = block.slide * z
+    return Response(time, z[:, None], v[:, None], slide, block.slide * v, block.output * z, block.output * v,
+                    block.output * gain + moving, base, pushed, slide)
 
 
 def panels(low, high, fastest: float) -> tuple:
@@ -188,23 +188,23 @@ def panels(low, high, fastest: float) -> tuple:
     return np.repeat(owner, PANEL.size), tau.ravel(), (half[:, None] * WEIGHT).ravel()
 
 
-def peak_acceleration(low, high, rows, scene: Scene) -> float:
+def peak_acceleration(low, high, rows, block: OneMode) -> float:
     """Largest |absolute acceleration| of the output over intervals [low, high] (k,) of phases, both ends included."""
-    return _peak(_output_acceleration, low, high, rows, scene)
+    return _peak(_output_acceleration, low, high, rows, block)
 
 
-def peak_force(low, high, rows, scene: Scene) -> float:
+def peak_force(low, high, rows, block: OneMode) -> float:
     """Largest |friction force| [N] over intervals [low, high] (k,) of phases, both ends included."""
-    return _peak(_force_rates, low, high, rows, scene)
+    return _peak(_force_rates, low, high, rows, block)
 
 
-def _peak(curve, low, high, rows, scene: Scene) -> float:
+def _peak(curve, low, high, rows, block: OneMode) -> float:
     """Largest size of a curve that gives its value, rate and second rate at tau in the phases `owner`."""
-    count = np.maximum(5, np.ceil((high - low) * scene.fastest * 8).astype(int) + 1)
+    count = np.maximum(5, np.ceil((high - low) * block.fastest * 8).astype(int) + 1)
     owner = np.repeat(np.arange(count.size), count)
     inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
     tau = low[owner] + (high - low)[owner] * inside / (count[owner] - 1)
-    value, rate, _ = curve(tau, rows, owner, scene)
+    value, rate, _ = curve(tau, rows, owner, block)
     top = float(np.abs(value).max())
     turn = np.flatnonzero((owner[:-1] == owner[1:]) & (rate[:-1] * rate[1:] < 0)
                           & (np.maximum(np.abs(value[:-1]), np.abs(value[1:])) >= 0.9 * top))
@@ -213,23 +213,23 @@ def _peak(curve, low, high, rows, scene: Scene) -> float:
     a, b = tau[turn], tau[turn + 1]
     t, mine = a - rate[turn] * (b - a) / (rate[turn + 1] - rate[turn]), owner[turn]
     for _ in range(6):
-        _, slope, bend = curve(t, rows, mine, scene)
+        _, slope, bend = curve(t, rows, mine, block)
         t = np.clip(t - np.divide(slope, bend, out=np.zeros_like(t), where=bend != 0), a, b)
-    return max(top, float(np.abs(curve(t, rows, mine, scene)[0]).max()))
+    return max(top, float(np.abs(curve(t, rows, mine, block)[0]).max()))
 
 
-def _force_rates(u, rows, owner, scene: Scene) -> tuple:
-    stuck = (rows[owner, 3] == 0) * (scene.modes.mass / scene.slide if scene.slide else 0.0)
-    _, rate, second = pull(u, rows, owner, scene)
-    return force(u, rows, owner, scene), stuck * rate, stuck * second
+def _force_rates(u, rows, owner, block: OneMode) -> tuple:
+    stuck = (rows[owner, 3] == 0) * (block.modes.mass / block.slide if block.slide else 0.0)
+    _, rate, second = pull(u, rows, owner, block)
+    return force(u, rows, owner, block), stuck * rate, stuck * second
 
 
-def _output_acceleration(u, rows, owner, scene: Scene) -> tuple:
-    _, v, gain = states(u, rows, owner, scene)
-    drive, rate, second = pull(u, rows, owner, scene)
-    alpha, beta, slips = 2 * scene.decay, scene.w**2, rows[owner, 3] != 0
+def _output_acceleration(u, rows, owner, block: OneMode) -> tuple:
+    _, v, gain = states(u, rows, owner, block)
+    drive, rate, second = pull(u, rows, owner, block)
+    alpha, beta, slips = 2 * block.decay, block.w**2, rows[owner, 3] != 0
     jerk = np.where(slips, rate - alpha * gain - beta * v, 0.0)
     snap = np.where(slips, second - alpha * jerk - beta * gain, 0.0)
-    share = -1 / scene.modes.base[0] if getattr(scene.drive, "moving", True) and scene.modes.base[0] else 0.0
-    return (scene.output * gain + share * drive, scene.output * jerk + share * rate,
-            scene.output * snap + share * second)
+    share = -1 / block.modes.base[0] if getattr(block.drive, "moving", True) and block.modes.base[0] else 0.0
+    return (block.output * gain + share * drive, block.output * jerk + share * rate,
+            block.output * snap + share * second)

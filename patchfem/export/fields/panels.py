@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pictures import axis_unit
+from ..pictures import axis_unit
 from .vtkhdf import Frame
 
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way

@@ -1,0 +1,135 @@
+"""build(scene) -> Model: everything a scene means, made once; the last module that sees a Scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from ..effects import absent
+from ..scene.scene import Scene
+from ..scene.tables import Accuracy, Friction, Temperature
+from .source import Source
+
+if TYPE_CHECKING:
+    from ..friction.bonds.parameters import Bonds
+    from .load import PointLoad
+    from .patch import PatchModel
+    from .rig import Rig
+    from .slide import SlidePath
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Model:
+    """What a run is asked to compute, frozen, in SI; nothing is solved.
+
+    kind: "patch", "bench", "rig" or "linear". patch or point, whichever carries the load, the other None. friction:
+    keys of the law as they act, of the first interface; heat: surface temperature table or None; spread [m] of the pad
+    (2.15) or None, pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
+    reading factor) or None. absent: effects that the scene does not name.
+    """
+
+    source: Source
+    kind: str
+    patch: PatchModel | None
+    point: PointLoad | None
+    friction: Friction | None
+    heat: Temperature | None
+    spread: float | None
+    pad: float | None
+    slide: SlidePath | None
+    rig: Rig | None
+    accuracy: Accuracy
+    measured: tuple | None
+    absent: tuple
+
+    @property
+    def side(self) -> str:
+        """The piece that carries the shapes, and with them the pressure."""
+        return self.patch.gap.side if self.patch is not None else "upper"
+
+    @property
+    def soft(self) -> str:
+        """What lets the patch slip part by part under one slide, as the scene writes it; empty where nothing."""
+        return self.patch.gives_way if self.patch is not None else ""
+
+    @property
+    def load_varies(self) -> bool:
+        """Whether the normal load is prescribed as a function of time."""
+        return self.point is not None and bool(self.point.amplitude)
+
+    @property
+    def nominal_load(self) -> float:
+        """Load [N] of the patch, estimated for a prescribed approach, or of the point; 0 without either."""
+        if self.patch is not None:
+            return self.patch.nominal_load
+        return self.point.load if self.point is not None else 0.0
+
+    @property
+    def speed(self) -> float:
+        """Size of the speeds to expect [m/s]."""
+        return self.slide.peak_speed if self.rig is None else self.rig.speed
+
+    @property
+    def bonds(self) -> Bonds:
+        """Bonds of law 'nonlocal', the floor of the speed by default 1e-3 of the speeds to expect."""
+        from .law import bonds_of
+
+        return bonds_of(self.friction, self.speed, 0.0 if self.rig is None else 1e-12)
+
+    def limits(self, load: float) -> tuple:
+        """(static, kinetic) friction force [N] of the first interface under a load [N]."""
+        return self.rig.interfaces[0].limits(load)
+
+
+def build(scene: Scene) -> Model:
+    """The model of a valid scene; files that it names are read. PatchfemError with the place of the key at fault.
+
+    Only what the scene names is imported.
+    """
+    patch = point = slide = rig = None
+    if scene.contact is not None:
+        from .patch import patch_asked
+
+        patch = patch_asked(scene.contact, scene.kind, scene.beside)
+    if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
+        from .load import point_asked
+
+        point = point_asked(scene)
+    if scene.slide is not None:
+        from .slide import slide_asked
+
+        slide = slide_asked(scene)
+    if scene.structure is not None:
+        from .rig import rig_asked
+
+        rig = rig_asked(scene)
+    friction, heat, spread, pad = _law(scene)
+    named, measured = tuple(scene.named()), scene.measured
+    found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
+                  (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
+                  tuple(absent(named)))
+    source = Source(scene.path, scene.title, scene.text, resolved(scene, found), named, tuple(scene.remarks))
+    return replace(found, source=source)
+
+
+def _law(scene: Scene) -> tuple:
+    """(keys of the law as they act, its surface temperature table, its spread [m], width of the pad [m]) of the first
+    interface."""
+    given = scene.structure.interface[0] if scene.structure is not None and scene.structure.interface else \
+        scene.friction
+    if given is None:
+        return None, None, None, None
+    from .law import acting, pad_width
+
+    pad = pad_width(scene)
+    return acting(given, pad, scene.where), given.temperature, given.spread, pad
+
+
+def resolved(scene: Scene, model: Model) -> str:
+    """The scene as TOML in SI with every default written out, also those that follow from other keys."""
+    contact, friction = scene.contact, scene.friction
+    if contact is not None and (contact.element_size, contact.mesh) == (None, None) and not model.patch.chosen:
+        contact = contact.model_copy(update={"element_size": model.patch.size})
+    if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
+        friction = friction.model_copy(update={"rest_speed": model.bonds.rest_speed})
+    return replace(scene, contact=contact, friction=friction).resolved()

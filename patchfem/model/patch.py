@@ -1,0 +1,136 @@
+"""The patch that a scene asks for: its two pieces, what presses them, what lets them give way. Nothing is solved."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ..scene.tables import Asperities, Coating, Contact, Material
+from .gap import Gap, gap_asked
+
+CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance
+AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
+
+
+@dataclass(frozen=True, slots=True)
+class OnePiece:
+    """One of the two pieces. height [m], coating included; coating None: bare."""
+
+    height: float
+    substrate: Material
+    coating: Coating | None
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of the coating [m], 0 where the piece is bare."""
+        return self.coating.thickness if self.coating else 0.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PatchModel:
+    """Two pieces and what presses them.
+
+    length, width, height [m], the last of a piece that names none; pairs: equal patches that share the load; plane:
+    "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface, None lets
+    the tolerance choose where `chosen`, else length/AUTOMATIC_CELLS; mesh: file of the two pieces. load [N] or approach
+    [m], the other None. offset [m] and line_moment [N m] of a load line; rotates: the upper piece is free to turn;
+    spring [N m/rad] and slide_spring [N/m, None rigid] of the holder. skin: asperities; strips: (count, roll [rad]);
+    shear: the pieces give way tangentially; gives_way: what lets the patch slip part by part, as the scene writes it.
+    """
+
+    length: float
+    width: float
+    height: float
+    pairs: int
+    plane: str
+    substrate: Material
+    lower: OnePiece
+    upper: OnePiece
+    gap: Gap
+    element_size: float | None
+    chosen: bool
+    mesh: Path | None
+    load: float | None
+    approach: float | None
+    offset: float | None
+    line_moment: float | None
+    rotates: bool
+    spring: float
+    slide_spring: float | None
+    skin: Asperities | None
+    strips: tuple | None
+    shear: bool
+    gives_way: str
+
+    @property
+    def alike(self) -> bool:
+        """Whether the pieces have the same height, material and coating."""
+        return self.lower == self.upper
+
+    @property
+    def size(self) -> float:
+        """Element size [m] of an even interface."""
+        return self.element_size or self.length / AUTOMATIC_CELLS
+
+    @property
+    def nominal_load(self) -> float:
+        """The load [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
+        if self.load is not None:
+            return self.load
+        return self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
+
+    def sized(self, size: float | None, kind: str = "") -> "PatchModel":
+        """The patch with another element size [m]; None: of the tolerance in a run of kind "patch", else automatic."""
+        chosen = size is None and kind == "patch" and self.mesh is None and self.gap.profile is None
+        found = replace(self, element_size=size, chosen=chosen)
+        profile = None if self.mesh is not None else found.size
+        return replace(found, gap=replace(self.gap, profile_size=profile))
+
+    @property
+    def moment(self) -> float | None:
+        """Moment of the load about the middle of the patch [N m], None where the rotation is held."""
+        if not self.rotates:
+            return 0.0 if self.spring > 0 else None
+        return self.line_moment if self.line_moment is not None else self.load * self.offset
+
+
+def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
+    """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names.
+
+    PatchfemError where the shapes lie on different pieces.
+    """
+    size = None if contact.mesh is not None else contact.element_size or contact.length / AUTOMATIC_CELLS
+    line, holder, strips = contact.load_line, contact.holder, contact.strips
+    chosen = kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None)
+    return PatchModel(
+        contact.length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate,
+        _piece(contact, contact.lower),
+        _piece(contact, contact.upper), gap_asked(contact, size, beside), contact.element_size, chosen,
+        beside(contact.mesh) if contact.mesh is not None else None, contact.load,
+        contact.approach.distance if contact.approach is not None else None,
+        line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
+        (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
+        (holder.tangential_stiffness or None) if holder is not None else None,
+        contact.asperities, (strips.count, strips.roll) if strips is not None else None, contact.shear is not None,
+        contact.gives_way)
+
+
+def _piece(contact: Contact, own) -> OnePiece:
+    """One piece: its own table before the common keys."""
+    height, substrate, coating = contact.height, contact.substrate, contact.coating
+    if own is not None:
+        height, substrate = own.height or height, own.substrate or substrate
+        coating = None if own.coating == "none" else own.coating or coating
+    return OnePiece(height, substrate, coating)
+
+
+def bars(patch: PatchModel, softness) -> float:
+    """Sum over the layers of both pieces of thickness * softness(material), all pairs together, per area [m/N]."""
+    total = 0.0
+    for piece in (patch.lower, patch.upper):
+        total += (piece.height - piece.thickness) * softness(piece.substrate)
+        total += piece.thickness * softness(piece.coating.material) if piece.coating else 0.0
+    return total / (patch.pairs * patch.length * patch.width)
+
+
+def block_shear(patch: PatchModel) -> float:
+    """Shear stiffness [N/m] of two blocks in series, layer by layer; short blocks held at both faces are stiffer."""
+    return 1 / bars(patch, lambda m: 2 * (1 + m.poisson) / m.young)

@@ -1,0 +1,82 @@
+"""The rig that a scene asks for: modes, drive, start, interfaces and springs, built once. Nothing is solved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import ModalBasis, Start
+from ..structure.drive_sizes import peak_speed
+from .drive import cycles_of, cycles_per_level, drive_of, levelled
+from .law import interface_names, rubbings_of
+from .structure import acts, first_of, frequencies, modes_of, notes_of, start_of, yaws
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rig:
+    """Modes with their drive and what rubs on them.
+
+    start: None at rest. kind: "base", "force" or "free"; waveform as in the scene; frequency [Hz] of a sine or of
+    levels, else None; levels: accelerations [m s-2] of a drive in levels, level_cycles of each; cycles of the whole
+    run; force [N] of a force drive, else None. interfaces: a Rubbing each, none in a linear rig; names: of interfaces
+    between masses. load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a
+    patch in strips. travel [m], infinite without a stop; cubic [N/m3] stiffening at the output or None; interlock:
+    (stiffness [N/m], wavelength [m]) of a bonded spring that bends, or None. mass [kg] and own_frequency [Hz] of the
+    first mode that is not rigid; frequencies (n,) [Hz]; by_modes: the scene
+    lists modes; notes: on a structure file.
+    """
+
+    modes: ModalBasis
+    drive: object
+    start: Start | None
+    kind: str
+    waveform: str
+    frequency: float | None
+    levels: tuple
+    level_cycles: float
+    cycles: float
+    force: float | None
+    interfaces: tuple
+    names: tuple
+    load_varies: bool
+    strips_slide_apart: bool
+    travel: float
+    cubic: float | None
+    interlock: tuple | None
+    bonded: float | None
+    mass: float
+    own_frequency: float
+    frequencies: np.ndarray
+    by_modes: bool
+    notes: tuple
+
+    @property
+    def speed(self) -> float:
+        """Size of the speeds to expect [m/s]: sets the default floor of the speed in the growth of bonds."""
+        return peak_speed(self.drive, self.start)
+
+    @property
+    def stiffness(self) -> float:
+        """K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all rigid."""
+        return self.mass * (2 * np.pi * self.own_frequency)**2 if self.own_frequency else 0.0
+
+    @property
+    def bends(self) -> bool:
+        """Whether springs beside the contact are not linear."""
+        return self.cubic is not None or self.interlock is not None
+
+
+def rig_asked(scene) -> Rig:
+    """The rig of a scene with [structure] and [drive]; PatchfemError for files or starts that cannot be used."""
+    structure, asked, modes = scene.structure, scene.drive, modes_of(scene)
+    drive, bonded = drive_of(scene, modes), structure.bonded
+    own, mass = first_of(scene)
+    rows = levelled(scene)
+    bends = bonded is not None and bonded.wavelength is not None
+    return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
+               asked.levels if rows else (), cycles_per_level(scene) if rows else 0.0, float(cycles_of(scene, drive)),
+               asked.force if asked.kind == "force" else None, rubbings_of(scene), tuple(interface_names(scene)),
+               acts(scene), yaws(scene), structure.travel or np.inf,
+               structure.stiffening.cubic if structure.stiffening is not None else None,
+               (bonded.stiffness, bonded.wavelength) if bends else None,
+               bonded.stiffness if bonded is not None else None, mass, own, frequencies(scene, modes),
+               bool(structure.mode), tuple(notes_of(scene)))

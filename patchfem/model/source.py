@@ -1,0 +1,40 @@
+"""Where a model comes from: the scene's path, text and effects, and the place of a key for messages."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..core import PatchfemError
+from ..scene.lines import key_lines
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Source:
+    """The scene behind a model. text: as read; resolved: TOML in SI with every default; effects: what it names;
+    remarks: sentences on keys that nothing uses."""
+
+    path: Path
+    title: str
+    text: str
+    resolved: str
+    effects: tuple
+    remarks: tuple
+
+    def where(self, key: str) -> str:
+        """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
+        lines = key_lines(self.text)
+        line = lines.get(key) or lines.get(key.rpartition(".")[0])
+        return f"{self.path}:{line}: {key}" if line else f"{self.path}: {key}"
+
+
+@contextmanager
+def placed(source: Source) -> Iterator[None]:
+    """Put file and line before every PatchfemError that names the key at fault and leaves the block."""
+    try:
+        yield
+    except PatchfemError as error:
+        if error.key is None:
+            raise
+        where = source.where(error.key) if error.key else str(source.path)
+        raise type(error)(f"{where}: {error}") from None

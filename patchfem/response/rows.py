@@ -1,0 +1,141 @@
+"""Measures of a motion as rows of one table, applied to the solution of every engine alike.
+
+A row has a name, a unit, the absolute floor of its error, a definition in one sentence, and the function that reads it
+off the last cycles of a run. A new measure is a new row.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import Response
+from .measures import acceleration_peak, drift, energy_balance, interface_loop, ledger_measures, slip_measures
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The last cycles of a run, with what its engine knows better than its samples.
+
+    window: histories; steps: samples per cycle; extremes (c, 2): of the output in every cycle of the window [m]; book:
+    energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode; sine: the drive
+    ends as a sine. loop: (slide (k,), first harmonics of slide and force, work per cycle [J]), None where the window
+    holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has
+    none.
+    """
+
+    window: Response
+    drive: object
+    steps: int
+    extremes: np.ndarray
+    book: dict
+    load: float | None
+    stiffness: float
+    sine: bool
+    loop: tuple | None = None
+    ledger: np.ndarray | None = None
+    known: dict = field(default_factory=dict)
+
+    @cached_property
+    def slip(self) -> dict:
+        """slip_amplitude, stick_fraction and slip_start_phase, as far as the run has them."""
+        found = {} if self.load is None else slip_measures(self.window, self.drive, self.steps)
+        return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
+
+    @cached_property
+    def cycle(self) -> dict:
+        """loop_area, equivalent_stiffness and equivalent_damping, as far as the run has them."""
+        if self.loop is None or self.load is None:
+            return {}
+        return interface_loop(*self.loop, self.stiffness)
+
+    @cached_property
+    def energies(self) -> dict:
+        """The measures of the ledger at its end."""
+        return {} if self.ledger is None else ledger_measures(self.ledger)
+
+    def of_load(self, value: Callable) -> float | None:
+        """value(load history (k,) [N]) where the load changes with the motion."""
+        load = self.window.extra.get("normal_load")
+        return None if load is None or self.load is None else float(value(load))
+
+
+class Row(NamedTuple):
+    """One measure. of: its function of Seen, None where a run of another kind or an engine alone has it; grain: samples
+    of a cycle that its reading may be off by."""
+
+    name: str
+    unit: str
+    floor: float
+    text: str
+    of: Callable | None = None
+    grain: float = 0.0
+
+
+ROWS = (
+    Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak motion at the output, relative to the base",
+        lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2),
+    Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
+        lambda s: acceleration_peak(s.window)),
+    Row("friction_force_peak", "N", 1e-6, "largest resultant of the friction of the interface",
+        lambda s: float(np.abs(s.window.force).max()) if s.load is not None else None),
+    Row("energy_balance", "1", 1e-8, "what the energy book misses, over the power that went in and the peak stored",
+        lambda s: energy_balance(s.book)),
+    Row("drift_per_cycle", "m", 1e-11, "motion of the mean slide per cycle",
+        lambda s: drift(s.window.time, s.window.slide, s.drive.period)),
+    Row("slip_amplitude", "m", 1e-10, "half peak-to-peak of the irreversible part of the slide",
+        lambda s: s.slip.get("slip_amplitude")),
+    Row("stick_fraction", "1", 1e-3, "share of the time in which the interface does not slip",
+        lambda s: s.slip.get("stick_fraction"), 4.0),
+    Row("slip_start_phase", "rad", 1e-3, "phase of the base displacement at which slip starts after a stick, modulo pi",
+        lambda s: s.slip.get("slip_start_phase"), 4 * np.pi),
+    Row("normal_load", "N", 0.0, "normal load of the interface, all pairs together", lambda s: s.load),
+    Row("loop_area", "J", 1e-10, "work of friction per cycle", lambda s: s.cycle.get("loop_area")),
+    Row("equivalent_stiffness", "N m-1", 1.0, "part of the friction in phase with the slide, over its amplitude",
+        lambda s: s.cycle.get("equivalent_stiffness")),
+    Row("equivalent_damping", "1", 1e-8, "loop area over 2 pi K A^2, K the first mode's, A half the slide's range",
+        lambda s: s.cycle.get("equivalent_damping")),
+    Row("friction_work", "J", 1e-10, "work that went into the interface over the run",
+        lambda s: s.energies.get("friction_work")),
+    Row("energy_stored", "J", 1e-10, "elastic energy in the interface at the end"),
+    Row("energy_dissipated", "J", 1e-10, "energy that friction turned into heat over the run",
+        lambda s: s.energies.get("energy_dissipated")),
+    Row("energy_created", "J", 1e-10, "energy that a law as printed made over the run",
+        lambda s: s.energies.get("energy_created")),
+    Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min)),
+    Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max)),
+    Row("open_fraction", "1", 1e-3, "share of the time without contact",
+        lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0),
+    Row("friction_ratio_end", "1", 1e-9, "friction over normal load at the end of the slide"),
+    Row("friction_ratio_peak", "1", 1e-9, "largest friction over normal load"),
+    Row("work_check", "1", 1e-2, "trapezoid of the run's own samples against the ledger's friction work, relative"),
+    Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
+    Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
+    Row("onset_level", "m s-2", 0.0, "level of the drive at which the interface starts to slip"),
+    Row("jump_level", "m s-2", 0.0, "level after the largest jump of the amplitude between two levels"),
+    Row("level_hysteresis", "m", 0.0, "largest difference of the amplitude at one level passed upwards and downwards"),
+)
+TABLE = {row.name: row for row in ROWS}
+
+
+def measures_of(seen: Seen) -> dict:
+    """name -> value of every row that the run has: the engine's own value before the one read off the samples."""
+    out = {}
+    for row in ROWS:
+        value = seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
+        if value is not None:
+            out[row.name] = value
+    return out
+
+
+def of_first(name: str) -> str:
+    """The name of a measure without the number of its interface: slip_amplitude_2 is slip_amplitude."""
+    head, _, number = name.rpartition("_")
+    return head if number.isdigit() else name
+
+
+def row_of(name: str) -> Row:
+    """The row of a measure of any interface."""
+    return TABLE[of_first(name)]

@@ -1,0 +1,127 @@
+"""Which engine slides the interface of a bench, what it loses and what it costs.
+
+The recursion, the list of bonds and the elements are the compiled ones that rigs march with. A law without memory needs
+no loop. Where the pressure of a point changes on the way, a law is stepped sample by sample.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...core import Missing, PatchfemError
+from ...effects import has, listed
+from ...friction.bonds.engines import Choice
+from ...friction.bonds.engines import choose as choose_sum
+from ...model.accuracy import LONGEST
+
+CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
+NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
+         STEPPED: "law step by step", PLANE: "two directions"}
+PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide needs no search for the increment
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """kind: one of the numbers above; choice: how bonds are summed, None without a sum; seconds: per sample."""
+
+    kind: int
+    seconds: float
+    choice: Choice | None = None
+
+    @property
+    def name(self) -> str:
+        """As summaries and plans have it."""
+        return "bench, " + (f"{self.choice.engine} bond list" if self.kind == LIST else NAMES[self.kind])
+
+
+def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> Engine:
+    """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
+    summed where that is known already.
+
+    PatchfemError for a pinned engine that cannot sum such a bench, Missing where the sum would take too long.
+    """
+    f, soft = model.friction, bool(model.soft)
+    if model.slide.across is not None:
+        return Engine(PLANE, _stepped_seconds(model, slide, 1))
+    if soft and has(f.law, "bonds"):
+        from ...slip.shear_modes import SHEAR_MODES
+
+        modes = model.accuracy.shear_modes or SHEAR_MODES
+        return Engine(POINTS, 4e-8 * points * (1 + modes / 4))
+    if soft:
+        return Engine(ELEMENTS, 3e-9 * points + 1e-7)
+    if changes(model):
+        return _stepped(model, slide, points)
+    if has(f.law, "memoryless"):
+        return Engine(CLOSED, 1e-7)
+    if not has(f.law, "bonds"):
+        return Engine(ELEMENTS, 1e-7)
+    return _summed(model, slide, points, choice or sum_of(model, slide))
+
+
+def changes(model) -> bool:
+    """Whether the pressure of a point changes during the slide: with the load, or as it slides over the other piece."""
+    return model.load_varies or model.side == "lower"
+
+
+def sum_of(model, slide) -> Choice:
+    """How the bonds of a rigid slide along the samples slide (k,) [m] are summed: as in a rig, but the error is held
+    against the force that is reached, which is small where the stroke is short against the bond length."""
+    law, accuracy = model.bonds, model.accuracy
+    stroke, steps = strokes(slide)
+    stroke = max(stroke / law.length, 1e-9)
+    goal = accuracy.tolerance * min(1.0, stroke)
+    tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
+    return choose_sum(law, goal, stroke, steps, accuracy.quadrature, tail, accuracy.merge)
+
+
+def smooth_sum_of(model, slide) -> Choice | None:
+    """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
+    fit. None of a law that is no sum, or where the scene names the engine."""
+    if not has(model.friction.law, "bonds") or model.accuracy.quadrature != "auto" or model.accuracy.merge is not None:
+        return None
+    found = sum_of(model, slide)
+    return replace(found, engine="truncated", merge=0.0, error=found.tail) if found.engine == "merged" else found
+
+
+def strokes(slide) -> tuple:
+    """(mean path [m], mean number of moving steps) between two reversals of the samples slide (k,) [m]."""
+    move = np.diff(slide)
+    way = np.sign(move[move != 0])
+    count = 1 + np.count_nonzero(way[1:] != way[:-1])
+    return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
+
+
+def _summed(model, slide, points: int, found: Choice) -> Engine:
+    law = model.bonds
+    if found.engine == "recursion":
+        return Engine(RECURSION, 3e-8, found)
+    if law.breakaway:  # a list has no elastic range
+        return _stepped(model, slide, points)
+    size = slide.size
+    strips = min(found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length))
+    seconds = PASSES * found.seconds * (strips / found.strips if found.strips else 1.0)
+    if size * seconds > LONGEST:
+        raise Missing(f"the bond list (about {strips:.0f} entries) would take about {size * seconds:.0f} "
+                      f"s, more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle or slide.cycles, or loosen "
+                      "accuracy.tail or accuracy.merge", "")
+    return Engine(LIST, seconds, found)
+
+
+def _stepped(model, slide, points: int) -> Engine:
+    f, pinned = model.friction, model.accuracy.quadrature
+    if has(f.law, "bonds") and pinned == "merged":
+        raise PatchfemError("'merged' where the pressure of a point changes "
+                            "during the slide, or beside friction.breakaway: use 'auto', 'direct' or 'truncated'; not "
+                            "yet built", "accuracy.quadrature")
+    return Engine(STEPPED, _stepped_seconds(model, slide, points))
+
+
+def _stepped_seconds(model, slide, points: int) -> float:
+    """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
+    f = model.friction
+    if not listed(f):
+        return 6e-5
+    moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
+    strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
+    return (3 if model.load_varies else 1) * (1.2e-3 + 2e-6 * strips + 8e-9 * strips * points)

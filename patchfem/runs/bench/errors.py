@@ -1,0 +1,66 @@
+"""What a bench leaves open: its steps, its mesh and its sum over bonds."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...response.errors import change, step_error
+from ..errors import Rung, estimate, space_rung
+from . import bench
+from .engine import LIST
+from .watch import Watch
+
+FINER = 0.5  # merge width of the run that shows what merging does
+MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
+
+
+class Variant(NamedTuple):
+    """A coarser pass: steps per cycle, on the coarser mesh or not, how the bonds are summed."""
+
+    steps: int
+    rough: bool
+    choice: object
+
+
+def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
+    """([error by measure name, ...], seconds) of the pass `fine` at `steps` per cycle on the ladder of `ladder_of`;
+    coarse: the patch on the coarser mesh or None."""
+    def solve(variant: Variant):
+        on = coarse if variant.rough else patch
+        return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say))
+
+    errors, seconds = estimate(solve, fine.values, ladder_of(model, coarse is not None, fine, steps))
+    return [*errors, *([stated(model, fine)] if fine.engine.kind == LIST else [])], seconds
+
+
+def ladder_of(model, meshed: bool, fine, steps: int) -> list:
+    """Rungs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there is one, and
+    for a merged list of bonds narrower strips."""
+    choice = fine.engine.choice
+    half, few = Variant(max(4, steps // 8 * 4), False, choice), Variant(max(4, steps // 16 * 4), False, choice)
+    counted = min(steps, 399) if model.load_varies else steps  # first order: twice the change, as of few steps
+    out = [Rung((half, few), lambda *values: step_error(*values, counted))]
+    if meshed:
+        out.append(space_rung(few._replace(rough=True), few))
+    if fine.engine.kind == LIST and choice.merge > 0:
+        narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
+        out.append(Rung((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few))
+    return out
+
+
+def stated(model, fine) -> dict:
+    """Error by measure name that follows from the bound of the sum over bonds, which is a share of the friction limit:
+    forces and slip directly, work as that share of what went to and fro, the store as that of a bond length at the
+    limit."""
+    error, f, power = fine.engine.choice.error, model.friction, float(np.abs(np.diff(fine.ledger[0])).sum())
+    force = error * f.static
+    out = {"friction_force_peak": force * float(fine.load.max()), "friction_ratio_end": force,
+           "friction_ratio_peak": force, "slip_amplitude": error * f.bond_length, "work_check": error}
+    out |= {name: error * power for name in ("friction_work", "energy_dissipated")}
+    out["energy_stored"] = out["friction_force_peak"] * f.bond_length
+    out["energy_created"] = error * fine.values["energy_created"]
+    out["loop_area"] = error * float(np.abs(np.diff(fine.ledger[0][fine.first:])).sum())
+    out["equivalent_stiffness"] = error * abs(fine.values.get("equivalent_stiffness", 0.0))
+    return {name: value for name, value in out.items() if name in fine.values} | \
+        {name: 0.0 for name in fine.values if name not in out}

@@ -1,0 +1,28 @@
+"""What a bench would cost, before it runs."""
+
+from ...model.model import Model
+from .engine import engine_of
+
+
+def cost(model: Model, unknowns: dict) -> tuple:
+    """(engine, steps of all passes, seconds) of a bench."""
+    if model.slide.across is not None:
+        from .two_directions import refuse
+
+        refuse(model)
+    accuracy = model.accuracy
+    per_cycle = model.slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
+    time, slide = model.slide.samples(per_cycle)[:2]
+    if model.load_varies:
+        time, slide = model.point.refined(model.slide, time, slide, per_cycle)
+    runs = engine_of(model, slide, unknowns.get("interface_points", 1))
+    if runs.choice is not None and runs.choice.strips:
+        unknowns["bond_list_about"] = int(runs.choice.strips)
+    steps = 2 * time.size  # half and a quarter of the steps and what checks the sum beside them
+    return runs.name, steps, steps * runs.seconds
+
+
+def groups(model: Model) -> dict:
+    """Dimensionless groups of the slide by name."""
+    length = model.friction.bond_length
+    return {"amplitude_over_bond_length": model.slide.amplitude / length} if length else {}

@@ -1,0 +1,45 @@
+"""A rigid slide under a pressure that rides on the upper piece, by the compiled engines.
+
+Every point shares the slide and the laws are linear in the pressure, so all points have the traction of one that
+carries the load, times their own share of it.
+"""
+
+import numpy as np
+
+from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
+from ...effects import has
+from ...friction.bonds.quadrature import cutoff
+from ...friction.record import law_from
+from .engine import ELEMENTS, Engine
+from .follow import follow
+from .law import pressed
+from .ledger import Slid, elastic_slip, local_slip
+from .watch import Watch
+
+
+def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> Slid:
+    """Slide the interface along path = (time [s], slide [m]), both (k,), with `frames` frames of its tractions."""
+    (time, slide), f = path, model.friction
+    sigma, weight = pressed(model, patch)
+    load = float(weight @ sigma)
+    paced = f.rest_growth is not None or not (has(f.law, "bonds") or has(f.law, "timeless"))
+    done = follow(one_point(model, load, engine), time, slide, frames, watch, paced)
+    tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
+    loads = np.full(time.size, load)
+    if engine.kind == ELEMENTS:
+        slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
+    else:
+        slip, local = elastic_slip(model, slide, done.force, loads), local_slip(model, slide[done.at], tau, sigma)
+    return Slid(done.force, loads, slip, done.ledger, done.at, tau, local)
+
+
+def one_point(model, load: float, engine: Engine) -> ContactModel:
+    """One point that carries the whole load [N], as a contact of the compiled loops."""
+    f = model.friction
+    if engine.kind == ELEMENTS:
+        return element_model(law_from(f, load).element(load))
+    law, found = model.bonds, engine.choice
+    if found.engine == "recursion":
+        return points_model(law, [1.0], [load])
+    reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
+    return list_model(law, f.static * load, reach, found.merge)

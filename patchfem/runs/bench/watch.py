@@ -1,0 +1,23 @@
+"""What a pass of a bench is told from outside, and what it tells."""
+
+from dataclasses import dataclass
+
+BLOCK = 4096  # samples between two words of progress; what it costs to enter compiled code is lost in it
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """What a pass is told from outside. choice: how bonds are summed, None to choose; say: called with one line when
+    something compiles; progress: called with the done share."""
+
+    choice: object = None
+    say: object = None
+    progress: object = None
+
+    def tell(self, share: float) -> None:
+        """Pass on the done share."""
+        if self.progress is not None:
+            self.progress(share)
+
+
+UNWATCHED = Watch()

@@ -1,0 +1,47 @@
+"""Sizes, stiffness and groups of a patch, before it is pressed."""
+
+from math import sqrt
+
+from ...model.model import Model
+from ...model.patch import CHOSEN_POINTS, bars, block_shear
+
+
+def sizes(asked) -> dict:
+    """Sizes by name of a `PatchModel`."""
+    points = CHOSEN_POINTS if asked.chosen else round(asked.length / asked.size) + 1
+    return {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
+
+
+def chain(asked) -> dict:
+    """Links of the stiffness chain by name [N/m], "rigid" where the scene names none."""
+    out = {"holder": asked.slide_spring or "rigid", "pieces_shear": block_shear(asked) if asked.shear else "rigid",
+           "asperities": "rigid"}
+    if asked.skin is not None and asked.skin.tangential_ratio is not None:
+        from .skin import mean_stiffness
+
+        area = asked.length * asked.width * asked.pairs
+        out["asperities"] = asked.skin.tangential_ratio * mean_stiffness(asked, asked.nominal_load / area) * area
+    return out
+
+
+def groups(model: Model) -> dict:
+    """Dimensionless groups of the patch by name."""
+    out, asked = {}, model.patch
+    load = asked.nominal_load
+    if model.friction is not None:
+        out["slip_length"] = model.friction.static * load / block_shear(asked)
+    tilts = [abs(part.angle) for name, part in asked.gap.shapes if name == "tilt"]
+    if tilts and load > 0:
+        approach = load * bars(asked, lambda m: (1 - m.poisson**2) / m.young)
+        out["tilt_over_first_opening"] = tilts[0] * asked.length / (2 * approach)
+    return out
+
+
+def verdict(found: dict) -> list:
+    """Sentences on what the tilt group says."""
+    tilt = found.get("tilt_over_first_opening")
+    if tilt is None:
+        return []
+    part = min(1.0, 1 / sqrt(tilt)) if tilt > 1 else 1.0
+    return [f"tilt is {tilt:.3g} of the first-opening tilt: " +
+            ("full contact" if tilt <= 1 else f"partial contact, roughly {100 * part:.0f} % or less")]

@@ -1,0 +1,82 @@
+"""Sizes, cost and groups of a coupled run, before it runs."""
+
+from math import inf, pi
+
+from ...effects import has
+from ...model.accuracy import LONGEST, choose, list_cost, quadrature_of
+from ...model.model import Model
+from ...slip.shear_modes import SHEAR_MODES
+from ...structure.drive_sizes import largest, omega_of
+
+
+def chain(rig) -> dict:
+    """Links of the stiffness chain of a Rig by name [N/m]."""
+    return {"mode": rig.stiffness} | ({"bonded": rig.bonded} if rig.bonded is not None else {})
+
+
+def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
+    """(engine, steps of all passes, seconds) of a coupled run."""
+    numerics, rig, f, soft = choose(model, per_point), model.rig, model.friction, bool(model.soft)
+    if numerics.engine == "exact":
+        each = 1e-4 if unknowns["modes"] == 1 else 4e-4 + 1e-4 * unknowns["modes"]
+        return "exact", int(4 * numerics.cycles), each * numerics.cycles
+    if numerics.engine == "harmonic":
+        points = 1 if rig.waveform == "sine" else 120
+        return "harmonic", points, 0.3 + 0.05 * points
+    steps = int(numerics.cycles * numerics.steps)
+    each, points = 1e-6, unknowns.get("interface_points", 1)
+    if f is not None and has(f.law, "bonds"):
+        if quadrature_of(model, numerics).engine != "recursion":
+            entries, seconds = list_cost(model, numerics)
+            each, unknowns["bond_list_about"] = seconds / steps, int(entries)
+        elif soft:
+            unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
+            each = 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
+        elif numerics.per_point:
+            each = 6e-8 * points
+    elif soft and rig.load_varies:
+        unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
+        each = 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
+    elif soft:
+        each = 3e-9 * points + 5e-7
+    return numerics.engine, int(steps * 1.75), steps * 1.75 * each
+
+
+def groups(model: Model) -> dict:
+    """Dimensionless groups of the motion by name, those without a meaning left out."""
+    out, f, rig = {}, model.friction, model.rig
+    limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
+    push = rig.force if rig.force else rig.mass * largest(rig.drive)
+    if push > 0:
+        out["D"] = limit / push
+    ratio = rig.own_frequency * rig.drive.period if rig.frequency else inf
+    if abs(ratio - 1) < 0.2:
+        out["knee"] = 4 / pi * limit / rig.mass
+    if f is not None and f.bond_length:
+        out["drive_amplitude_over_bond_length"] = largest(rig.drive) / omega_of(rig.drive)**2 / f.bond_length
+    return out
+
+
+def first_words(rig, found: dict) -> list:
+    """The sentence on D of one mode: whether the block sticks, and whether friction bounds its motion."""
+    d = found.get("D")
+    if d is None or rig.modes.omega.size != 1 or not rig.by_modes or rig.kind == "free":
+        return []
+    if d >= 1:
+        return [f"D = {d:.3g} >= 1: the block should stick"]
+    if d > pi / 4:
+        return [f"D = {d:.3g} between pi/4 and 1: stick-slip at resonance"]
+    return [f"D = {d:.3g} below pi/4: at resonance friction alone does not bound the motion"]
+
+
+def sum_words(model: Model) -> list:
+    """Sentences on how the bonds of law 'nonlocal' are summed."""
+    if model.friction is None or not has(model.friction.law, "bonds"):
+        return []
+    numerics = choose(model)
+    found = quadrature_of(model, numerics)
+    seconds = 0.0 if found.engine == "recursion" else list_cost(model, numerics)[1]
+    out = ["sum over bonds by " + found.said()]
+    if seconds > LONGEST:
+        out.append(f"run will refuse: the bond list would take about {seconds:.0f} s, more than {LONGEST:.0f} s")
+    return out

@@ -1,0 +1,70 @@
+"""What an engine gives back, and the last cycles as the measures see them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core import Outcome, Response
+from ...response.measures import harmonic
+from ...response.rows import Seen, measures_of
+from ...structure.drive_sizes import omega_of, sinusoidal, whole
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Solution:
+    """One run of an engine before its errors are known.
+
+    values: measure -> value; response: kept histories, window: those of the last cycles; amplitudes: per window;
+    steady: (steady amplitude, error) or (None, None); outcome: None where the amplitudes decide; snapshots of the
+    interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
+    levels, slips: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
+    [m] below which a cycle sticks; own: what the run itself leaves open of its measures.
+    """
+
+    values: dict
+    response: Response
+    window: Response
+    amplitudes: np.ndarray
+    steady: tuple
+    outcome: Outcome | None
+    snapshots: list
+    book: dict
+    seconds: float
+    contact: object = None
+    prepare: dict | None = None
+    message: str = ""
+    levels: tuple = ()
+    slips: object = None
+    log: object = None
+    notes: tuple = ()
+    held: float = 0.0
+    own: dict | None = None
+
+
+def borne(model, patch) -> float | None:
+    """Normal load [N] of the first interface; None where nothing rubs."""
+    if model.friction is None:
+        return None
+    return patch.pressure.load if patch is not None else model.point.load
+
+
+def seen(model, patch, window, extremes, book: dict, steps: int, **more) -> Seen:
+    """The last cycles of a run of a model; `drive` among `more` where it is not the model's own."""
+    drive = more.pop("drive", model.rig.drive)
+    return Seen(window, drive, steps, extremes, book, borne(model, patch), model.rig.stiffness, sinusoidal(drive),
+                **more)
+
+
+def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:
+    """The loop of equally spaced samples by the trapezoidal rule, as `Seen` takes it; None where the window holds no
+    whole cycle. force: its first harmonic where it is known better."""
+    if not whole(window.time[-1] - window.time[0], drive):
+        return None
+    weight, omega = np.full(window.time.size, 1.0), omega_of(drive)
+    weight[[0, -1]] = 0.5
+    slide = harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
+    pull = harmonic(window.time, weight, window.force, omega) if force is None else force
+    return window.slide, slide, pull, work
+
+
+__all__ = ["Solution", "borne", "measures_of", "sampled_loop", "seen"]

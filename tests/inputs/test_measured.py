@@ -1,0 +1,72 @@
+"""Tables of measurements: Table 1 as typed, units, and every faulty table refused at its line."""
+
+from math import pi
+from pathlib import Path
+
+import pytest
+
+from patchfem.core import G_N, PatchfemError
+from patchfem.inputs.measured import FLAGS, read_table
+
+TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
+OMEGA = 2 * pi * 143
+HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
+
+
+def test_table_1_as_typed():
+    rows = read_table(TABLE_1)
+    assert len(rows) == 28
+    assert sum(r.acceleration is not None for r in rows) == 27
+    assert sum(r.displacement is not None for r in rows) == 8
+    bare = [r for r in rows if r.acceleration is None]
+    assert [(r.frequency, r.input, r.displacement, r.flag) for r in bare] == [(143.0, 8 * G_N, None, "U")]
+    assert sum("R" in r.flag for r in rows) == 9 and sum("U" in r.flag for r in rows) == 3
+    assert all((r.displacement is None) == ("*" in r.flag or r in bare) for r in rows)
+    mine = next(r for r in rows if r.frequency == 143 and r.input == 5 * G_N and "R" not in r.flag)
+    assert mine.acceleration == pytest.approx(6 * G_N, rel=1e-15)
+    assert mine.displacement == pytest.approx(0.23 * 25.4e-6, rel=1e-15)
+
+
+def test_table_1_interface_force_at_the_onset():
+    """A rigid block of mass M at 143 Hz and 4 g needs the interface force a_abs - x omega_n^2 = 4.8 g times M."""
+    mine = next(r for r in read_table(TABLE_1) if r.frequency == 143 and r.input == 4 * G_N and "R" not in r.flag)
+    assert (mine.acceleration - mine.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
+
+
+def test_exact_units_of_a_table(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("\ufeffinput [m/s^2], displacement [um],frequency [kHz],flag\n2,3,0.1,UR\n\n4,,0.2,\n", "utf-8")
+    first, second = read_table(path)
+    assert (first.input, first.frequency, first.acceleration, first.flag) == (2.0, 100.0, None, "UR")
+    assert first.displacement == pytest.approx(3e-6, rel=1e-15)
+    assert (second.input, second.displacement, second.flag) == (4.0, None, "")
+    assert set("UR") < set(FLAGS)
+
+
+@pytest.mark.parametrize("text, wanted", [
+    ("", ":1: the measured table is empty"),
+    ("frequency,input [g]\n", ":1: column 'frequency'"),
+    ("frequency [Hz],input [lb]\n", ":1: column 'input [lb]'"),
+    ("frequency [Hz],speed [m/s]\n", ":1: column 'speed [m/s]'"),
+    ("frequency [Hz],flag\n", ":1: no column input"),
+    ("flag\n", ":1: no column frequency, input"),
+    (HEAD + "143,5,6.0,,\n143,6\n", ":3: 2 cells under 5 columns"),
+    (HEAD + "143,5,six,,\n", ":2: acceleration: 'six' is not a number"),
+    (HEAD + "143,5,\"6,0\",,\n", ":2: acceleration: '6,0' is not a number"),
+    (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
+    (HEAD + ",5,6.0,,\n", ":2: frequency and input are wanted"),
+    (HEAD + "143,,6.0,,\n", ":2: frequency and input are wanted"),
+])  # fmt: skip
+def test_refuses_a_faulty_table(tmp_path, text, wanted):
+    path = tmp_path / "t.csv"
+    path.write_text(text, "utf-8")
+    with pytest.raises(PatchfemError) as caught:
+        read_table(path)
+    assert str(caught.value).startswith(f"{path}{wanted}")
+
+
+def test_refuses_a_file_that_cannot_be_read(tmp_path):
+    (tmp_path / "t.csv").write_bytes(b"frequency [Hz],input [g]\n\xff")
+    for path in (tmp_path / "t.csv", tmp_path / "none.csv", tmp_path):
+        with pytest.raises(PatchfemError, match="cannot be read"):
+            read_table(path)

@@ -1,0 +1,207 @@
+"""The model of a scene: frozen, made once, all that a run takes; parts of it exchanged without a scene."""
+
+from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+
+import numpy as np
+import pytest
+from scene_texts import (
+    BENCH,
+    COULOMB,
+    GROWING,
+    LINEAR,
+    PATCH,
+    POINT,
+    RIG,
+    SHEAR,
+    SHORT,
+    SMALL_PATCH,
+    STRUCTURE,
+    TRIANGLE,
+    line_of,
+)
+
+from patchfem.core import Missing, PatchfemError
+from patchfem.model import law, load, patch, rig, slide
+from patchfem.model.model import build
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+KINDS = {"a patch": (PATCH, "patch"), "a small patch": (SMALL_PATCH, "patch"), "a point on a bench": (BENCH, "bench"),
+         "growing bonds on a bench": (POINT + GROWING + TRIANGLE, "bench"),
+         "a patch on a bench": (SMALL_PATCH + COULOMB + TRIANGLE, "bench"), "a rig": (RIG, "rig"),
+         "a point on a rig": (POINT + COULOMB + STRUCTURE, "rig"),
+         "a soft patch on a rig": (SMALL_PATCH + SHEAR + COULOMB + SHORT, "rig"), "a linear rig": (LINEAR, "linear")}
+FEW = ["drive.cycles=6", "accuracy.steps_per_cycle=100", "contact.element_size=0.5 mm"]
+RUNS = {"patch": (SMALL_PATCH, []), "bench": (BENCH, ["accuracy.steps_per_cycle=100"]), "march": (RIG, FEW),
+        "exact": (POINT + COULOMB + SHORT, []), "harmonic": (POINT + COULOMB + SHORT, ["accuracy.method=harmonic"]),
+        "comparison": (POINT + COULOMB + SHORT, ["accuracy.method=newmark"]), "linear": (LINEAR, ["drive.cycles=6"])}
+
+
+def seen(result) -> tuple:
+    """All of a result but its times, as text, so that two results compare bit by bit."""
+    response = result.response
+    histories = [] if response is None else [np.asarray(getattr(response, name)).tobytes()
+                                             for name in ("time", "slide", "force", "slip")]
+    measured = {name: repr(measure) for name, measure in result.measures.items()}
+    stated = result.plan.as_json() | {"seconds": None}
+    return result.outcome, measured, result.warnings, histories, stated
+
+
+# ---- the model itself
+
+@pytest.mark.parametrize("text, kind", KINDS.values(), ids=KINDS)
+def test_always_a_model_of_every_kind_is_frozen(text, kind):
+    model = build(loads(text))
+    assert model.kind == kind
+    assert (model.rig is not None, model.slide is not None) == (kind in ("rig", "linear"), kind == "bench")
+    assert (model.patch is not None) == ("[contact]" in text) and (model.point is not None) == ("[normal]" in text)
+    assert (model.friction is not None) == ("[friction]" in text)
+    parts = [model, *(part for part in (model.source, model.patch, model.patch and model.patch.gap, model.point,
+                                        model.slide, model.rig) if part is not None)]  # fmt: skip
+    for part in parts:
+        assert is_dataclass(part)
+        for field in fields(part):
+            with pytest.raises(FrozenInstanceError):
+                setattr(part, field.name, None)
+        with pytest.raises((FrozenInstanceError, AttributeError, TypeError)):
+            part.another = None
+
+
+@pytest.mark.parametrize("text, kind", KINDS.values(), ids=KINDS)
+def test_always_a_model_keeps_the_scene_it_came_from(text, kind):
+    scene = loads(text, "a.toml")
+    source = build(scene).source
+    assert (source.text, source.title, source.effects) == (text, scene.title, tuple(scene.named()))
+    again = loads(source.resolved)
+    assert again.kind == kind and again.remarks == [] and build(again).source.resolved == source.resolved
+
+
+def test_exact_the_resolved_text_has_what_follows_from_other_keys():
+    patch = PATCH + COULOMB + SHORT
+    assert loads(build(loads(patch)).source.resolved).contact.element_size == pytest.approx(12.7e-3 / 200, rel=1e-12)
+    assert loads(build(loads(PATCH)).source.resolved).contact.element_size is None, "the tolerance chooses it"
+    model = build(loads(POINT + GROWING + TRIANGLE))
+    assert loads(model.source.resolved).friction.rest_speed == model.bonds.rest_speed == 1e-3 * model.speed
+
+
+@pytest.mark.parametrize("text, sets", RUNS.values(), ids=RUNS)
+def test_exact_a_run_makes_nothing_of_the_model_again(text, sets, monkeypatch):
+    """Every maker is called at most once, and none once the model stands."""
+    calls = []
+    for place, names in ((patch, ("patch_asked",)), (slide, ("slide_asked",)), (load, ("point_asked",)),
+                         (law, ("acting",)), (rig, ("rig_asked", "modes_of", "drive_of", "start_of", "rubbings_of"))):
+        for name in names:
+            made = getattr(place, name)
+            monkeypatch.setattr(place, name, lambda *words, name=name, made=made: calls.append(name) or made(*words))
+    model = build(loads(text, sets=sets))
+    first = list(calls)
+    assert first and len(set(first)) == len(first)
+    run(model, estimate=False)
+    assert calls == first
+
+
+# ---- runs of it
+
+@pytest.mark.parametrize("text, sets", RUNS.values(), ids=RUNS)
+def test_exact_the_run_of_a_model_is_the_run_of_its_scene(text, sets):
+    scene = loads(text, sets=sets)
+    model = build(scene)
+    ours, want = run(model), run(scene)
+    assert seen(ours) == seen(want) == seen(run(plan(model)))
+    assert ours.plan.model is model and ours.measures
+
+
+def with_load(model, size: float):
+    """The model under another load [N]."""
+    if model.patch is not None:
+        return replace(model, patch=replace(model.patch, load=size))
+    return replace(model, point=replace(model.point, load=size))
+
+
+def with_tilt(model, angle: float):
+    """The model under another tilt [rad]."""
+    ((name, tilt),) = model.patch.gap.shapes
+    shapes = ((name, tilt.model_copy(update={"angle": angle})),)
+    return replace(model, patch=replace(model.patch, gap=replace(model.patch.gap, shapes=shapes)))
+
+
+def with_size(model, size: float):
+    """The model on another mesh [m]."""
+    return replace(model, patch=model.patch.sized(size, model.kind))
+
+
+CHANGES = {"load": (with_load, 200.0, "contact.load=200 N"), "gap": (with_tilt, 5e-5, "contact.tilt.angle=0.05 mrad"),
+           "mesh": (with_size, 4e-4, "contact.element_size=0.4 mm")}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("text, sets", [(SMALL_PATCH, []), (RIG, FEW),
+                                        (SMALL_PATCH + SHEAR + COULOMB + SHORT, ["accuracy.steps_per_cycle=100"])],
+                         ids=["patch", "rig", "soft patch on a rig"])
+def test_exact_an_exchanged_part_is_the_scene_with_that_set(text, sets, change):
+    exchanged, value, one = CHANGES[change]
+    before = build(loads(text, sets=sets))
+    ours, want = run(exchanged(before, value)), run(loads(text, sets=[*sets, one]))
+    assert seen(ours) == seen(want) != seen(run(before))
+
+
+@pytest.mark.parametrize("method", ["exact", "march", "harmonic", "duhamel", "newmark", "euler"])
+def test_exact_another_load_of_a_point_is_the_scene_with_that_set(method):
+    sets = [f"accuracy.method={method}", *(["accuracy.steps_per_cycle=100"] if method != "exact" else [])]
+    text = POINT + COULOMB + SHORT
+    before = build(loads(text, sets=sets))
+    ours, want = run(with_load(before, 60.0)), run(loads(text, sets=[*sets, "normal.load=60 N"]))
+    assert seen(ours) == seen(want)
+    assert ours.measures["friction_force_peak"].value <= 0.3 * 60 * (1 + 1e-12)
+
+
+def test_exact_another_law_is_the_scene_with_that_set():
+    """The first interface of the rig and the law of the model are one law in two places: both are exchanged."""
+    text, sets = SMALL_PATCH + SHEAR + COULOMB + SHORT, ["accuracy.steps_per_cycle=100"]
+    before = build(loads(text, sets=sets))
+    less = before.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
+    other = replace(before.rig, interfaces=(replace(before.rig.interfaces[0], numbers=less),))
+    ours = run(replace(before, friction=less, rig=other))
+    assert seen(ours) == seen(run(loads(text, sets=[*sets, "friction.static=0.2", "friction.kinetic=0.2"])))
+
+
+# ---- messages
+
+TINY = SMALL_PATCH.replace('"0.5 mm"', '"1 nm"')
+STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
+NEWMARK = SMALL_PATCH + SHEAR + COULOMB + SHORT + '[accuracy]\nmethod = "newmark"\n'
+
+
+@pytest.mark.parametrize("text, key, line, says", [
+    (STILL, "drive.kind", 'kind = "base"', "the drive pushes no mode"),
+    (NEWMARK, "accuracy.method", 'method = "newmark"', "takes an interface as a whole"),
+    (TINY, "", "", "GB are needed"),
+], ids=["a key of a run", "a key of a plan", "a size"])
+def test_refuses_with_file_and_line_once_whoever_asks(text, key, line, says):
+    """The same sentence from the scene, its model and its plan; file and line of the key once, at the beginning."""
+    where = f"a.toml:{line_of(text, line)}: {key}: " if key else "a.toml: "
+    scene, messages = loads(text, "a.toml"), set()
+    for act in (lambda: run(scene), lambda: run(build(scene)), lambda: run(plan(scene))):
+        with pytest.raises(PatchfemError) as caught:
+            act()
+        messages.add(str(caught.value))
+        assert caught.value.key is None and isinstance(caught.value, Missing) == (text == TINY)
+    [message] = messages
+    assert message.startswith(where) and message.count("a.toml") == 1 and says in message
+
+
+def test_refuses_what_no_model_can_be_made_of_with_file_and_line_once():
+    text = POINT + GROWING + '[friction.temperature]\nsurface = "1 K"\nreference = "293.15 K"\n' \
+        'rest_activation = "2500 K"\nslip_activation = "1500 K"\n' + TRIANGLE
+    for act in (build, plan, run):
+        with pytest.raises(PatchfemError, match="rest_growth would be 1e-") as caught:
+            act(loads(text, "a.toml"))
+        where = f"a.toml:{line_of(text, '[friction.temperature]')}: friction.temperature: "
+        assert str(caught.value).startswith(where) and str(caught.value).count("a.toml") == 1
+
+
+def test_refuses_a_key_of_a_set_with_the_file_alone():
+    with pytest.raises(PatchfemError, match=r"^a\.toml: accuracy\.method: 'newmark' takes") as caught:
+        plan(loads(NEWMARK.partition("[accuracy]")[0], "a.toml", ["accuracy.method=newmark"]))
+    assert str(caught.value).count("a.toml") == 1

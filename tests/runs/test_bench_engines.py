@@ -1,0 +1,249 @@
+"""A bench on the compiled engines: against the laws stepped in NumPy, its error bar, its energy, its progress."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from patchfem.core import Missing, PatchfemError
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.model.accuracy import LONGEST
+from patchfem.model.model import build
+from patchfem.response.measures import work_check
+from patchfem.runs.bench import bench
+from patchfem.runs.bench.engine import engine_of, strokes
+from patchfem.runs.bench.stepped import stepped
+from patchfem.runs.bench.watch import BLOCK, UNWATCHED, Watch
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+POINT = '[normal]\nload = "100 N"\n'
+PATCH = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "100 N"\n'
+         'element_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "0.02 mrad"\n')
+FRICTION = "[friction]\nstatic = 0.3\n"
+BONDS = 'law = "nonlocal"\nbond_length = "2 um"\n'
+GROWTH = 'kinetic = 0.15\nrest_growth = "2 m/s^2"\nslip_growth = "1 um"\nrest_speed = "10 um/s"\n'
+SLIDES = {
+    "sine": 'kind = "sine"\namplitude = "4 um"\nfrequency = "50 Hz"\ncycles = 2\n',
+    "small": 'kind = "sine"\namplitude = "0.1 um"\nfrequency = "50 Hz"\ncycles = 2\n',
+    "dwell": 'kind = "dwell"\nspeed = "1 mm/s"\ndistance = "20 um"\nhold = "0.3 s"\ndistance_after = "10 um"\n',
+}  # fmt: skip
+EXACT = {
+    "coulomb": 'law = "coulomb"\n', "coulomb that holds more": 'law = "coulomb"\nkinetic = 0.2\n',
+    "tanh": 'law = "tanh"\nreference_speed = "1 mm/s"\n',
+    "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "2 um"\n',
+    "averaged": 'law = "convolution"\nbond_length = "0.8 mm"\n',
+    "bonds": BONDS + "initial_bonds = 0.4\n", "growing": BONDS + GROWTH, "loose": BONDS + GROWTH + "breakaway = 0.3\n",
+}  # fmt: skip
+SUMS = [("stretch", order, growth) for order in (0, 0.5, 2.5) for growth in ("", GROWTH)] + \
+    [("report", order, growth) for order in (0, 0.5, 1, 2) for growth in ("", GROWTH)] + [("report", -0.5, "")]
+
+
+def model_of(law, slide, *sets, where=POINT):
+    return build(loads(where + FRICTION + law + "[slide]\n" + SLIDES[slide], sets=sets))
+
+
+def sum_of(reading, order, growth):
+    return BONDS + growth + f'reading = "{reading}"\norder = {order}\n' + ("initial_bonds = 0\n" if order < 0 else "")
+
+
+def both(model, steps, patch=None, frames=0):
+    time, slide = model.slide.samples(steps)[:2]
+    return bench.run(model, patch, steps, frames), stepped(model, patch, time, slide, frames, UNWATCHED)
+
+
+# ---- the compiled engines and their twins
+
+@pytest.mark.parametrize("slide", SLIDES)
+@pytest.mark.parametrize("law", EXACT)
+def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
+    one, two = both(model_of(EXACT[law], slide), 80)
+    limit = np.abs(two.force).max()
+    assert one.force == pytest.approx(two.force, abs=1e-13 * limit)
+    assert one.slip == pytest.approx(two.slip, abs=1e-18)
+    assert one.ledger == pytest.approx(two.ledger, abs=1e-13 * np.abs(np.diff(two.ledger[0])).sum())
+
+
+@pytest.mark.parametrize("reading, order, growth", SUMS)
+def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading, order, growth):
+    """Over all slides; 1e-5 besides for the two points per strip, which fall with the step."""
+    for slide in SLIDES:
+        one, two = both(model_of(sum_of(reading, order, growth), slide), 100)
+        error = one.engine.choice.error + (2e-5 if growth else 1e-5)
+        assert one.engine.name.endswith("bond list")
+        assert np.abs(one.force - two.force).max() <= error * 30
+        assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
+
+
+def test_exact_samples_at_the_place_of_the_first_bonds_cost_no_work():
+    """Every fourth of a sine stands there; the printed force jumps, and its mean over a step beside it must not."""
+    for keys in ("order = 0\n", 'reading = "report"\norder = 2\n'):
+        one, two = both(model_of(BONDS + keys, "small", "accuracy.quadrature=direct"), 200)
+        power = np.abs(np.diff(two.ledger[0])).sum()
+        assert one.ledger == pytest.approx(two.ledger, abs=1e-6 * power)
+
+
+@pytest.mark.parametrize("law", ["coulomb that holds more", "averaged", "elastic-plastic", "growing"])
+def test_exact_frames_of_a_patch_are_those_of_its_points(law):
+    model = model_of(EXACT[law], "sine", where=PATCH)
+    patch = solve_all(model.patch, 1e-3, False)[0]
+    one, two = both(model, 40, patch, 5)
+    top = np.abs(two.tau).max()
+    assert (one.frames == two.frames).all() and one.tau.shape == (5, patch.x.size)
+    assert one.force == pytest.approx(two.force, abs=1e-12 * np.abs(two.force).max())
+    assert one.tau == pytest.approx(two.tau, abs=1e-12 * top)
+    assert one.local == pytest.approx(two.local, abs=1e-17)
+
+
+def test_exact_a_long_list_of_bonds_finds_room():
+    """Steps of two bond lengths with nothing cut off or merged: far more strips than a list begins with."""
+    model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=direct", "slide.amplitude=3 mm",
+                     "slide.cycles=1")
+    one, two = (bench.run(model, None, steps) for steps in (6000, 12000))
+    assert one.engine.name == "bench, direct bond list"
+    assert one.values["friction_work"] == pytest.approx(two.values["friction_work"], rel=1e-4)
+
+
+# ---- what runs, and what it says of itself
+
+@pytest.mark.parametrize("law, where, name", [
+    (EXACT["coulomb"], POINT, "closed form"), (EXACT["elastic-plastic"], POINT, "parallel elements"),
+    (BONDS, POINT, "recursion"), (BONDS + "order = 2\n", POINT, "merged bond list"),
+    (BONDS + 'reading = "report"\n', POINT, "truncated bond list"),
+    (BONDS + "order = 2\nbreakaway = 0.2\n", POINT, "law step by step"),
+    (BONDS, PATCH + 'on = "lower"\n', "law step by step"), (BONDS, PATCH + "[contact.shear]\n", "bond points"),
+    (EXACT["coulomb"], PATCH + "[contact.shear]\n", "parallel elements"),
+])  # fmt: skip
+def test_exact_a_plan_names_the_engine_that_runs(law, where, name):
+    what = plan(model_of(law, "sine", where=where))
+    result = run(what, estimate=False)
+    assert what.engine == result.extra["engine"] == result.response.engine.name == f"bench, {name}"
+    assert ("bond_list_about" in what.unknowns) == name.endswith("list")
+
+
+def test_exact_strokes_are_counted_between_reversals():
+    assert strokes(np.array([0.0, 1, 1, 2, 3, 1, 0, 0, -1, 2])) == pytest.approx((10 / 3, 7 / 3))
+
+
+def test_always_short_strokes_are_summed_as_finely_as_their_force_is_small():
+    wide, short = (engine_of(model, model.slide.samples(400)[1]).choice for model in
+                   (model_of(BONDS + "order = 2\n", slide) for slide in ("sine", "small")))
+    assert short.error < 0.2 * wide.error
+
+
+def test_always_pinned_keys_of_the_sum_are_kept():
+    model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", "accuracy.merge=0.1",
+                     "accuracy.tail=1e-5")
+    found = engine_of(model, model.slide.samples(400)[1]).choice
+    assert (found.engine, found.merge, found.tail) == ("merged", 0.1, 1e-5)
+
+
+def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
+    model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=direct", "slide.cycles=400",
+                     "accuracy.steps_per_cycle=4000")
+    with pytest.raises(Missing, match=f"more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle"):
+        plan(model)
+    with pytest.raises(PatchfemError, match="'merged' where the pressure of a point changes"):
+        plan(model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", where=PATCH + 'on = "lower"\n'))
+
+
+@pytest.mark.parametrize("keys, slide", [
+    ("order = 2\n", "sine"), ("order = 0.5\n", "small"), ('reading = "report"\norder = 0.5\n' + GROWTH, "sine"),
+    (GROWTH + "order = 2\n", "dwell"),
+])  # fmt: skip
+def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
+    """Against the sum over every bond, nothing merged or cut off, at four times the steps."""
+    sets = ["accuracy.tolerance=1e-2", "accuracy.quadrature=merged", "accuracy.steps_per_cycle=400"]
+    model = model_of(BONDS + keys, slide, *sets)
+    found = run(plan(model))
+    choice = found.response.engine.choice
+    assert choice.engine == "merged" and choice.merge > 0
+    assert found.measures["friction_force_peak"].error >= choice.error * 30
+    steps = 4 * model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, 2e-6)
+    whole = replace(choice, engine="direct", merge=0.0, tail=0.0, error=0.0)
+    truth = bench.run(model, None, steps, watch=Watch(whole))
+    for name, measure in found.measures.items():
+        if name not in ("work_check", "energy_balance"):
+            assert abs(measure.value - truth.values[name]) <= measure.error + measure.floor, name
+
+
+# ---- progress
+
+@pytest.mark.parametrize("law, where", [(EXACT["coulomb"], POINT), (BONDS, POINT), (BONDS + "order = 2\n", POINT),
+                                        (EXACT["elastic-plastic"], PATCH + "[contact.shear]\n"),
+                                        (EXACT["tanh"], PATCH + 'on = "lower"\n')])
+def test_always_the_done_share_grows_to_one(law, where):
+    told = []
+    run(plan(model_of(law, "sine", "accuracy.steps_per_cycle=6000", where=where)), progress=told.append,
+        estimate=False)
+    assert told[-1] == 1.0 and (np.diff([0.0, *told]) >= 0).all()
+    assert len(told) >= (1 if law == EXACT["coulomb"] else 12000 // BLOCK)
+
+
+def test_always_an_interrupt_ends_a_bench_between_two_blocks():
+    told = []
+
+    def stop(share):
+        told.append(share)
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(plan(model_of(BONDS, "sine", "accuracy.steps_per_cycle=20000")), progress=stop)
+    assert told[-1] <= 0.5 + BLOCK / 40000
+
+
+# ---- two books of energy
+
+def test_exact_a_wrong_book_is_seen_and_a_right_one_is_second_order():
+    """int cos dq over a quarter of a turn; the book is off by one part in a hundred."""
+    off = []
+    for steps in (50, 100):
+        q = np.linspace(0, np.pi / 2, steps + 1)
+        pairs = [(q, np.cos(q))]
+        off.append(work_check(np.sin(q), pairs))
+        assert work_check(1.01 * np.sin(q), pairs) == pytest.approx(0.01 / 1.01, abs=1e-4)
+    assert off[0] < 1e-4 and off[0] / off[1] == pytest.approx(4, abs=0.1)
+    assert work_check(np.zeros(3), [(np.zeros(3), np.ones(3))]) == 0.0
+
+
+def test_exact_a_jump_of_the_force_at_a_turn_costs_the_check_nothing():
+    for law in ("coulomb", "coulomb that holds more"):
+        assert bench.run(model_of(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
+
+
+def test_exact_bonds_that_lose_their_pressure_give_nothing_back():
+    """A step into a place without pressure: the mean is that of the force along it, as of many short steps under the
+    same pressures; what the bonds stored is dissipated."""
+    law = Quadrature(Bonds(1.0, 1.0, 0.5, initial=0.7), 0.0)
+    one, state = np.ones(1), law.start(np.ones(1))
+    for _ in range(20):
+        state = law.step(state, 0.1, one, one, 1.0).state
+    last = law.step(state, 0.05, one, 0 * one, 1.0)
+    work, part, count = 0.0, state, 500
+    for k in range(count):
+        s0, s1 = one * (1 - k / count), one * (1 - (k + 1) / count)
+        step = law.step(part, 0.05 / count, s0, np.maximum(s1, 1e-9), 1.0)
+        work, part = work + step.mean[0] * 0.05 / count, step.state
+    assert last.mean[0] * 0.05 == pytest.approx(work, rel=1e-3)
+    assert last.dissipated[0] == pytest.approx(law.stored(state)[0] + last.mean[0] * 0.05, rel=1e-12)
+    assert law.stored(last.state)[0] == 0
+
+
+def test_exact_work_over_a_pressure_that_stays_below_is_the_trapezoid_of_its_force():
+    """Orders other than 1 lose bonds at the edges of the contact; energy_balance cannot see what becomes of theirs."""
+    text = PATCH.replace("0.02 mrad", "0.0957 mrad").replace("12.7 mm", "4 mm").replace(
+        '"0.5 mm"', '"0.16 mm"') + 'on = "lower"\n' + FRICTION + \
+        'law = "nonlocal"\nbond_length = "61.45 um"\norder = 0.5\ninitial_bonds = 0.657\n' \
+        '[slide]\nkind = "sine"\namplitude = "184.6 um"\nfrequency = "10 Hz"\ncycles = 2\n'
+    model = build(loads(text))
+    patch = solve_all(model.patch, 1e-3, False)[0]
+    found = [bench.run(model, patch, steps) for steps in (40, 80, 160)]
+    check = [one.values["work_check"] for one in found]
+    assert check[0] / check[1] > 2.5 and check[1] / check[2] > 2.5 and check[2] < 1.1e-3
+    fine = found[-1]
+    assert fine.values["friction_work"] == pytest.approx(np.trapezoid(fine.force, fine.slide), rel=2e-3)
+    assert fine.values["energy_created"] == 0
