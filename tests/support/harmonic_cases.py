@@ -4,8 +4,6 @@ import numpy as np
 from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
-from patchfem.dynamics.harmonic.laws import OfSpeed
-from patchfem.friction.laws.tanh import Rate
 
 
 def sdof(xi=0.003, omega=1.0, mass=1.0):
@@ -67,8 +65,3 @@ def march(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
         rows.append(y)
         forces.append(force)
     return np.array(rows), np.array(forces)
-
-
-def tanh_law(limit, speed):
-    """The rate law of a contact as harmonic balance takes it."""
-    return OfSpeed(Rate(limit, speed).element(1.0))

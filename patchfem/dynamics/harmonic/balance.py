@@ -9,13 +9,13 @@ import numpy as np
 from ...core import Response
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
-from .laws import Interlock, Jenkins, Spring, Stretch, Track, law_of_model, synthesis
+from .laws import Interlock, Jenkins, OfSpeed, Spring, Stretch, Track, law_of_model, synthesis
 from .point import Periodic, point
 from .stability import with_stability
 
-__all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "Periodic", "Spring", "Stretch", "backbone",
-           "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime", "response",
-           "with_stability"]
+__all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "Stretch",
+           "backbone", "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime",
+           "response", "with_stability"]
 
 
 STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
