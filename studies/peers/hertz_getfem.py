@@ -28,7 +28,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import Peer, ratio_text, run, seconds_at, timed
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from peer import Peer, ratio_text, run, seconds_at, timed
 
 from patchfem import closed_forms as exact
 from patchfem.contact.gaps import crown, tilt
@@ -159,7 +160,7 @@ def ratios(rows: list) -> list:
 def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -> dict:
     """form -> medians of all rows, printed with the ratios of time; Missing where GetFEM is absent."""
     out = {}
-    with threadpool_limits(1), Peer("GetFEM", "getfem_child.py", "PATCHFEM_GETFEM_PYTHON", "/usr/bin/python3",
+    with threadpool_limits(1), Peer("GetFEM", "peers/getfem_child.py", "PATCHFEM_GETFEM_PYTHON", "/usr/bin/python3",
                                     "install python3-getfem (Debian)") as peer:
         print(f"GetFEM {peer.version}")
         ours(4, "mirror"), theirs(peer, 4, "mirror", "nodal")  # first calls load and compile

@@ -22,7 +22,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import Peer, run, timed
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from peer import Peer, run, timed
 from strip import wavy_pair, wavy_press
 
 from patchfem import closed_forms as exact
@@ -107,7 +108,7 @@ def fastest(rows: list, program: str, points: int) -> Row:
 
 def main(points=POINTS, repeats: int = 9, cells=CELLS) -> list:
     """Medians of all rows, printed with the ratios of time; Missing where Tamaas is absent."""
-    with threadpool_limits(1), Peer("Tamaas", "tamaas_child.py", "PATCHFEM_TAMAAS_PYTHON", sys.executable,
+    with threadpool_limits(1), Peer("Tamaas", "peers/tamaas_child.py", "PATCHFEM_TAMAAS_PYTHON", sys.executable,
                                     "pip install tamaas") as peer:
         print(f"Tamaas {peer.version}")
         warm_up = ours(64, 1e-10), theirs(peer, 64, 1e-8, False)

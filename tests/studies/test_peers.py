@@ -59,7 +59,7 @@ def test_exact_mirrored_and_twice_condensed_pairs_are_one(hertz):
 def test_exact_getfem_finds_the_same_pressures(hertz):
     """With the corner rule both programs solve one discrete problem by different means: all three steps agree."""
     try:
-        peer = hertz.Peer("GetFEM", "getfem_child.py", GETFEM, "/usr/bin/python3", "")
+        peer = hertz.Peer("GetFEM", "peers/getfem_child.py", GETFEM, "/usr/bin/python3", "")
     except Missing as absent:
         pytest.skip(str(absent))
     with peer:
@@ -71,7 +71,7 @@ def test_exact_getfem_finds_the_same_pressures(hertz):
 
 def test_exact_tamaas_finds_the_same_wave(wavy):
     try:
-        peer = wavy.Peer("Tamaas", "tamaas_child.py", TAMAAS, sys.executable, "")
+        peer = wavy.Peer("Tamaas", "peers/tamaas_child.py", TAMAAS, sys.executable, "")
     except Missing as absent:
         pytest.skip(str(absent))
     with peer:
