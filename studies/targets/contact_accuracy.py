@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "peers"))
-import hertz_getfem as hertz
+import hertz_pair as hertz
 import strip
 
 from patchfem import closed_forms as exact

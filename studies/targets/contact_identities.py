@@ -8,7 +8,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "peers"))
-import hertz_getfem as hertz
+import hertz_pair as hertz
 from contact_accuracy import COATED, COATING
 
 from patchfem.contact.gaps import crown, tilt
