@@ -81,7 +81,8 @@ def solve(case: str, cycles: int = CYCLES, steps: int = 400) -> Row:
     onset, loop = found.measures.get("onset_level"), found.measures.get("level_hysteresis")
     folds = folds_of(case) if case == "stiffened, 147 Hz" else ()
     return Row(case, listed, amplitude, slip, given.friction.static * load / given.structure.moving_mass / G_N,
-               None if onset is None else (onset.value / G_N, (onset.error or 0.0) / G_N), seen_from(listed, slip, up.size),
+               None if onset is None else (onset.value / G_N, (onset.error or 0.0) / G_N),
+               seen_from(listed, slip, up.size),
                (largest_step(listed, slip, slice(0, up.size)), largest_step(listed, slip, slice(up.size - 1, None))),
                loop.value, folds)
 
