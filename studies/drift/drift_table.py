@@ -8,7 +8,7 @@ Dahl's law, creeps by .272 bond lengths per cycle for ever, tanh with v_0 = 1 mm
 swing of the force in shares of mu_s N stops the drift from the second cycle on; with growth it must be eps_0/eps_k
 times as long.
 
-What the elastic range costs against b = 0: from A = 3 on the loop is b (1 - b) bond lengths narrower, and below A = b it
+What the elastic range costs against b = 0: from A = 3 on the loop is b (1 - b) bond lengths narrower, below A = b it
 has no area. b = .1 costs 3 % of 4 A mu_s N at A = 3 and less than 1 % from A = 12.5 on. So b = 0, the law as it stands,
 is the default, and b > 0 serves where a mean force and a dither act together and the mean position matters.
 

@@ -12,7 +12,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
-import engines
+from engine_peers import PEERS, cvode
+from engine_problems import exact, problem
+from engines import dop853
 from peer import Peer
 
 from patchfem.compiled import load
@@ -36,9 +38,9 @@ def least(work, repeats: int = 5, inside: int = 1) -> float:
 
 
 def block():
-    """Problem of `engines` of 200 cycles."""
-    one = replace(engines.problem("block"), cycles=CYCLES)
-    return replace(one, truth=engines.exact(one, 0))
+    """The block of `engine_problems` over 200 cycles."""
+    one = replace(problem("block"), cycles=CYCLES)
+    return replace(one, truth=exact(one, 0))
 
 
 @cache
@@ -58,14 +60,14 @@ def cycle_of_peer(name: str) -> float:
     Missing where SUNDIALS is not installed."""
     one = block()
     if name == "DOP853":
-        return least(lambda: engines.dop853(one, 1e-8), 2) / CYCLES
-    _, _, _, script, variable, remedy = engines.PEERS["SUNDIALS CVODE"]
+        return least(lambda: dop853(one, 1e-8), 2) / CYCLES
+    _, _, _, script, variable, remedy = PEERS["SUNDIALS CVODE"]
     best = inf
     with Peer("SUNDIALS CVODE", script, variable, sys.executable, remedy) as peer:
         for method in ("Adams", "BDF"):
             for tolerance in (1e-4, 1e-6, 1e-8):
                 for _ in range(2):
-                    slide, seconds = engines.cvode(peer, one, tolerance, method)
+                    slide, seconds = cvode(peer, one, tolerance, method)
                     if one.error(slide) < 1e-3:
                         best = min(best, seconds)
     return best / CYCLES
@@ -73,7 +75,7 @@ def cycle_of_peer(name: str) -> float:
 
 def twin() -> float:
     """200 cycles by the plain Python of the event engine, histories and measures included [s]."""
-    one = engines.problem("block")
+    one = problem("block")
     return least(lambda: sdof.simulate(one.modes, one.drive, one.limit, one.limit, CYCLES))
 
 
