@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem import closed_forms
-from patchfem.compiled import load_kernels
-from patchfem.dynamics.march.models import points_model
+from patchfem.dynamics.march.models import load_kernels, points_model
 from patchfem.friction.bonds.parameters import Bonds, elastic_part
 from patchfem.friction.bonds.point_kernels import loose_mean, loose_step
 from patchfem.friction.bonds.quadrature import Quadrature
