@@ -91,7 +91,7 @@ def _turned(model: Model, knob: str):
             if 8 <= cells <= MOST_CELLS:
                 yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(model, length / cells), 0)
         return
-    from ..model.accuracy import choose
+    from ..runs.rig.numerics import choose
 
     now = getattr(model.accuracy, knob) or (choose(model).steps if knob == "steps_per_cycle" and model.kind == "rig"
                                             else {"steps_per_cycle": 400, "shear_modes": 8}[knob])

@@ -21,12 +21,13 @@ class Rung(NamedTuple):
     beside: object = None
 
 
-def estimate(solve: Callable, fine: dict, ladder) -> tuple:
+def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
     """([error by measure name, ...] one per rung, seconds of the coarser runs).
 
-    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: Rungs.
+    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: Rungs; made:
+    variant -> run of those that are made already, filled.
     """
-    begin, made = perf_counter(), {}
+    begin, made = perf_counter(), {} if made is None else made
 
     def values(variant) -> dict:
         if variant not in made:

@@ -86,7 +86,8 @@ def _bonds(model: Model) -> dict:
     if f is None or not load > 0:
         return {}
     rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
-    return {"bonds": f.static * load / f.bond_length if f.bond_length and not has(f.law, "averaged") else rigid}
+    stretches = f.bond_length and not has(f.law, "averaged")
+    return {"bonds": f.static * load / f.bond_length if stretches else rigid}
 
 
 def _verdict(model: Model, groups: dict, size: int, said: list) -> list:

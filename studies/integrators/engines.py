@@ -17,14 +17,15 @@ from patchfem.core import ModalBasis, NotConverged, Start
 from patchfem.dynamics.comparison import duhamel, euler, newmark
 from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.march import models
 from patchfem.dynamics.one_mode import sdof, sdof_kernels
 from patchfem.dynamics.one_mode.sdof_samples import position
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 from patchfem.structure.drives import release
 
@@ -114,8 +115,8 @@ def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
 
 def march(one: Problem, steps: int) -> np.ndarray:
     """The march at `steps` per cycle."""
-    model = marching.coulomb_model(one.limit, one.limit) if one.elements is None \
-        else marching.jenkins_model(*one.elements)
+    model = models.coulomb_model(one.limit, one.limit) if one.elements is None \
+        else models.jenkins_model(*one.elements)
     found = marching.march(one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start)
     return found.window.slide[::steps // POINTS][1:]
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from patchfem.dynamics.march.models import growth_numbers
 from patchfem.friction.bonds import bond_sum_kernels, point_kernels, recursion
 from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
 from patchfem.friction.bonds.recursion import advance, shape_functions
 from patchfem.friction.laws import elastic_plastic_kernels
 from patchfem.friction.laws.elastic_plastic import parallel
+from patchfem.friction.laws.stretch import growth_numbers
 
 # ---- bond points
 

@@ -7,8 +7,9 @@ speed; or 1, limit, 0, whether as printed, and the numbers of its law. The text 
 import numpy as np
 from numba import njit
 
+from ...friction.flags_kernels import LEAN
 from ...friction.laws import tanh_kernels as law
-from ..modal_kernels import LEAN, narrowed
+from ..modal_kernels import narrowed
 
 COULOMB, HEAD = 0, 4  # first number of a row of set-valued friction; numbers of a row before those of its law
 

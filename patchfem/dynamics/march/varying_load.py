@@ -53,7 +53,7 @@ def bonds(law) -> Rubbing:
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError("friction: under a load that changes only reading = \"stretch\" with order = 1 and no "
                             "breakaway; the others are not yet built")
-    from .models import growth_numbers
+    from ...friction.laws.stretch import growth_numbers
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)

@@ -40,7 +40,7 @@ def ends_of_rest(model, slide) -> dict:
     """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
     the first sample of a slide and the last of every rest."""
     f = model.friction
-    if not has(f.law, "set-valued") or not (f.kinetic or f.static) < f.static:
+    if not has(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:
         return {}
     moves = np.sign(np.diff(slide))
     ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))

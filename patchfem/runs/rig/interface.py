@@ -6,10 +6,10 @@ from ...core import PatchfemError
 from ...effects import carries, has, named, refusal
 from ...friction.protocol import Element
 from ...friction.record import law_from
-from ...model.accuracy import Numerics, quadrature_of
 from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
 from ...structure.drive_sizes import omega_of
+from .numerics import Numerics, quadrature_of
 from .strips import strip_loads
 
 

@@ -16,13 +16,6 @@ from .solution import Solution, sampled_loop, seen
 from .strips import joined, other_measures
 
 
-def sampled(values: dict) -> dict:
-    """Errors of measures of strips that are read off 400 samples a cycle, by the trapezoidal rule."""
-    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
-    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
-            else 1e-9 * abs(value) for name, value in values.items()}
-
-
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One march at numerics.steps per cycle; patch: the solved Patch or None."""
     from ...dynamics.march import march as hub
@@ -49,9 +42,10 @@ class _Read:
         self.model, self.numerics, self.patch, self.contact, rig = model, numerics, patch, contact, model.rig
         self.held = 0.0  # slip [m] below which a cycle sticks
         if model.friction is not None:
-            noise = 1e-15 * peak_speed(rig.drive) * rig.drive.period
-            self.held = noise if contact.set_valued else 1e-3 * contact.length
-            self.held *= not has(model.friction.law, "creeps")  # it never holds
+            least = 1e-15 * peak_speed(rig.drive) * rig.drive.period
+            self.held = least if contact.set_valued else 1e-3 * contact.length
+            self.creeps = has(model.friction.law, "creeps")  # it never holds, nor sticks
+            self.held *= not self.creeps
 
     def solution(self, done, seconds: float, prepare: dict) -> Solution:
         """The Solution of a MarchResult."""
@@ -59,7 +53,7 @@ class _Read:
         rubs, stuck, rings, own = self.model.friction is not None, False, {}, {}
         if rubs:
             rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
-            stuck = run_events.all_stick(done.window, self.held) and not has(self.model.friction.law, "creeps")
+            stuck = run_events.all_stick(done.window, self.held) and not self.creeps
         last = min(window, len(done.amplitudes))
         values = self.values(done, done.amplitudes[-last:], done.response.extra.get("ledger"), stuck) | rings
         levels, slips = self._levels(done) if rig.levels else ((), None)

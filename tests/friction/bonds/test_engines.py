@@ -14,12 +14,12 @@ from patchfem.dynamics.march.models import list_model, points_model
 from patchfem.friction.bonds.engines import ENGINES, choose, impossible
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.model.accuracy import choose as settings_of
-from patchfem.model.accuracy import quadrature_of
 from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.march import created_warning
+from patchfem.runs.rig.numerics import choose as settings_of
+from patchfem.runs.rig.numerics import quadrature_of
 from patchfem.scene import scene
 from patchfem.scene.tables import Accuracy
 

@@ -19,13 +19,14 @@ from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march.march import GOAL, march, plant_of
-from patchfem.dynamics.march.models import growth_numbers, jenkins_model, load_kernels, points_model
+from patchfem.dynamics.march.models import jenkins_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds import point_kernels
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import BondState, Recursion
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.stretch import growth_numbers
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
