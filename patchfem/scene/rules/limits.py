@@ -140,7 +140,8 @@ def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
         draft.say("friction.order", f"{law.order:g} beside {shear}: use order = 1; not yet built")
     if not has(law.law, "bonds") and not carries(law, "shear"):
         draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out, or {refusal('shear')}")
-    if has(law.law, "set-valued") and law.static is not None and _inside(law.kinetic, -1, law.static):
+    weakens = law.static is not None and _inside(law.kinetic, -1, law.static)
+    if has(law.law, "set-valued") and carries(law, "shear") and weakens:
         draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside {shear}: leave kinetic "
                                       "out; not yet built")  # fmt: skip
 
