@@ -17,6 +17,8 @@ from patchfem.friction.quadrature import Quadrature, cutoff
 from patchfem.simulate_march import list_model, march, place_model
 
 GROWS = {"ratio": 0.5, "rest_growth": 0.3, "slip_growth": 0.05, "rest_speed": 1e-2}
+for kernel in (kernels.place_mean, kernels.place_force, place_step):
+    kernel.enable_caching()  # called from Python here alone: compiled once for all workers and runs
 AHEAD, COUNT = 41, 7  # force after a step in the numbers; cells in use in row 0
 
 
