@@ -228,8 +228,8 @@ def siconos(peer, one: Problem, steps: int, theta: float = 0.5) -> tuple:
 
 
 PEERS = {  # name: (callable, knobs, problems, script, variable of its interpreter, remedy)
-    "SUNDIALS CVODE": (cvode, (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), ALL, "sundials_child.py",
+    "SUNDIALS CVODE": (cvode, (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12), ALL, "integrators/sundials_child.py",
                        "PATCHFEM_SUNDIALS_PYTHON", "pip install scikit-sundae"),
-    "Siconos, theta 1/2": (siconos, (100, 200, 400, 1000, 4000), POINT, "siconos_child.py",
+    "Siconos, theta 1/2": (siconos, (100, 200, 400, 1000, 4000), POINT, "integrators/siconos_child.py",
                            "PATCHFEM_SICONOS_PYTHON", "apt install python3-siconos"),
 }

@@ -36,10 +36,10 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "peers"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 sys.path.insert(0, str(Path(__file__).parent))
-from common import Peer, ratio_text, run, seconds_at
 from engines import ALL, OURS, PEERS, problem
+from peer import Peer, ratio_text, run, seconds_at
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
@@ -71,7 +71,7 @@ def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
     try:
         for name, (_, _, _, script, variable, remedy) in peers.items():
             try:
-                children[name] = Peer(name, f"../integrators/{script}", variable, sys.executable, remedy)
+                children[name] = Peer(name, script, variable, sys.executable, remedy)
                 versions[name] = children[name].version
             except Missing as missing:
                 absent[name] = f"skipped: {name} is not installed ({variable}: {remedy})"
