@@ -69,7 +69,7 @@ ROWS = (
     Row("friction_force_peak", "N", 1e-6, "largest resultant friction force of the interface",
         lambda s: float(np.abs(s.window.force).max()) if s.load is not None else None),
     Row("energy_balance", "1", 1e-8,
-        "|work in - stored - dissipated| of the whole run, over the power that passed and the peak stored",
+        "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
         lambda s: energy_balance(s.book)),
     Row("drift_per_cycle", "m", 1e-11, "motion of the middle of the slide per cycle",
         lambda s: drift(s.window.time, s.window.slide, s.drive.period)),
