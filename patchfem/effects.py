@@ -1,19 +1,34 @@
 """Every effect a scene can name: what computes it, its equations, what it needs and what it gives.
 
 An effect is a table of a scene or the value of its selector key. `plan` imports only the modules of the effects that a
-scene names.
+scene names. A law of friction is such an effect with the keys that it has besides `static` and with what carries it:
+nothing else in the package knows which laws there are.
+
+A law is carried by the bench, by a rig of one interface under a constant load, and by what its record names: "shear"
+of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw), "varying-load" in a rig,
+"harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events. Traits: "set-valued" (it holds
+without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
+"timeless" (no rate of the slide changes its force), "creeps" (it never holds).
 """
 
 from typing import NamedTuple
 
 
 class Effect(NamedTuple):
-    """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on."""
+    """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction
+    the keys that it must have and those that it may have besides, what carries it, and its traits."""
 
     module: str
     equations: str
     needs: tuple = ()
     gives: tuple = ()
+    keys: tuple = ("", "")
+    carries: str = ""
+    traits: str = ""
+
+
+def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "") -> Effect:
+    return Effect(f"patchfem.friction.{module}", equations, ("pressure",), ("traction",), keys, carries, traits)
 
 
 EFFECTS = {
@@ -37,18 +52,20 @@ EFFECTS = {
     "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R q - g - roll y_j per strip, one holder q"),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
-    "friction.law=coulomb": Effect("patchfem.dynamics.events.events",
-                                   "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
-                                   ("pressure",), ("traction",)),
-    "friction.law=tanh": Effect("patchfem.friction.laws.elastic_plastic", "F = mu N tanh(v/v_0) (2.4)", ("pressure",),
-                                ("traction",)),
-    "friction.law=elastic-plastic": Effect("patchfem.friction.laws.elastic_plastic",
-                                           "F' = mu N v/eps, |F| <= mu N (3.12 with its "
-                                           "reversal)", ("pressure",), ("traction",)),
-    "friction.law=nonlocal": Effect("patchfem.friction.bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n "
-                                    "u/|u| dL1/eps_0 (2.17)", ("pressure",), ("traction",)),
-    "friction.law=convolution": Effect("patchfem.friction.laws.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps "
-                                       "sigma_n(x - s sgn v) ds (Oden, Pires)", ("pressure",), ("traction",)),
+    "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
+                                 ("", "kinetic"), "shear joints varying-load comparison exact", "set-valued timeless"),
+    "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
+                              "joints varying-load harmonic comparison", "creeps"),
+    "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
+                                         "reversal)", ("bond_length", ""),
+                                         "shear joints varying-load harmonic comparison", "timeless"),
+    "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
+                                  ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
+                                   "initial_bonds breakaway spread temperature"),
+                                  "shear joints varying-load harmonic two-directions", "bonds"),
+    "friction.law=convolution": _law("laws.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds "
+                                     "(Oden, Pires)", ("bond_length", "order spread"), "exact",
+                                     "averaged set-valued timeless"),
     "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
                                        "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",
@@ -101,3 +118,54 @@ NOT_YET_BUILT = ("wear",)
 def absent(named) -> list:
     """Every effect that is not among `named`, built or not, in the order of the chain."""
     return [name for name in (*EFFECTS, *NOT_YET_BUILT) if name not in set(named)]
+
+LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
+        if name.startswith("friction.law=")}
+LISTED = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
+
+
+def has(law: str | None, trait: str) -> bool:
+    """Whether a law of friction, by its name in a scene, has a trait; none has that is not there."""
+    return law in LAWS and trait in LAWS[law].traits.split()
+
+
+def listed(friction) -> bool:
+    """Whether the law of a [friction] table is a sum over all bonds: any but the stretch reading with order = 1."""
+    return has(friction.law, "bonds") and (friction.reading == "report" or friction.order not in (1, None))
+
+
+def carries(friction, word: str) -> bool:
+    """Whether the law of a [friction] table runs with what `word` stands for."""
+    words = LISTED if listed(friction) else LAWS[friction.law].carries
+    return word in words.split()
+
+
+def named(friction) -> str:
+    """The law of a [friction] table as words, with the reading or the order that makes it a sum over all bonds."""
+    if not listed(friction):
+        return f"law '{friction.law}'"
+    return f"law '{friction.law}' of " + ("reading 'report'" if friction.reading == "report"
+                                          else f"order {friction.order:g}")
+
+
+def takes(law: str | None, key: str) -> bool:
+    """Whether a law has a key; any may have it where the law is not known."""
+    return law not in LAWS or key in " ".join(LAWS[law].keys).split()
+
+
+def using(key: str) -> str:
+    """The laws that have a key, as words: "coulomb and nonlocal"."""
+    return in_words((name for name in LAWS if takes(name, key)), "and")
+
+
+def refusal(word: str, least: str = "") -> str:
+    """What serves in place of a law that is not carried: "use law 'coulomb' or 'tanh'; not yet built"; least: what the
+    law must carry besides."""
+    laws = (f"'{name}'" for name, law in LAWS.items() if {word, *least.split()} <= set(law.carries.split()))
+    return f"use law {in_words(laws, 'or')}; not yet built"
+
+
+def in_words(names, last: str) -> str:
+    """Names with commas and a word before the last."""
+    *first, end = names
+    return f"{', '.join(first)} {last} {end}" if first else end

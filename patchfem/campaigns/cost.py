@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from ..core import NotConverged, PatchfemError
+from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from ..runs.plan import plan
@@ -35,7 +36,7 @@ def knobs_of(model: Model) -> list:
         engine = plan(model).engine
         if engine in ("march", "bench"):
             out.append("steps_per_cycle")
-            if model.soft and model.friction.law == "nonlocal":
+            if model.soft and has(model.friction.law, "bonds"):
                 out.append("shear_modes")
     return out
 
@@ -90,7 +91,7 @@ def _turned(model: Model, knob: str):
             if 8 <= cells <= MOST_CELLS:
                 yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(model, length / cells), 0)
         return
-    from ..model.accuracy import choose
+    from ..runs.rig.numerics import choose
 
     now = getattr(model.accuracy, knob) or (choose(model).steps if knob == "steps_per_cycle" and model.kind == "rig"
                                             else {"steps_per_cycle": 400, "shear_modes": 8}[knob])

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..core import Outcome, PatchfemError
+from ..effects import has
 from ..inputs.loops import Loop
 from ..model.model import Model, build
 from ..model.source import placed
@@ -17,15 +18,16 @@ class BenchModel:
         self.notes, self.sets, law = [], [], scene.friction
         self.time = self._paced()
         named = {one.key for one in wanted}
-        if law.law == "nonlocal" and law.rest_growth is not None and law.rest_speed is None \
+        if has(law.law, "bonds") and law.rest_growth is not None and law.rest_speed is None \
                 and "friction.rest_speed" not in named:
             speed = 1e-3 * float(np.abs(np.diff(loop.displacement) / np.diff(self.time)).max())
             self.sets.append(f"friction.rest_speed={speed!r} m/s")
         self._note_amplitude()
-        self.instant = law.law in ("coulomb", "tanh")
+        self.instant = has(law.law, "creeps") or (has(law.law, "set-valued") and not has(law.law, "averaged"))
         soft = scene.contact is not None and scene.contact.gives_way
-        steady = law.law != "nonlocal" or (law.rest_growth is None and (law.reading == "report" or law.order == 1))
-        self.exact = steady and not (soft and law.law == "nonlocal") and not self._on_lower()
+        bonds = has(law.law, "bonds")
+        steady = not bonds or (law.rest_growth is None and (law.reading == "report" or law.order == 1))
+        self.exact = steady and not (soft and bonds) and not self._on_lower()
         steps, legs = scene.accuracy.steps_per_cycle, loop.reading.size - 1
         self.pinned = steps is not None
         self.pieces = max(1, -(-steps // legs)) if self.pinned and not self.exact else 1
@@ -90,7 +92,7 @@ class BenchModel:
         if loop.time is not None:
             return loop.time
         law, slide = scene.friction, scene.slide
-        aged = law.law == "tanh" or (law.law == "nonlocal" and law.rest_growth is not None)
+        aged = not has(law.law, "timeless") and not (has(law.law, "bonds") and law.rest_growth is None)
         if not aged and not (scene.normal is not None and scene.normal.amplitude):
             self.notes.append(f"{loop.path} has no time: its rows are taken as even in time, which law '{law.law}' "
                               "does not feel")

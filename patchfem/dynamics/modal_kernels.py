@@ -4,13 +4,35 @@ state (2, n): coordinates and rates; row: one line of `propagator.Propagator.tab
 modal accelerations that are constant over the step.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
-from numba.core.options import DefaultOptions
 
-# no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
-LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-FAST = {"reassoc", "contract", "arcp"}
+from ..friction.flags_kernels import FAST, LEAN
+
+
+class Plant(NamedTuple):
+    """What the modes are to a loop: omega, damp = 2 zeta omega, slide, base, output (n,), damping (n, n) where it
+    couples, else (0, 0); their steps, arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first
+    interface; mass [kg]; room (3, n)."""
+
+    omega: np.ndarray
+    damp: np.ndarray
+    slide: np.ndarray
+    base: np.ndarray
+    output: np.ndarray
+    damping: np.ndarray
+    free: np.ndarray
+    push: np.ndarray
+    dense: np.ndarray
+    reach: np.ndarray
+    loss: np.ndarray
+    dense_loss: np.ndarray
+    dt: float
+    beta: float
+    mass: float
+    room: np.ndarray
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -111,6 +133,29 @@ def safe_point(low, high, guess):
     if low < guess < high and np.isfinite(guess):
         return guess
     return 0.5 * (low + high)
+
+
+@njit(error_model="numpy", **LEAN)
+def narrowed(low, high, here, miss, gain, late):
+    """(low, high, next place) of a search for the root of a function that grows, by Newton's steps in a bracket.
+
+    miss: its value at `here`, gain: its slope or what stands for one; low, high: infinite where nothing is known yet.
+    The bracket closes on `here`; a step that leaves it is replaced by its middle. late: evaluations beyond those that a
+    search should take; from 1 on every other step is the middle, as kinks can throw steps to and fro, and the steps
+    grow where there is no bracket.
+    """
+    if miss > 0:
+        high = here
+    else:
+        low = here
+    new = here - miss / gain
+    if low > -np.inf and high < np.inf:
+        new = safe_point(low, high, new)
+        if late > 0 and late % 2:
+            new = 0.5 * (low + high)
+    elif late > 0:
+        new = here - miss * 2.0 ** min(late, 60)
+    return low, high, new
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)

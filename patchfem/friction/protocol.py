@@ -1,8 +1,16 @@
-"""What every law of friction returns for a step.
+"""What every law of friction returns for a step, and how it hands itself to compiled code.
 
 A law is start(sigma) -> state, step(state, dq, s0, s1, dt) -> Step for an increment of slide over a pressure that
 changes along the way, and press(state, s0, s1) -> Step for a pressure that changes in time at rest. None of them
 changes the state it was given. No traction outlives the contact, and at rest none exceeds mu sigma.
+
+element(load) -> Element is the same law of a whole contact for the loops. The kernels that an Element names are a
+module with three compiled functions of one signature, num (e, k) and mem (e, k) the numbers and memories of e contacts:
+mean(num, mem, e, q, dq, eps, dt) -> (path-mean force [N], its slope over dq [N/m]) over an increment dq [m] in dt [s];
+commit(num, mem, e, dq, force, v0, v1, dt, eps) -> energy dissipated [J], which moves the memory over that increment;
+state(num, mem, e, q, v) -> (force [N], stored energy [J], irreversible part of the slide q [m]).
+A law whose bonds grow has middle(num, mem, e, v, dt) -> eps [m] besides, the bond length of the step. num[e, 0] is left
+to the loops.
 """
 
 from typing import NamedTuple
@@ -16,3 +24,22 @@ class Step(NamedTuple):
     mean: np.ndarray
     dissipated: np.ndarray
     state: object
+
+
+class Element(NamedTuple):
+    """A law on one contact as compiled code takes it.
+
+    kernels: module of its compiled form in this package; numbers (k,), the first one free, and memory (l,) at the
+    start; limit: largest force [N], or the size of the force where none is largest; length [m]: slide over which it
+    stretches before it slips, 0 where nothing stretches; bounded: whether no force exceeds the limit. form: what the
+    memory is made of, for engines that look inside: "parallel" elements side by side, "points" of bonds, "speed" alone
+    and no memory, "flow" of one number, or "".
+    """
+
+    kernels: str
+    numbers: np.ndarray
+    memory: np.ndarray
+    limit: float
+    length: float = 0.0
+    bounded: bool = True
+    form: str = ""

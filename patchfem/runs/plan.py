@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..core import Missing
-from ..effects import EFFECTS
+from ..effects import EFFECTS, has
 from ..model.model import Model, build
 from ..model.source import placed
 
@@ -92,8 +92,9 @@ def _bonds(model: Model) -> dict:
     f, load = model.friction, model.nominal_load
     if f is None or not load > 0:
         return {}
-    rigid = "none: it creeps" if f.law == "tanh" else "rigid until it slips"
-    return {"bonds": f.static * load / f.bond_length if f.bond_length and f.law != "convolution" else rigid}
+    rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
+    stretches = f.bond_length and not has(f.law, "averaged")
+    return {"bonds": f.static * load / f.bond_length if stretches else rigid}
 
 
 def _verdict(model: Model, groups: dict, size: int, said: list) -> list:

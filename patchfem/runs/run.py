@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ..core import Measure, Outcome
+from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
@@ -136,10 +137,10 @@ def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, est
     from .bench.watch import Watch
 
     model, f = what.model, what.model.friction
-    if f.law == "nonlocal" and f.order < 0 and f.initial_bonds > 0:
+    if has(f.law, "bonds") and f.order < 0 and f.initial_bonds > 0:
         warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
                     "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
-    if f.law == "nonlocal":
+    if has(f.law, "bonds"):
         warnings = [*warnings, *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
             warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "

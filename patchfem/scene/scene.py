@@ -14,6 +14,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+from ..effects import takes
 from . import tables
 from .lines import key_lines
 from .reader import Draft, apply_set
@@ -196,7 +197,7 @@ def _contact(contact: tables.Contact) -> tables.Contact:
 def _law(law: tables.Friction) -> tables.Friction:
     idle = {"kinetic": kinetic_unused(law), "temperature": temperature_unused(law)}
     law = _without(law, unused(law, "law", LAWS) | {key for key, without in idle.items() if without})
-    return _filled(law, {"kinetic": law.static}) if law.law in ("coulomb", "nonlocal") else law
+    return _filled(law, {"kinetic": law.static}) if takes(law.law, "kinetic") else law
 
 
 def _mode(mode: tables.Mode, first: bool) -> tables.Mode:

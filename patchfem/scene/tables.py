@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from ..effects import LAWS
 from .materials import MATERIALS
 from .types import Table, choices, number, quantity, whole
 
@@ -20,7 +21,7 @@ Mass, Seconds, Frequency = quantity("mass", gt=0), quantity("time", gt=0), quant
 Speed, Acceleration = quantity("velocity", gt=0), quantity("acceleration", gt=0)
 Kelvin, PerMetre = quantity("temperature", gt=0), quantity("participation")
 Piece = Literal["upper", "lower"]
-LawName = Literal["coulomb", "tanh", "elastic-plastic", "nonlocal", "convolution"]
+LawName = Literal[tuple(LAWS)]
 
 
 class Material(Table):

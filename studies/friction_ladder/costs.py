@@ -22,11 +22,12 @@ import path_kernels as loops
 import today
 from ladder import HERTZ, LENGTH
 
-from patchfem.dynamics.march.models import growth_numbers, list_model, load_kernels
+from patchfem.dynamics.march.models import list_model, load_kernels
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.coulomb import Coulomb
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic, parallel
+from patchfem.friction.laws.stretch import growth_numbers
 from patchfem.friction.laws.tanh import Rate
 
 STEPS, AMPLITUDE = 200, 12.5
@@ -44,20 +45,25 @@ def compiled(cycles: int = 100, repeats: int = 7) -> dict:
     force = np.zeros(path.size)
     one = np.ones(1)
     runs = {"Coulomb": lambda: loops.coulomb(path, force), "tanh": lambda: loops.tanh(path, dt, 1e-3, force),
-            "elastic-plastic": lambda: loops.jenkins(path, 0 * one, one / LENGTH, one * LENGTH, force)}
+            "elastic-plastic": lambda: _elements(path, one / LENGTH, one * LENGTH, force)}
     laws = {BASE: ladder.bonds(), "LuGre": ladder.at_once(), "stretch": ladder.bonds(**ladder.GROWTH)}
     runs |= {name: lambda law=law: loops.bond(path, dt, growth_numbers(law), force) for name, law in laws.items()}
     soft = growth_numbers(ladder.bonds(breakaway=0.3))
     runs["constant, breakaway 0.3"] = lambda: loops.loose(path, soft, force)
     for n in (5, 10, 20, 50, 100):
         k, s = today.iwan_elements(n)
-        runs[f"Iwan {n}"] = lambda k=k, s=s: loops.jenkins(path, np.zeros(k.size), k / LENGTH, s * LENGTH, force)
+        runs[f"Iwan {n}"] = lambda k=k, s=s: _elements(path, k / LENGTH, s * LENGTH, force)
     runs |= {f"Bouc-Wen n = {n}, Runge-Kutta": lambda n=n: loops.bouc_wen(path / LENGTH, n, force) for n in (2, 5)}
     out = _least(runs, path.size - 1, repeats)
     short = sine(6)
     return out | _least({name: _list(law, short, dt) for name, law in {
         "report, constant": ladder.bonds(reading="report"),
         "report, growing": ladder.bonds(reading="report", **ladder.GROWTH)}.items()}, short.size - 1, 2)
+
+
+def _elements(path, stiffness, yield_slide, force) -> None:
+    one = parallel(stiffness, yield_slide)
+    loops.jenkins(path, one.numbers[None], one.memory[None].copy(), force)
 
 
 def _list(law, path, dt):

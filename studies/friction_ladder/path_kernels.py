@@ -5,7 +5,7 @@ from numba import njit
 
 from patchfem.friction.bonds.bond_kernels import list_mean, list_step
 from patchfem.friction.bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from patchfem.friction.laws.elastic_plastic_kernels import jenkins_mean, jenkins_step
+from patchfem.friction.laws import elastic_plastic_kernels as law
 
 
 @njit(error_model="numpy")
@@ -22,12 +22,11 @@ def tanh(path, dt, speed, force):
 
 
 @njit(error_model="numpy")
-def jenkins(path, stretch, stiffness, limit, force):
-    now = np.zeros(3)
+def jenkins(path, num, mem, force):
     for i in range(path.size - 1):
         dq = path[i + 1] - path[i]
-        force[i] = jenkins_mean(dq, stretch, stiffness, limit)[0]
-        jenkins_step(dq, stretch, stiffness, limit, now)
+        force[i] = law.mean(num, mem, 0, path[i], dq, 0.0, 1.0)[0]
+        law.commit(num, mem, 0, dq, force[i], 0.0, 0.0, 1.0, 0.0)
 
 
 @njit(error_model="numpy")

@@ -19,10 +19,10 @@ from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tan
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.one_mode import sdof, sdof_kernels
 from patchfem.dynamics.one_mode.sdof_samples import position
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 from patchfem.structure.drives import release
 
@@ -80,7 +80,7 @@ def problem(name: str) -> Problem:
     model = build(scene.load(HERE / "patch.toml"))
     modes, drive = model.rig.modes, model.rig.drive
     contact = contact_model(model, choose(model), solve_all(model.patch, model.accuracy.tolerance, False)[0])
-    k, y = contact.fields["stiffness"], contact.fields["limit"]
+    k, y = contact.element.numbers[2:].reshape(2, -1)
     numbers = {"omega": modes.omega, "zeta": modes.zeta, "slide": modes.slide, "base": modes.base, "mass": modes.mass,
                "drive": drive.acceleration, "drive_omega": drive.omega, "stiffness": k, "yields": y}
     made = Problem(name, modes, drive, contact.limit, 20,

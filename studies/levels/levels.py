@@ -32,10 +32,10 @@ from patchfem.dynamics.harmonic.branch import levels as follow
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Spring
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[1]

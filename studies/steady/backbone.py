@@ -26,11 +26,11 @@ from against_march import PATCH, TEXTS
 
 from patchfem.dynamics.harmonic import balance as harmonic_balance
 from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent

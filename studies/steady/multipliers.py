@@ -27,11 +27,11 @@ from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.laws import Spring
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.one_mode.sdof import simulate as simulate_sdof
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model, model_of
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from patchfem.dynamics.march.models import growth_numbers
 from patchfem.friction.bonds import bond_sum_kernels, point_kernels, recursion
 from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
 from patchfem.friction.bonds.recursion import advance, shape_functions
-from patchfem.friction.laws.elastic_plastic_kernels import jenkins_mean, jenkins_step
+from patchfem.friction.laws import elastic_plastic_kernels
+from patchfem.friction.laws.elastic_plastic import parallel
+from patchfem.friction.laws.stretch import growth_numbers
 
 # ---- bond points
 
@@ -81,15 +82,17 @@ def jenkins_numpy(dq, stretch, stiffness, limit):
 def test_exact_jenkins_is_a_clip(seed):
     rng = np.random.default_rng(seed)
     stiffness, limit = rng.uniform(0.1, 3, 30), rng.uniform(0.05, 2, 30)
-    stretch, now = np.zeros(30), np.zeros(3)
+    element = parallel(stiffness, limit)
+    num, mem = element.numbers[None], element.memory[None].copy()
+    stretch, now = mem[0, 3:], mem[0, :3]
     for dq in rng.normal(0, 1, 60) * 10.0**rng.uniform(-3, 1, 60):
         want, new, loss = jenkins_numpy(dq, stretch, stiffness, limit)
-        force, slope = jenkins_mean(dq, stretch, stiffness, limit)
+        force, slope = elastic_plastic_kernels.mean(num, mem, 0, 0.0, dq, 0.0, 1.0)
         h = 1e-6 * abs(dq)
         ahead, behind = (jenkins_numpy(dq + s * h, stretch, stiffness, limit)[0] for s in (1, -1))
         assert force == pytest.approx(want, abs=1e-12)
         assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
-        burnt = jenkins_step(dq, stretch, stiffness, limit, now)
+        burnt = elastic_plastic_kernels.commit(num, mem, 0, dq, force, 0.0, 0.0, 1.0, 0.0)
         share = stiffness * limit
         assert now == pytest.approx([stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12)
         assert stretch == pytest.approx(new, abs=1e-15) and burnt == pytest.approx(loss, abs=1e-11)
@@ -98,9 +101,9 @@ def test_exact_jenkins_is_a_clip(seed):
 
 def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
     """No difference of large numbers: a step of 1e-12 of the stretch, elastic, has its force to 1e-15 of itself."""
-    stiffness, limit, stretch = np.full(4, 3.0), np.full(4, 1.0), np.array([0.3, -0.7, 0.9, 0.1])
+    num, mem = parallel(np.full(4, 3.0), np.full(4, 1.0)).numbers[None], np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]])
     for dq in (1e-12, -1e-13, 1e-300, 0.0):
-        force, slope = jenkins_mean(dq, stretch, stiffness, limit)
+        force, slope = elastic_plastic_kernels.mean(num, mem, 0, 0.0, dq, 0.0, 1.0)
         assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(6.0, rel=1e-6)
 
 

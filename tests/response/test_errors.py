@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchfem.model.accuracy import choose
 from patchfem.model.model import build
 from patchfem.response.errors import change, step_error, with_errors
 from patchfem.runs.rig import march as rig_march
+from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 TEXT = """

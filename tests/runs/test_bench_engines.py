@@ -8,7 +8,6 @@ import pytest
 from patchfem.core import Missing, PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.model.accuracy import LONGEST
 from patchfem.model.model import build
 from patchfem.response.measures import work_check
 from patchfem.runs.bench import bench
@@ -17,6 +16,7 @@ from patchfem.runs.bench.stepped import stepped
 from patchfem.runs.bench.watch import BLOCK, UNWATCHED, Watch
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
+from patchfem.runs.rig.numerics import LONGEST
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

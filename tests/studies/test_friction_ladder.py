@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 from study_module import study
 
 from patchfem import closed_forms as exact
-from patchfem.dynamics.march.models import growth_numbers
 from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.stretch import growth_numbers
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 from friction_paths import GAUSS, lengths_by_hand, rates
 from scipy.special import gamma
 
-from patchfem.dynamics.march.models import growth_numbers
 from patchfem.friction.bonds import bond_kernels
 from patchfem.friction.bonds.bond_list import law_numbers, share_table
 from patchfem.friction.bonds.quadrature import cutoff
+from patchfem.friction.laws.stretch import growth_numbers
 
 
 class Listed(NamedTuple):

@@ -6,7 +6,7 @@ A law is a row (kind, limit, second number, third number) as `point_laws.rows` w
 import numpy as np
 from numba import njit
 
-from ..modal_kernels import LEAN
+from ...friction.flags_kernels import LEAN
 
 COULOMB, TANH, ELASTIC = 0, 1, 2
 

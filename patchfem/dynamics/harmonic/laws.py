@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import load
+from ...compiled import instance, load
 from ...core import PatchfemError, frozen_array
+from ...friction.protocol import Element
 
 SHARPEST = 48  # samples while an element goes from one limit to the other
 
@@ -21,6 +22,12 @@ SHARPEST = 48  # samples while an element goes from one limit to the other
 def kernels():
     """The compiled laws."""
     return load("dynamics.harmonic.cycle_kernels")
+
+
+@cache
+def speed_kernels(law: str):
+    """The loop over the samples of a compiled law without memory."""
+    return instance("dynamics.harmonic.speed_kernels", {"law": load(law)})
 
 
 class Sampled(NamedTuple):
@@ -185,12 +192,11 @@ class Interlock:
         return Sampled(self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle), self.stiffness * np.cos(angle))
 
 
-@dataclass(frozen=True, slots=True)
-class Tanh:
-    """Friction limit tanh(q'/speed) of eq. 2.4: limit [N], speed [m/s]."""
+@dataclass(frozen=True, eq=False, slots=True)
+class OfSpeed:
+    """A law without memory, whose force follows the speed of the slide alone: its Element of form "speed"."""
 
-    limit: float
-    speed: float
+    element: Element
 
     @property
     def total(self) -> float:
@@ -203,10 +209,9 @@ class Tanh:
 
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
-        v = track.omega * track.rate / self.speed
-        t = np.tanh(v)
-        return Sampled(self.limit * t, None, self.limit / self.speed * (1 - t) * (1 + t), None, self.limit,
-                       np.zeros(v.size))
+        force, slope = np.empty(track.samples), np.empty(track.samples)
+        speed_kernels(self.element.kernels).along(self.element.numbers[None], track.omega * track.rate, force, slope)
+        return Sampled(force, None, slope, None, self.element.limit, np.zeros(track.samples))
 
 
 def _samples(share: float) -> int:
@@ -216,17 +221,18 @@ def _samples(share: float) -> int:
 
 
 def law_of_model(model):
-    """The law of a dynamics.march.march.ContactModel; PatchfemError names what cannot be balanced and what to do."""
-    fields = model.fields
-    if model.kind == 1:
-        return Jenkins(fields["stiffness"], fields["limit"])
-    if model.kind == 4:
-        return Tanh(float(fields["force"][0]), float(fields["force"][1]))
-    if model.kind == 0:
-        raise PatchfemError("accuracy.method: \"harmonic\" cannot balance friction.law = \"coulomb\", a set-valued "
-                            "force; use the event map, or law = \"elastic-plastic\" with a short bond_length")
-    if model.kind == 2 and "psi" not in fields and not model.follow and fields["growth"][0] < 0 \
-            and not fields["growth"][5]:
+    """The law of a dynamics.march.models.ContactModel; PatchfemError names what cannot be balanced and what to do."""
+    one = model.element
+    form = one.form if one is not None else ""
+    if form == "parallel":
+        count = int(one.numbers[1])
+        return Jenkins(one.numbers[2:2 + count], one.numbers[2 + count:])
+    if form == "speed":
+        return OfSpeed(one)
+    if model.set_valued:
+        raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
+                            "law = \"elastic-plastic\" with a short bond_length")
+    if form == "points" and one.numbers[2] < 0 and not one.numbers[7] and not one.kernels.endswith("lower_kernels"):
         return Stretch(model.limit, model.length)
     raise PatchfemError("accuracy.method: \"harmonic\" takes the stretch reading with order = 1, a constant bond "
                         "length, friction.breakaway = 0 and a rigid slide; use method = \"march\"")

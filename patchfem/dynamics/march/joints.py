@@ -1,95 +1,126 @@
 """Several interfaces and springs that are not linear beside, or instead of, the patch: the march of many elements."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from ...compiled import load
+from ... import compiled
 from ...core import Response
+from ...friction.protocol import Element
+from ..contacts import arrays
+from .hub import HERE, contact_of
 from .march import GOAL, Run
-from .models import ContactModel, growth_numbers
+from .models import SET_VALUED, ContactModel, coulomb_model
 
-COULOMB, JENKINS, POINTS, RATE, CUBIC, SINE = 0, 1, 2, 4, 5, 6  # as in the kernels
-NUMBERS, MEMORY = 9, 8
+COULOMB = "friction.laws.coulomb_kernels"
+DISPATCH = '''"""Laws of elements side by side: num[e, 0] says which one is meant. Written by dynamics.march.joints."""
+
+from numba import njit
+
+{imports}
+from patchfem.friction.flags_kernels import LEAN
+
+
+@njit(error_model="numpy", **LEAN)
+def middle(num, mem, e, v, dt):
+{middle}
+
+@njit(error_model="numpy", **LEAN)
+def mean(num, mem, e, q, dq, eps, dt):
+{mean}
+
+@njit(error_model="numpy", **LEAN)
+def commit(num, mem, e, dq, force, v0, v1, dt, eps):
+{commit}
+
+@njit(error_model="numpy", **LEAN)
+def state(num, mem, e, q, v):
+{state}
+'''
+SIGNATURES = {"middle": "num, mem, e, v, dt", "mean": "num, mem, e, q, dq, eps, dt",
+              "commit": "num, mem, e, dq, force, v0, v1, dt, eps", "state": "num, mem, e, q, v"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Element:
-    """A law on one port: kind, its numbers (9,) and first memory (8,) as in joint_laws_kernels; limit: friction
-    limit [N], 0 for a spring; length: of its bonds [m], 0 without."""
+class Joint:
+    """A law on one port: its Element; potential: energy [J] of a slide [m] of a spring, None for friction."""
 
-    kind: int
     port: int
-    numbers: np.ndarray
-    memory: np.ndarray
-    limit: float = 0.0
-    length: float = 0.0
+    element: Element
+    potential: Callable | None = None
 
 
-def _element(kind: int, port: int, numbers, limit: float = 0.0, length: float = 0.0, memory=()) -> Element:
-    filled = [np.zeros(NUMBERS), np.zeros(MEMORY)]
-    for whole, part in zip(filled, (numbers, memory)):
-        whole[:len(part)] = part
-    return Element(kind, port, *filled, limit, length)
-
-
-def coulomb(port: int, static: float, kinetic: float) -> Element:
-    """Rigid Coulomb friction of static and kinetic force [N]."""
-    return _element(COULOMB, port, [static, kinetic], static)
-
-
-def elastic_plastic(port: int, limit: float, length: float) -> Element:
-    """A spring limit/length that slips at the limit [N] (3.12 with its reversal); length [m]."""
-    return _element(JENKINS, port, [limit, limit / length, length], limit, length)
-
-
-def bonds(port: int, law, load: float) -> Element:
-    """The stretch reading with p = 1 under a normal load [N]; law: friction.law.Bonds."""
-    numbers = [law.static * load, law.static / law.length, load, *growth_numbers(law)]
-    return _element(POINTS, port, numbers, law.static * load, law.length, [law.initial * load, 0, 0, 0, law.length])
-
-
-def rate(port: int, limit: float, speed: float) -> Element:
-    """limit tanh(v/speed) of eq. 2.4, limit [N], speed [m/s]."""
-    return _element(RATE, port, [limit, speed], limit)
-
-
-def cubic(port: int, stiffness: float) -> Element:
+def cubic(port: int, stiffness: float) -> Joint:
     """Restoring force k_3 q^3 [N], k_3 [N/m3]."""
-    return _element(CUBIC, port, [stiffness])
+    return _spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
 
 
-def interlock(port: int, stiffness: float, wavelength: float) -> Element:
+def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
     """Restoring force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks."""
-    return _element(SINE, port, [stiffness, wavelength])
+    turn = 2 * np.pi / wavelength
+    return _spring(port, [0.0, 0.0, stiffness, wavelength],
+                   lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
+
+
+def _spring(port: int, numbers, potential) -> Joint:
+    return Joint(port, Element(f"{HERE}.spring_kernels", np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
+
+
+def number_of(laws: tuple) -> dict:
+    """num[e, 0] of every compiled law: 0 for Coulomb's, which the loop asks for its step, from 1 on for the others."""
+    return {COULOMB: 0} | {law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)}
+
+
+@cache
+def law_of(laws: tuple):
+    """The compiled module of one law, or of several that num[e, 0] tells apart."""
+    if len(laws) == 1:
+        return compiled.load(laws[0])
+    numbers, calls = number_of(laws), {}
+    for name, signature in SIGNATURES.items():
+        lines = [f"    if num[e, 0] == {numbers[law]}:\n        return law_{numbers[law]}.{name}({signature})\n"
+                 for law in laws[:-1]]
+        calls[name] = "".join(lines) + f"    return law_{numbers[laws[-1]]}.{name}({signature})\n"
+    imports = "\n".join(f"import patchfem.{law} as law_{numbers[law]}" for law in laws)
+    text = DISPATCH.format(imports=imports, **calls)
+    return compiled.written(f"{HERE}.laws_{compiled.digest(text)}", text)
+
+
+@cache
+def loop_of(laws: tuple, patch: tuple):
+    """The loop with these laws and the contact of the patch, of this kind."""
+    law = law_of(laws)
+    parts = {"law": law, "patch": contact_of(patch),
+             "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
+             "together": compiled.instance(f"{HERE}.joints_solve_kernels", {"law": law})}
+    return compiled.instance(f"{HERE}.joints_kernels", parts)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SlotsModel:
-    """A patch (ContactModel on port 0, or None) and elements; rows (p, n): slide of every port per coordinate.
+class JointsModel:
+    """A patch (ContactModel on port 0, or None) and joints; rows (p, n): slide of every port per coordinate.
 
-    scale [N]: force against which residuals of springs count.
+    scale [N]: force against which residuals of springs count; also: modules of compiled laws that the loop knows
+    besides those of the joints, so that models of several sets of laws share one loop.
     """
 
     patch: ContactModel | None
-    elements: tuple
+    joints: tuple
     rows: np.ndarray
     scale: float
+    also: tuple = ()
 
     @property
     def limit(self) -> float:
         """Friction limit of all [N]."""
-        return (self.patch.limit if self.patch is not None else 0.0) + sum(e.limit for e in self.elements)
+        return (self.patch.limit if self.patch is not None else 0.0) + sum(one.element.limit for one in self.joints)
 
     @property
     def length(self) -> float:
         """Bond length of the patch, or else of the first interface [m]."""
-        return self.patch.length if self.patch is not None else self.elements[0].length
-
-    @property
-    def fields(self) -> dict:
-        """Of the patch."""
-        return self.patch.fields if self.patch is not None else {}
+        return self.patch.length if self.patch is not None else self.joints[0].element.length
 
     @property
     def reduction(self):
@@ -97,52 +128,75 @@ class SlotsModel:
         return self.patch.reduction if self.patch is not None else None
 
     @property
-    def kind(self) -> int:
-        """Of the patch, or else of the first interface."""
-        return self.patch.kind if self.patch is not None else self.elements[0].kind
+    def set_valued(self) -> bool:
+        """Whether the patch, or else the first interface, holds without any stretch."""
+        return self.patch.set_valued if self.patch is not None else not self.joints[0].element.kernels
+
+    @property
+    def laws(self) -> tuple:
+        """Modules of the compiled laws, each once."""
+        return tuple(sorted({*self.also, *(one.element.kernels or COULOMB for one in self.joints)}))
+
+    @property
+    def kind(self) -> tuple:
+        """Of the patch."""
+        return self.patch.kind if self.patch is not None else (SET_VALUED, "")
 
     @property
     def runner(self):
         """The class that marches it."""
-        return SlotRun
+        return JointsRun
 
-    def build(self, hub):
-        """(Contact, Work) of the patch; an idle point where there is none."""
-        idle = ContactModel(COULOMB, 1.0, {"force": [0.0, 0.0, 0.0]})
-        return (self.patch or idle).build(hub)
+    def shown(self, contact) -> dict:
+        """Of the patch."""
+        return self.patch.shown(contact) if self.patch is not None else {}
+
+    def build(self, hub=None):
+        """(contact, None) of the patch; an idle point where there is none."""
+        return (self.patch or coulomb_model(0.0, 0.0)).build()
+
+    def arrays(self, beta, give) -> arrays.Joints:
+        """Fresh arrays; beta (p, p), give (n,) [m/N]."""
+        e, (p, n), numbers = len(self.joints), self.rows.shape, number_of(self.laws)
+        elements = [one.element for one in self.joints]
+        num, mem = (np.zeros((e, max(1, *(len(part) for part in parts)))) for parts in (
+            [one.numbers for one in elements], [one.memory for one in elements]))
+        for k, one in enumerate(elements):
+            num[k, :one.numbers.size], mem[k, :one.memory.size] = one.numbers, one.memory
+            num[k, 0] = numbers[one.kernels or COULOMB]
+        goal = [self.patch.limit if self.patch is not None else 1.0,
+                *(one.limit or max(self.scale, 1e-300) for one in elements)]
+        ports, rubs = (np.array(part, np.int64) for part in zip(*(
+            (one.port, one.potential is None) for one in self.joints)))
+        return arrays.Joints(
+            np.array([self.patch is not None], np.int64), np.array(beta, float), np.ascontiguousarray(self.rows, float),
+            ports, rubs, num, mem, np.array([one.limit if one.bounded else np.inf for one in elements]),
+            GOAL * np.array(goal), give,
+            np.zeros((e, 2)), np.zeros(e), np.zeros(2), np.zeros(p), *np.zeros((5, e)), np.zeros((e, e)),
+            np.zeros((3, n)), np.zeros((n, n)))
 
 
-class SlotRun(Run):
+class JointsRun(Run):
     """The arrays of a march of many elements and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        self.loop = load("dynamics.march.joints_kernels")
-        self.laws = load("dynamics.march.joint_laws_kernels")
-        elements = model.elements
-        self.kinds = np.array([e.kind for e in elements], np.int64)
-        self.ports = np.array([e.port for e in elements], np.int64)
-        self.numbers = np.array([e.numbers for e in elements])
-        self.memory = np.array([e.memory for e in elements])
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
-        self.rows = np.ascontiguousarray(model.rows, float)
-        self.width = 2 * modes.omega.size + 7 + 4 * len(elements)
-        patch = model.patch
-        self.kind = patch.kind if patch is not None else -1
-        self.goal = GOAL * np.array([patch.limit if patch is not None else 1.0,
-                                     *(e.limit or max(model.scale, 1e-300) for e in elements)])
+        self.loop = loop_of(model.laws, model.kind)
+        self.joints = model.arrays(self.prop.beta, self.plant.push[0] / modes.mass)
+        self.rubs = self.joints.rubs == 1
+        self.width = 2 * modes.omega.size + 7 + 4 * len(model.joints)
         self.ledger[0] += self.strained()
+
+    def fork(self, drive):
+        """As of a Run."""
+        twin = super().fork(drive)
+        twin.joints = type(self.joints)(*(array.copy() for array in self.joints))
+        return twin
 
     def _steps(self, count: int, rows) -> tuple:
         table, row = self.table(count)
-        n = 2 * self.modes.omega.size
-        more = np.zeros((count + 1, len(self.kinds), 4))
-        own = np.empty((count + 1, n + 7))
-        done = self.loop.march_slots(row, count, self.state, self.held, self.arrays, self.steps, self.prop.beta, table,
-                                     self.modes.mass, self.kind, self.contact, self.work, self.rows, self.ports,
-                                     self.kinds, self.numbers, self.memory, self.goal, self.travel, self.ledger, own,
-                                     more)
-        rows[:, :n + 7], rows[:, n + 7:] = own, more.reshape(count + 1, -1)
-        return done
+        return self.loop.march(row, count, self.state, self.plant, table, self.contact, self.joints, float(self.travel),
+                               self.ledger, rows)
 
     def _works(self, rows) -> np.ndarray:
         return rows[:-1, 2 * self.modes.omega.size + 6]
@@ -150,27 +204,27 @@ class SlotRun(Run):
     def watched(self, rows) -> tuple:
         """(rates, slips) (k, e) of the patch and of all elements."""
         rate, slip = super().watched(rows)
-        parts = rows[:, 2 * self.modes.omega.size + 10:].reshape(len(rows), len(self.kinds), 4)
+        parts = rows[:, 2 * self.modes.omega.size + 10:].reshape(len(rows), self.rubs.size, 4)
         return np.column_stack([rate, parts[:, :, 1]]), np.column_stack([slip, parts[:, :, 3]])
 
     def strained(self) -> float:
         """Energy of the patch, of the interfaces and of the springs [J]."""
-        slide = self.model.rows @ self.state[0]
-        out = sum(float(self.laws.element_state(int(kind), self.numbers, self.memory, e, float(slide[port]), 0.0)[1])
-                  for e, (kind, port) in enumerate(zip(self.kinds, self.ports)))
-        return out + (super().strained() if self.model.patch is not None else 0.0)
+        rows, n = np.empty((1, self.width)), 2 * self.modes.omega.size
+        self.loop.march(0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, self.joints, np.inf, np.zeros(9),
+                        rows)
+        springs = [(k, one.potential) for k, one in enumerate(self.model.joints) if one.potential is not None]
+        return float(rows[0, n + 5]) + sum(float(energy(rows[0, n + 7 + 4 * k])) for k, energy in springs)
 
     def response(self, rows, number) -> Response:
         """Histories; `extra`: slides, slide_rates, forces, slips (k, i) of the interfaces, spring_forces (k, s)."""
-        n, modes = 2 * self.modes.omega.size, self.modes
+        n, modes, joints = 2 * self.modes.omega.size, self.modes, self.joints
         out = super().response(rows, number)
-        parts = rows[:, n + 10:].reshape(len(rows), len(self.kinds), 4)
-        push = -np.einsum("ke,en->kn", parts[:, :, 2], self.rows[self.ports]) / modes.mass
+        parts = rows[:, n + 10:].reshape(len(rows), self.rubs.size, 4)
+        push = -np.einsum("ke,en->kn", parts[:, :, 2], joints.rows[joints.ports]) / modes.mass
         if self.model.patch is None:
             push += np.outer(out.force, modes.slide) / modes.mass  # of the first element, counted already
-        rubs = self.kinds < CUBIC
-        extra = out.extra | {"spring_forces": parts[:, ~rubs, 2]}
-        if rubs.any():
+        extra = out.extra | {"spring_forces": parts[:, ~self.rubs, 2]}
+        if self.rubs.any():
             names = ("slides", "slide_rates", "forces", "slips")
-            extra |= {name: parts[:, rubs, k] for k, name in enumerate(names)}
+            extra |= {name: parts[:, self.rubs, k] for k, name in enumerate(names)}
         return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)

@@ -2,200 +2,197 @@
 
 Port p is a row of slides; the patch, where there is one, and the elements each act on one port. Within a step the path-
 mean forces F satisfy d = free - beta F together with every law. Turn by turn each law is solved with the others held
-(block descent on a convex problem for laws that dissipate); the rest of the forces moves d of the others by beta.
+(block descent on a convex problem for laws that dissipate); the rest of the forces moves d of the others by beta. The
+text runs with any patch and any laws: `joints` makes an instance per set of them.
 """
 
 import numpy as np
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
+from ...friction.laws import elastic_plastic_kernels as law
+from ...friction.laws.coulomb_kernels import stick
+from ..contacts import coulomb_kernels as patch
+from ..contacts import element_solve_kernels as solver
 from ..modal_kernels import free_slide, move, note, sample, stored, tell
-from .joint_laws_kernels import CUBIC, element_commit, element_mean, element_middle, element_solve, element_state
-from .joints_solve_kernels import solve_smooth
-from .step_kernels import COULOMB, RATE, commit, contact_state, contact_step
+from . import joints_solve_kernels as together
 
 TURNS = 1000  # of all elements in a step before it counts as failed
 ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
-NOBODY = -1  # kind of a patch that is not there
+HOLDS = 0  # of num: the law that holds without a stretch
 
 
 @njit(error_model="numpy", **LEAN)
-def elsewhere(mine, port, ports, forces, own, beta):
-    """Slide [m] that the forces of all others take from a port; own: force of the patch on port 0, mine -1 for it."""
+def elsewhere(mine, port, j):
+    """Slide [m] that the forces of all others take from a port; mine -1 for the patch on port 0."""
     out = 0.0
-    for k in range(forces.size):
+    for k in range(j.forces.size):
         if k != mine:
-            out += beta[port, ports[k]] * forces[k]
-    return out + beta[port, 0] * own if mine >= 0 else out
+            out += j.beta[port, j.ports[k]] * j.forces[k]
+    return out + j.beta[port, 0] * j.own[0] if mine >= 0 else out
 
 
 @njit(error_model="numpy", **LEAN)
-def newton_turn(free, ports, kinds, num, mem, q, eps, dt, beta, forces, mean, system):
-    """One Newton step on the forces of all elements at once, without a patch; False where it fails.
-
-    forces (e,) in place; the residual is forces - law(free - beta forces). A Coulomb element that holds asks for no
-    slide, with a trace of give where elements that depend on each other share their force in more ways than one; one
-    that slips keeps its force.
-    """
-    count = forces.size
-    for e in range(count):
-        dq, own = free[ports[e]], beta[ports[e], ports[e]]
-        for k in range(count):
-            dq -= beta[ports[e], ports[k]] * forces[k]
-        if kinds[e] == COULOMB:
-            holds = abs(forces[e]) < num[e, 0] * (1 - 1e-12) and abs(forces[e]) != num[e, 1]
-            mean[e] = dq / own if holds else 0.0
-            for k in range(count):
-                system[e, k] = beta[ports[e], ports[k]] / own if holds else 0.0
-            system[e, e] += 1e-9 if holds else 1.0
-            continue
-        force, slope = element_mean(kinds[e], num, mem, e, q[e], dq, eps[e], dt)
-        mean[e] = force - forces[e]
-        for k in range(count):
-            system[e, k] = slope * beta[ports[e], ports[k]]
-        system[e, e] += 1.0
-    for i in range(count):  # elimination with the pivots in place: 1 + slope beta leads its row for laws that resist
-        if abs(system[i, i]) < 1e-12:
-            return False
-        for j in range(i + 1, count):
-            part = system[j, i] / system[i, i]
-            for k in range(i + 1, count):
-                system[j, k] -= part * system[i, k]
-            mean[j] -= part * mean[i]
-    for i in range(count - 1, -1, -1):
-        for k in range(i + 1, count):
-            mean[i] -= system[i, k] * mean[k]
-        mean[i] /= system[i, i]
-    for e in range(count):
-        if not np.isfinite(mean[e]):
-            return False
-    for e in range(count):
-        forces[e] += mean[e]
-        if kinds[e] == COULOMB:
-            forces[e] = min(max(forces[e], -num[e, 0]), num[e, 0])
-    return True
+def sampled(i, motion, j, rows):
+    """(force, slip of the first element, energy of friction, of springs) at a sample; slide, speed, force and slip of
+    every element in its row."""
+    n, m = motion.shape[1], 2 * motion.shape[1] + 7
+    first, moved, energy, springs = 0.0, 0.0, 0.0, 0.0
+    for e in range(j.ports.size):
+        q, v = 0.0, 0.0
+        for k in range(n):
+            q += j.rows[j.ports[e], k] * motion[0, k]
+            v += j.rows[j.ports[e], k] * motion[1, k]
+        force, stock, slip = law.state(j.num, j.mem, e, q, v)
+        j.q[e], j.v[e] = q, v
+        at = m + 4 * e
+        rows[i, at], rows[i, at + 1], rows[i, at + 2], rows[i, at + 3] = q, v, force, slip
+        if j.rubs[e]:
+            energy += stock
+        else:
+            springs += stock
+        if e == 0:
+            first, moved = force, slip
+    return first, moved, energy, springs
 
 
-@njit(error_model="numpy", cache=True)
-def march_slots(first, steps, state, held, modes, prop, beta, table, mass, kind, c, work, rows_of, ports, kinds, num,
-                mem, goal, travel, ledger, rows, more):
-    """March `steps` steps; arguments as `dynamics.march.loop_kernels.march`, beta (p, p), rows_of (p, n): the ports.
+@njit(error_model="numpy", **LEAN)
+def turned(e, turn, j, dt):
+    """Solve element e with all others held: (change of its force over its goal, iterations)."""
+    p = j.ports[e]
+    beta = j.beta[p, p]
+    mine = j.free[p] - elsewhere(e, p, j)
+    if j.num[e, 0] == HOLDS:
+        j.dq[e], used = stick(mine, beta, j.num[e, 1], j.num[e, 2])
+        tries = 1
+    else:
+        guess = 2 * j.last[e, 0] - j.last[e, 1] if turn == 0 else j.dq[e]
+        j.dq[e], used, tries = solver.solve_element(mine, beta, j.num, j.mem, e, j.q[e], j.eps[e], dt, guess,
+                                                    j.bound[e], 0.1 * j.goal[1 + e])
+    used = (mine - j.dq[e]) / beta
+    change = abs(used - j.forces[e]) / (j.goal[1 + e] + ROUND * (abs(mine) / beta + abs(used)))
+    j.forces[e] = used
+    return change if tries >= 0 else np.inf, abs(tries)
 
-    kind: of the patch on port 0, NOBODY: none; ports, kinds (e,), num, mem (e, ...): the elements; goal (1 + e,): their
-    residual [N]; more (steps + 1, e, 4): slide, speed, force, slip of every element. rows as of `march`, for the patch
-    or else the first element, and a last column: friction work of the step that follows [J]; the energy in them is that
-    of the friction alone. Returns (steps done, status).
-    """
-    omega, _, slide, _, output, _ = modes
-    free_map, push, dense, reach, loss, dense_loss, dt, _ = prop
-    n, count, many = slide.size, kinds.size, rows_of.shape[0]
-    around, there = table.shape[0], kind != NOBODY
-    accel, spare, growth = np.empty(n), np.empty((2, n)), np.empty(6)
-    free, forces, dqs = np.empty(many), mem[:, 7].copy(), np.zeros(count)
-    q, v, eps = np.empty(count), np.empty(count), np.empty(count)
-    mean, system, v1 = np.empty(count), np.empty((count, count)), np.empty(count)
-    own, dq, middle, iterations = held[0], 0.0, 0.0, 0
-    give, room, hess, smooth = np.empty(n), np.empty((3, n)), np.empty((n, n)), not there and dense.size == 0
-    for k in range(n):
-        give[k] = push[0, k] / mass
-    for e in range(count):
-        smooth = smooth and kinds[e] != COULOMB
-    for i in range(steps + 1):
-        slide_now, speed_now, out = sample(rows[i], state, slide, output)
-        force, energy, slip, springs = 0.0, 0.0, slide_now, 0.0
+
+@njit(error_model="numpy", **LEAN)
+def agreed(there, smooth, q, v, dt, c, j):
+    """Forces of patch and elements over a step, in j.own, j.forces and j.dq: (slide of the patch, iterations), < 0
+    where they do not agree."""
+    count, iterations, last_worst, worst, dq = j.ports.size, 0, np.inf, 0.0, 0.0
+    for turn in range(TURNS):
+        worst = 0.0
         if there:
-            force, energy, slip = contact_state(kind, c, slide_now, held[0])
+            free = j.free[0] - elsewhere(-1, 0, j)
+            dq, _, tries = patch.solve(free, j.beta[0, 0], q, v, dt, c, j.goal[0])
+            used = (free - dq) / j.beta[0, 0]
+            worst = abs(used - j.own[0]) / (j.goal[0] + ROUND * (abs(j.free[0]) / j.beta[0, 0] + abs(used)))
+            j.own[0] = used
+            iterations += abs(tries)
+            if tries < 0:
+                worst = np.inf
         for e in range(count):
-            q[e], v[e] = 0.0, 0.0
-            for k in range(n):
-                q[e] += rows_of[ports[e], k] * state[0, k]
-                v[e] += rows_of[ports[e], k] * state[1, k]
-            f, stock, moved = element_state(kinds[e], num, mem, e, q[e], v[e])
-            more[i, e, 0], more[i, e, 1], more[i, e, 2], more[i, e, 3] = q[e], v[e], f, moved
-            if e == 0 and not there and kinds[e] < CUBIC:
-                force, slip = f, moved
-            if kinds[e] < CUBIC:
-                energy += stock
-            else:
-                springs += stock
+            change, tries = turned(e, turn, j, dt)
+            worst = max(worst, change)
+            iterations += tries
+        if worst <= 1.0 or count + there == 1:
+            return dq, iterations
+        if smooth and turn > 1:
+            iterations += abs(together.solve_smooth(j, dt))
+        elif turn > 4 and not there and worst > 0.2 * last_worst:
+            together.newton_turn(j, dt)
+        last_worst = worst
+    return dq, -iterations
+
+
+@njit(error_model="numpy", **LEAN)
+def held(i, there, dq, force, j, rows):
+    """Forces at the sample of what is set-valued: between steps of stick the mean of both, else that of the step."""
+    n, m = j.room.shape[1], 2 * j.room.shape[1] + 7
+    for e in range(j.ports.size):
+        if j.num[e, 0] == HOLDS:
+            rests = j.dq[e] == 0.0 and j.last[e, 0] == 0.0
+            rows[i, m + 4 * e + 2] = 0.5 * (rows[i, m + 4 * e + 2] + j.forces[e]) if rests else j.forces[e]
+            if e == 0 and not there:
+                rows[i, 2 * n + 2] = rows[i, m + 2]
+    if there and patch.SET_VALUED:
+        rows[i, 2 * n + 2] = 0.5 * (force + j.own[0]) if dq == 0.0 and j.own[1] == 0.0 else j.own[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def pushed(there, dq, plant, j, accel):
+    """Modal accelerations (n,) of all forces; the friction work of the step [J]."""
+    work = j.own[0] * dq if there else 0.0
+    for k in range(accel.size):
+        accel[k] = -plant.slide[k] * j.own[0] / plant.mass if there else 0.0
+    for e in range(j.ports.size):
+        for k in range(accel.size):
+            accel[k] -= j.rows[j.ports[e], k] * j.forces[e] / plant.mass
+        if j.rubs[e]:
+            work += j.forces[e] * j.dq[e]
+    return work
+
+
+@njit(error_model="numpy", **LEAN)
+def committed(there, q, v, dq, motion, plant, c, j):
+    """Move the memories of patch and elements by the step: (energy dissipated [J], False where one is full)."""
+    lost, ok = 0.0, True
+    if there:
+        speed = 0.0
+        for k in range(plant.slide.size):
+            speed += plant.slide[k] * motion[1, k]
+        lost, ok = patch.commit(dq, j.own[0], q, v, speed, plant.dt, c)
+        j.own[1] = dq
+    for e in range(j.ports.size):
+        speed = 0.0
+        for k in range(plant.slide.size):
+            speed += j.rows[j.ports[e], k] * motion[1, k]
+        lost += law.commit(j.num, j.mem, e, j.dq[e], j.forces[e], j.v[e], speed, plant.dt, j.eps[e])
+        j.last[e, 1] = j.last[e, 0]
+        j.last[e, 0] = j.dq[e]
+    return lost, ok
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def march(first, steps, motion, plant, table, c, j, travel, ledger, rows):
+    """March `steps` steps; arguments as `loop_kernels.march`.
+
+    j: `arrays.Joints`, c: arrays of the patch on port 0, where there is one. rows as of `march`, for the patch or
+    else the first element, then the friction work of the step that follows [J], then slide, speed, force and slip of
+    every element; the energy in them is that of the friction alone. Returns (steps done, status).
+    """
+    n, around, dt, mass, there = plant.slide.size, table.shape[0], plant.dt, plant.mass, j.there[0] == 1
+    accel, spare, smooth = plant.room[0], plant.room[1:], not there and plant.dense.size == 0
+    for e in range(j.ports.size):
+        smooth = smooth and j.num[e, 0] != HOLDS
+    for i in range(steps + 1):
+        q, v, out = sample(rows[i], motion, plant.slide, plant.output)
+        force, slip, energy, springs = sampled(i, motion, j, rows)
+        if there:
+            force, stock, slip = patch.state(c, q, v)
+            energy += stock
+        elif not j.rubs[0]:
+            force, slip = 0.0, q
         status = note(rows[i, :2 * n + 6], force, energy, slip, out, travel,
-                      energy + springs + stored(state, omega, mass), ledger)
+                      energy + springs + stored(motion, plant.omega, mass), ledger)
         if status:
             return i, status
         if i == steps:
             break
         at = (first + i) % around
-        for p in range(many):
-            free[p] = free_slide(state, reach, p, table, at)
-        for e in range(count):
-            eps[e] = element_middle(kinds[e], num, mem, e, v[e], dt, growth)
-        iterations, last_worst = 0, np.inf
-        for turn in range(TURNS):
-            worst = 0.0
-            if there:
-                dq, used, tries, middle = contact_step(free[0] - elsewhere(-1, 0, ports, forces, 0.0, beta), beta[0, 0],
-                                                       speed_now, dt, kind, c, work, goal[0])
-                used = (free[0] - elsewhere(-1, 0, ports, forces, 0.0, beta) - dq) / beta[0, 0]
-                worst = abs(used - own) / (goal[0] + ROUND * (abs(free[0]) / beta[0, 0] + abs(used)))
-                own = used
-                iterations += abs(tries)
-                if tries < 0:
-                    worst = np.inf
-            for e in range(count):
-                p = ports[e]
-                mine = free[p] - elsewhere(e, p, ports, forces, own if there else 0.0, beta)
-                dqs[e], used, tries = element_solve(mine, beta[p, p], kinds[e], num, mem, e, q[e], eps[e], dt,
-                                                    2 * mem[e, 5] - mem[e, 6] if turn == 0 else dqs[e],
-                                                    0.1 * goal[1 + e])
-                used = (mine - dqs[e]) / beta[p, p]
-                noise = ROUND * (abs(mine) / beta[p, p] + abs(used))
-                worst = max(worst, abs(used - forces[e]) / (goal[1 + e] + noise))
-                forces[e] = used
-                iterations += abs(tries)
-                if tries < 0:
-                    worst = np.inf
-            if worst <= 1.0 or count + there == 1:
-                break
-            if smooth and turn > 1:
-                iterations += abs(solve_smooth(free, rows_of, ports, kinds, num, mem, q, eps, dt, give, goal[1:],
-                                               forces, room[0], room[1], room[2], hess))
-            elif turn > 4 and not there and worst > 0.2 * last_worst:
-                newton_turn(free, ports, kinds, num, mem, q, eps, dt, beta, forces, mean, system)
-            last_worst = worst
-        failed = worst > 1.0 and count + there > 1
-        for e in range(count):
-            if kinds[e] == COULOMB:  # at the sample: between two steps of stick the mean of both
-                more[i, e, 2] = 0.5 * (mem[e, 7] + forces[e]) if dqs[e] == 0.0 and mem[e, 5] == 0.0 else forces[e]
-        if there and kind == COULOMB:
-            rows[i, 2 * n + 2] = 0.5 * (held[0] + own) if dq == 0.0 and work.last[0, 0] == 0.0 else own
-        elif not there and kinds[0] == COULOMB:
-            rows[i, 2 * n + 2] = more[i, 0, 2]
-        work_done = own * dq if there else 0.0
-        for k in range(n):
-            accel[k] = -slide[k] * own / mass if there else 0.0
-        for e in range(count):
-            for k in range(n):
-                accel[k] -= rows_of[ports[e], k] * forces[e] / mass
-            if kinds[e] < CUBIC:
-                work_done += forces[e] * dqs[e]
-        tell(-iterations if failed else iterations, work_done, ledger)
-        move(state, free_map, push, loss, dense, dense_loss, table, at, accel, spare, ledger)
-        speed = 0.0
-        for k in range(n):
-            speed += slide[k] * state[1, k]
-        for e in range(count):
-            v1[e] = 0.0
-            for k in range(n):
-                v1[e] += rows_of[ports[e], k] * state[1, k]
-        rows[i, 2 * n + 4] = own if there else (forces[0] if kinds[0] < CUBIC else 0.0)
-        rows[i, 2 * n + 6] = work_done
-        if there:
-            held[0] = c.force[0] * np.tanh(speed / c.force[1]) if kind == RATE else own
-            burnt, ok = commit(dq, own, speed_now, speed, dt, kind, c, work, middle, slide_now, False)
-            ledger[3] += burnt
-            if not ok:
-                return i, 2
-        for e in range(count):
-            ledger[3] += element_commit(kinds[e], num, mem, e, dqs[e], forces[e], v[e], v1[e], dt, eps[e], growth)
+        for p in range(j.free.size):
+            j.free[p] = free_slide(motion, plant.reach, p, table, at)
+        for e in range(j.ports.size):
+            j.eps[e] = law.middle(j.num, j.mem, e, j.v[e], dt)
+        dq, iterations = agreed(there, smooth, q, v, dt, c, j)
+        held(i, there, dq, force, j, rows)
+        work = pushed(there, dq, plant, j, accel)
+        tell(iterations, work, ledger)
+        move(motion, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
+        rows[i, 2 * n + 4] = j.own[0] if there else (j.forces[0] if j.rubs[0] else 0.0)
+        rows[i, 2 * n + 6] = work
+        lost, ok = committed(there, q, v, dq, motion, plant, c, j)
+        ledger[3] += lost
+        if not ok:
+            return i, 2
     return steps, 0
-

@@ -1,4 +1,4 @@
-"""All elements of a step at once, where every law has a slope: a convex problem in the modes that move them.
+"""Solvers of all elements of a step at once, for where one element after the other gets there too slowly.
 
 With y_i what the forces take from coordinate i over the step, the slides are d = free - R y, and y is the minimum of
 sum y_i^2/(2 S_i) + sum Psi_e(d_e), Psi_e' the path-mean force of element e, S_i the give of a coordinate [m/N].
@@ -10,68 +10,81 @@ import numpy as np
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
-from .joint_laws_kernels import element_mean
-from .step_kernels import cholesky_solve
+from ...friction.laws import elastic_plastic_kernels as law
+from ..contacts.shear_kernels import cholesky_solve
+
+HOLDS = 0  # of num: the law that holds without a stretch
 
 
 @njit(error_model="numpy", **LEAN)
-def slide_of(e, y, free, rows_of, ports):
+def slide_of(e, y, j):
     """Slide of element e [m] at y (n,)."""
-    out = free[ports[e]]
+    p = j.ports[e]
+    out = j.free[p]
     for i in range(y.size):
-        out -= rows_of[ports[e], i] * y[i]
+        out -= j.rows[p, i] * y[i]
     return out
 
 
 @njit(error_model="numpy", **LEAN)
-def along(t, y, step, trial, free, rows_of, ports, kinds, num, mem, q, eps, dt, give):
+def along(t, y, step, trial, j, dt):
     """Slope of the minimum's function along `step` at y + t step."""
     out = 0.0
     for i in range(y.size):
         trial[i] = y[i] + t * step[i]
-        out += step[i] * trial[i] / give[i]
-    for e in range(kinds.size):
-        force = element_mean(kinds[e], num, mem, e, q[e], slide_of(e, trial, free, rows_of, ports), eps[e], dt)[0]
+        out += step[i] * trial[i] / j.give[i]
+    for e in range(j.ports.size):
+        force = law.mean(j.num, j.mem, e, j.q[e], slide_of(e, trial, j), j.eps[e], dt)[0]
         for i in range(y.size):
-            out -= step[i] * rows_of[ports[e], i] * force
+            out -= step[i] * j.rows[j.ports[e], i] * force
     return out
 
 
 @njit(error_model="numpy", **LEAN)
-def solve_smooth(free, rows_of, ports, kinds, num, mem, q, eps, dt, give, goal, forces, y, step, trial, hess):
-    """Forces (e,) of a step in place, from those there are; y, step, trial (n,), hess (n, n): room; goal (e,) [N].
+def slope_at(y, step, j, dt, hess):
+    """Newton's equations at y (n,): minus the slope in `step`, the Hessian, j.forces of the laws; the largest change of
+    a force over its goal."""
+    n, worst = y.size, 0.0
+    for i in range(n):
+        step[i] = -y[i] / j.give[i]
+        for k in range(n):
+            hess[i, k] = 0.0
+        hess[i, i] = 1 / j.give[i]
+    for e in range(j.ports.size):
+        p = j.ports[e]
+        force, slope = law.mean(j.num, j.mem, e, j.q[e], slide_of(e, y, j), j.eps[e], dt)
+        worst = max(worst, abs(force - j.forces[e]) / j.goal[1 + e])
+        j.forces[e] = force
+        slope = max(slope, 0.0)
+        for i in range(n):
+            step[i] += j.rows[p, i] * force
+            for k in range(i + 1):
+                hess[i, k] += slope * j.rows[p, i] * j.rows[p, k]
+    return worst
+
+
+@njit(error_model="numpy", **LEAN)
+def solve_smooth(j, dt):
+    """Forces j.forces (e,) of a step in place, from those there are, where every law has a slope.
 
     Returns the iterations, below 0 where the minimum was not reached.
     """
-    n, count = y.size, kinds.size
+    y, step, trial, hess = j.room[0], j.room[1], j.room[2], j.hess
+    n, count = y.size, j.ports.size
     for i in range(n):
         y[i] = 0.0
         for e in range(count):
-            y[i] += give[i] * rows_of[ports[e], i] * forces[e]
+            y[i] += j.give[i] * j.rows[j.ports[e], i] * j.forces[e]
     for turn in range(1, 80):
-        for i in range(n):
-            step[i] = -y[i] / give[i]
-            for k in range(n):
-                hess[i, k] = 0.0
-            hess[i, i] = 1 / give[i]
-        worst = 0.0
-        for e in range(count):
-            force, slope = element_mean(kinds[e], num, mem, e, q[e], slide_of(e, y, free, rows_of, ports), eps[e], dt)
-            worst = max(worst, abs(force - forces[e]) / goal[e])
-            forces[e] = force
-            slope = max(slope, 0.0)
-            for i in range(n):
-                step[i] += rows_of[ports[e], i] * force
-                for k in range(i + 1):
-                    hess[i, k] += slope * rows_of[ports[e], i] * rows_of[ports[e], k]
+        worst = slope_at(y, step, j, dt, hess)
         if turn > 1 and worst <= 0.1:
             return turn
         if not cholesky_solve(hess, step):
             return -turn
-        begin = along(0.0, y, step, trial, free, rows_of, ports, kinds, num, mem, q, eps, dt, give)
+        begin = along(0.0, y, step, trial, j, dt)
         low, high, t = 0.0, np.inf, 1.0
         for _ in range(40):
-            here = along(t, y, step, trial, free, rows_of, ports, kinds, num, mem, q, eps, dt, give)
+            here = along(t, y, step, trial, j, dt)
             if abs(here) <= 0.1 * abs(begin):
                 break
             if here > 0:
@@ -82,3 +95,58 @@ def solve_smooth(free, rows_of, ports, kinds, num, mem, q, eps, dt, give, goal, 
         for i in range(n):
             y[i] += t * step[i]
     return -80
+
+
+@njit(error_model="numpy", **LEAN)
+def equations(j, dt):
+    """Newton's equations j.system (e, e), j.miss (e,) on the forces of all elements, residual forces - law(free - beta
+    forces).
+
+    An element that holds asks for no slide, with a trace of give where elements that depend on each other share their
+    force in more ways than one; one that slips keeps its force.
+    """
+    count, beta = j.forces.size, j.beta
+    for e in range(count):
+        p = j.ports[e]
+        dq, own = j.free[p], beta[p, p]
+        for k in range(count):
+            dq -= beta[p, j.ports[k]] * j.forces[k]
+        if j.num[e, 0] == HOLDS:
+            holds = abs(j.forces[e]) < j.num[e, 1] * (1 - 1e-12) and abs(j.forces[e]) != j.num[e, 2]
+            j.miss[e] = dq / own if holds else 0.0
+            for k in range(count):
+                j.system[e, k] = beta[p, j.ports[k]] / own if holds else 0.0
+            j.system[e, e] += 1e-9 if holds else 1.0
+            continue
+        force, slope = law.mean(j.num, j.mem, e, j.q[e], dq, j.eps[e], dt)
+        j.miss[e] = force - j.forces[e]
+        for k in range(count):
+            j.system[e, k] = slope * beta[p, j.ports[k]]
+        j.system[e, e] += 1.0
+
+
+@njit(error_model="numpy", **LEAN)
+def newton_turn(j, dt):
+    """One Newton step on the forces of all elements at once, without a patch; False where it fails."""
+    count, system, miss = j.forces.size, j.system, j.miss
+    equations(j, dt)
+    for i in range(count):  # elimination with the pivots in place: 1 + slope beta leads its row for laws that resist
+        if abs(system[i, i]) < 1e-12:
+            return False
+        for k in range(i + 1, count):
+            part = system[k, i] / system[i, i]
+            for l in range(i + 1, count):
+                system[k, l] -= part * system[i, l]
+            miss[k] -= part * miss[i]
+    for i in range(count - 1, -1, -1):
+        for k in range(i + 1, count):
+            miss[i] -= system[i, k] * miss[k]
+        miss[i] /= system[i, i]
+    for e in range(count):
+        if not np.isfinite(miss[e]):
+            return False
+    for e in range(count):
+        j.forces[e] += miss[e]
+        if j.num[e, 0] == HOLDS:
+            j.forces[e] = min(max(j.forces[e], -j.num[e, 1]), j.num[e, 1])
+    return True

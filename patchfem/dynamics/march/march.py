@@ -7,19 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
-from .models import (
-    ContactModel,
-    coulomb_model,
-    growth_numbers,
-    jenkins_model,
-    list_model,
-    load_kernels,
-    points_model,
-    rate_model,
-)
-
-__all__ = ["ContactModel", "MarchResult", "Run", "coulomb_model", "growth_numbers", "jenkins_model", "list_model",
-           "march", "points_model", "rate_model", "warm_up"]
+from .models import ContactModel, load_kernels
 
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
 GOAL = 1e-11  # residual of the step solve over the friction limit
@@ -73,17 +61,15 @@ def _response(rows, number, dt, modes, drive) -> Response:
                     {"ledger": rows[:, [2 * n + 6, 2 * n + 5, 2 * n + 7, 2 * n + 8]].T})
 
 
-def modes_arrays(modes: ModalBasis, hub):
-    """hub.Modes of a basis."""
+def plant_of(modes: ModalBasis, prop):
+    """The modal_kernels.Plant of a basis and its Propagator."""
+    from ..modal_kernels import Plant
+
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
-    return hub.Modes(*(np.array(v, float) for v in (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base,
-                                                    modes.output, damping)))
-
-
-def steps_arrays(prop, hub):
-    """hub.Steps of a Propagator of one interface."""
-    return hub.Steps(*(np.array(v) for v in (prop.free, prop.push, prop.dense, prop.reach, prop.loss,
-                                             prop.dense_loss)), prop.dt, float(prop.beta[0, 0]))
+    own = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping, prop.free,
+           prop.push, prop.dense, prop.reach, prop.loss, prop.dense_loss)
+    return Plant(*(np.array(v, float, order="C") for v in own), float(prop.dt), float(prop.beta[0, 0]),
+                 float(modes.mass), np.zeros((3, modes.omega.size)))
 
 
 def _runner(model):
@@ -163,14 +149,14 @@ class Run:
 
         self.modes, self.drive, self.model, self.travel, self.hub = modes, drive, model, travel, hub
         self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
-        self.contact, self.work = model.build(hub)
-        self.state, self.held = np.zeros((2, modes.omega.size)), np.zeros(1)
+        self.contact = model.build(hub)[0]
+        self.state = np.zeros((2, modes.omega.size))
         if start is not None:
             self.state[:] = start.z, start.v
         self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
         self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 6
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
-        self.arrays, self.steps = modes_arrays(modes, hub), steps_arrays(self.prop, hub)
+        self.plant = plant_of(modes, self.prop)
         self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
 
     def fork(self, drive):
@@ -180,7 +166,7 @@ class Run:
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
                 setattr(twin, name, value.copy())
-        twin.contact, twin.work = (type(part)(*(array.copy() for array in part)) for part in (self.contact, self.work))
+        twin.contact = type(self.contact)(*(array.copy() for array in self.contact))
         return twin
 
     def slip_amplitude(self, cycles: int, window: int) -> float:
@@ -224,9 +210,8 @@ class Run:
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""
         table, row = self.table(count)
-        return self.hub.march(row, count, self.state, self.held, self.arrays, self.steps, table, self.modes.mass,
-                              self.model.kind, self.model.follow, self.contact, self.work, GOAL * self.model.limit,
-                              self.travel, self.ledger, rows)
+        return self.hub.march(self.model.kind, row, count, self.state, self.plant, table, self.contact,
+                              float(GOAL * self.model.limit), float(self.travel), self.ledger, rows)
 
     def _booked(self, rows) -> np.ndarray:
         """Rows with the friction work, the energy dissipated and that created since the start [J] as further columns;
@@ -248,9 +233,9 @@ class Run:
 
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
-        have = self.contact.bondlist.shape[1]
-        if not have:
+        if not hasattr(self.contact, "bondlist"):
             return
+        have = self.contact.bondlist.shape[1]
         want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
         if want <= have or have >= MOST_STRIPS:
             return
@@ -269,9 +254,9 @@ class Run:
             self.message = f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle"
 
     def _snapshot(self, row) -> dict:
-        n, c = self.modes.omega.size, self.contact
-        return {"time": self.done * self.prop.dt, "slide": row[2 * n], "rate": row[2 * n + 1], "force": row[2 * n + 2],
-                "slip": row[2 * n + 3], "bonds": c.bonds.copy(), "stretch": c.stretch.copy(), "b": c.b.copy()}
+        n = 2 * self.modes.omega.size
+        return {"time": self.done * self.prop.dt, "slide": row[n], "rate": row[n + 1], "force": row[n + 2],
+                "slip": row[n + 3]} | self.model.shown(self.contact)
 
     def check(self) -> None:
         """Mark the run not_converged when a step missed its residual; what was computed is kept."""
@@ -291,15 +276,17 @@ class Run:
 
     def strained(self) -> float:
         """Energy stored in the interface [J]."""
-        slide = float(self.modes.slide @ self.state[0])
-        return float(self.hub.contact_state(self.model.kind, self.contact, slide, float(self.held[0]))[1])
+        rows = np.empty((1, 2 * self.modes.omega.size + 6))
+        self.hub.march(self.model.kind, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, 1.0, np.inf,
+                       np.zeros(9), rows)
+        return float(rows[0, -1])
 
     def book(self) -> dict:
         """The energy ledger [J]."""
         names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
         book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
-        tally = self.contact.tally
-        if tally.size:
+        if hasattr(self.contact, "tally"):
+            tally = self.contact.tally
             book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),
                      "strips": float(tally[10])}
         return book

@@ -1,76 +1,92 @@
-"""From the results of the stages to the arrays of a contact in the compiled hub: one function per law."""
+"""From a law under its load to the arrays of a contact in the compiled loops."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...compiled import load
+from ...friction.laws.coulomb import Coulomb
+from ...friction.laws.elastic_plastic import parallel
+from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
+from ...friction.laws.tanh import Rate
+from ...friction.protocol import Element
+from ..contacts import arrays
 
-RATE = 4  # kind of a force that follows the speed, as in loop_kernels
+HERE = "dynamics.contacts"
+SET_VALUED = f"{HERE}.coulomb_kernels"  # the contact without a slope
 
 
 def load_kernels(say=None):
-    """The compiled module `loop_kernels`; `say` is told when it has to compile first."""
-    return load("dynamics.march.loop_kernels", say)
+    """The hub of the march, `dynamics.march.hub`; `say` is told when it has to compile first."""
+    return load("dynamics.march.hub", say)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
     """What the hub needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
 
-    kind as in loop_kernels; limit: friction limit [N]; fields: keyword arrays of loop_kernels.Contact; follow:
-    pressure stays on the lower piece; length: bond length for the stick criterion [m]; reduction: the JenkinsSet or
-    ShearModes behind the arrays.
+    contact: module of the compiled contact; law: that of the compiled law in it, "" where the contact
+    has none to choose; limit: friction limit [N]; fields: arrays of `tuple_of`;
+    length: bond length for the stick criterion [m]; reduction: the JenkinsSet or ShearModes behind the arrays; element:
+    the law of an Element.
     """
 
-    kind: int
+    contact: str
     limit: float
     fields: dict
-    follow: bool = False
     length: float = 0.0
+    law: str = ""
     reduction: object = None
+    element: Element | None = None
+    tuple_of: type = arrays.Element
 
-    def build(self, hub):
-        """(Contact, Work) with arrays of their own."""
-        empty = {name: np.zeros((0, 0)) if name in ("psi", "bonds", "bondlist") else np.zeros(0)
-                 for name in hub.Contact._fields}
-        empty["growth"] = np.append(np.full(5, -1.0), 0.0)
-        arrays = {k: np.array(v, dtype=np.float64, order="C") for k, v in (empty | self.fields).items()}
-        contact = hub.Contact(**arrays)
-        r = contact.kappa.size
-        scale = np.ones(1 + r)
-        if r:
-            scale[1:] = self.limit / np.maximum(contact.psi @ (contact.weight * contact.source), 1e-300)
-            scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((contact.psi**2).mean(axis=1)))
-        work = hub.Work(np.zeros(1 + r), np.zeros(1 + r), np.zeros((1 + r, 1 + r)), np.zeros((3, contact.weight.size)),
-                        np.zeros(1 + r), np.zeros(1 + r), scale, np.zeros((2, 1 + r)), np.full(1, self.length))
-        return contact, work
+    @property
+    def kind(self) -> tuple:
+        """(contact, law): what the hub takes an instance of its loop for."""
+        return self.contact, self.law
+
+    @property
+    def set_valued(self) -> bool:
+        """Whether the contact holds without any stretch."""
+        return self.contact == SET_VALUED
+
+    def shown(self, contact) -> dict:
+        """What a picture of the interface needs of the memory: "stretch" (t,) of elements, or "bonds" (4 or 5, m)."""
+        form = self.element.form if self.element is not None else ""
+        if form == "parallel":
+            return {"stretch": contact.mem[0, 3:].copy()}
+        if form == "points":
+            return {"bonds": bonds_of(contact.mem[0]).copy()}
+        return {"bonds": contact.bonds.copy(), "b": contact.b.copy()} if hasattr(contact, "psi") else {}
+
+    def build(self, hub=None):
+        """(contact, None) with arrays of their own."""
+        made = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
+        return self.tuple_of(**made), None
+
+
+def element_model(element: Element, reduction=None) -> ContactModel:
+    """A contact of one law on one slide."""
+    bound = element.limit if element.bounded else np.inf
+    fields = {"num": element.numbers[None], "mem": element.memory[None], "last": np.zeros(2), "eps": np.zeros(1),
+              "bound": [bound]}
+    contact = f"{HERE}.element_kernels" if element.kernels else SET_VALUED
+    return ContactModel(contact, element.limit, fields, element.length, element.kernels, reduction, element)
 
 
 def coulomb_model(static: float, kinetic: float) -> ContactModel:
     """Rigid Coulomb contact with static and kinetic friction force [N]."""
-    return ContactModel(0, static, {"force": [static, kinetic, static]})
+    return element_model(Coulomb(kinetic, static).element(1.0))
 
 
 def rate_model(limit: float, speed: float) -> ContactModel:
     """Friction limit*tanh(v/speed) of eq. 2.4, limit [N], speed v_0 [m/s]."""
-    return ContactModel(RATE, limit, {"force": [limit, speed, limit]})
+    return element_model(Rate(limit, speed).element(1.0))
 
 
-def jenkins_model(stiffness, yield_slide) -> ContactModel:
+def jenkins_model(stiffness, yield_slide, reduction=None) -> ContactModel:
     """Parallel Jenkins elements (t,) [N/m], [m]."""
-    limit = float(np.dot(stiffness, yield_slide))
-    fields = {"force": [limit, limit, limit], "stretch": np.zeros(len(stiffness)), "stiffness": stiffness,
-              "limit": yield_slide, "now": np.zeros(3)}
-    return ContactModel(1, limit, fields)
-
-
-def growth_numbers(law) -> np.ndarray:
-    """(a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10, a_s = -1 for a constant bond length, and the breakaway share."""
-    if not law.grows:
-        return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
-    return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length,
-                     law.breakaway])
+    return element_model(parallel(stiffness, yield_slide), reduction)
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
@@ -81,20 +97,21 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     """
     if shear is not None and pattern is not None:
         raise ValueError("shear modes and a pressure that stays on the lower piece cannot be combined")
-    area, sigma = np.asarray(area, float), np.asarray(sigma, float)
-    places = np.zeros(0) if pattern is None else pattern[0]
-    if shear is not None:
-        area, sigma = area[shear.points], sigma[shear.points]
-    bonds = np.zeros((5 if law.breakaway else 4, area.size))
+    if shear is None:
+        return element_model(points_element(law, area, sigma, pattern))
+    area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]
+    bonds, psi = np.zeros((5 if law.breakaway else 4, area.size)), np.asarray(shear.shape).T
     bonds[0] = law.initial * sigma
-    limit = law.static * float(area @ sigma)
-    fields = {"force": [limit, limit, limit], "weight": law.static * area / law.length, "bonds": bonds,
-              "source": sigma, "growth": growth_numbers(law)}
-    if shear is not None:
-        fields |= {"psi": np.asarray(shear.shape).T, "kappa": shear.stiffness, "b": np.zeros(shear.stiffness.size)}
-    if pattern is not None:
-        fields |= {"place": places, "x": pattern[0], "sigma": pattern[1]}
-    return ContactModel(2, limit, fields, pattern is not None, law.length)
+    limit, size = law.static * float(area @ sigma), 1 + shear.stiffness.size
+    weight = law.static * area / law.length
+    scale = np.append(1.0, limit / np.maximum(psi @ (weight * sigma), 1e-300))
+    scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((psi**2).mean(axis=1)))
+    fields = {"weight": weight, "bonds": bonds, "source": sigma, "growth": growth_numbers(law),
+              "eps": np.full(2, law.length), "psi": psi, "kappa": shear.stiffness, "b": np.zeros(size - 1),
+              "y": np.zeros(size), "out": np.zeros(size), "trial": np.zeros(size), "other": np.zeros(size),
+              "scale": scale, "hess": np.zeros((size, size)), "points": np.zeros((3, area.size)),
+              "last": np.zeros((2, size))}
+    return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 
 
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
@@ -104,7 +121,8 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     """
     from ...friction.bonds.bond_list import law_numbers, room, share_table
 
-    fields = {"force": [limit, limit, (1 + law.initial) * limit], "bondlist": np.zeros((10, room(law, reach, merge))),
+    fields = {"force": [limit], "bondlist": np.zeros((10, room(law, reach, merge))),
               "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
-              "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law)}
-    return ContactModel(3, limit, fields, False, law.length)
+              "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law),
+              "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
+    return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)

@@ -14,7 +14,7 @@ from ...compiled import load as compiled
 from ...contact.atlas import Atlas, sides
 from ...core import ModalBasis, Outcome, PatchfemError, Response
 from .march import GOAL, Run
-from .models import ContactModel
+from .models import coulomb_model
 
 COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
 FLOOR = 1.0  # least pressure of a node in the weights of the shear modes, over the mean of the preload
@@ -53,7 +53,7 @@ def bonds(law) -> Rubbing:
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError("friction: under a load that changes only reading = \"stretch\" with order = 1 and no "
                             "breakaway; the others are not yet built")
-    from .models import growth_numbers
+    from ...friction.laws.stretch import growth_numbers
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
@@ -122,19 +122,14 @@ class WrenchModel:
         return self.law.length
 
     @property
-    def fields(self) -> dict:
-        """None: its memory is that of the run."""
-        return {}
-
-    @property
     def reduction(self):
         """ShearModes, None of pieces that are rigid in shear."""
         return self.shear
 
     @property
-    def kind(self) -> int:
-        """Of the law."""
-        return self.law.kind
+    def set_valued(self) -> bool:
+        """Whether the law holds without any stretch."""
+        return self.law.kind == COULOMB
 
     @property
     def runner(self):
@@ -142,8 +137,12 @@ class WrenchModel:
         return WrenchRun
 
     def build(self, hub):
-        """(Contact, Work) that nothing uses."""
-        return ContactModel(COULOMB, 1.0, {"force": [0.0, 0.0, 0.0]}).build(hub)
+        """(contact, None) that nothing uses."""
+        return coulomb_model(0.0, 0.0).build()
+
+    def shown(self, contact) -> dict:
+        """Nothing: its memory is that of the run."""
+        return {}
 
 
 def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tolerance: float = 1e-3):
@@ -215,9 +214,9 @@ class WrenchRun(Run):
         model, loads = self.model, np.zeros(0)
         if model.load is not None:
             loads = np.array(model.load((self.done + np.arange(count + 1)) * self.prop.dt), float)
-        return self.loop.march_wrench(row, count, self.state, self.held, self.slot, self.arrays, self.ports, self.steps,
-                                      table, float(self.modes.mass), model.law.kind, self.rub, self.sets, loads,
-                                      GOAL * model.limit, float(self.travel), self.ledger, rows)
+        return self.loop.march_wrench(row, count, self.state, self.held, self.slot, self.plant, self.ports, table,
+                                      model.law.kind, self.rub, self.sets, loads, GOAL * model.limit,
+                                      float(self.travel), self.ledger, rows)
 
     def _booked(self, rows) -> np.ndarray:
         """As of a Run; the noise is that of the largest force, of the slide's last digit (a sum over the modes) and of

@@ -84,8 +84,8 @@ def press_step(book, k0, begin, f1, f2, beta, arm, turn, out):
 
 
 @njit(error_model="numpy", cache=True)
-def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table, mass, kind, rub, book, loads, goal,
-                 travel, ledger, rows):
+def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind, rub, book, loads, goal, travel, ledger,
+                 rows):
     """March `steps` steps from row `first` of the table of the drive.
 
     held (2,): last friction force, mean force of the step before; at_piece (1,): slot of the present piece; rub:
@@ -96,8 +96,10 @@ def march_wrench(first, steps, state, held, at_piece, modes, ports, prop, table,
     preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
     contact set fits.
     """
-    omega, damp, slide, base, output, damping = modes
-    free_map, push, dense, reach, loss, dense_loss, dt, _ = prop
+    omega, damp, slide, base, output, damping = (plant.omega, plant.damp, plant.slide, plant.base, plant.output,
+                                                 plant.damping)
+    free_map, push, dense, reach, loss, dense_loss, dt, mass = (plant.free, plant.push, plant.dense, plant.reach,
+                                                                plant.loss, plant.dense_loss, plant.dt, plant.mass)
     n, around, beta = omega.size, table.shape[0], ports.beta
     free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
     accel, spare = np.empty(n), np.empty((2, n))

@@ -13,8 +13,8 @@ from numba import njit
 
 from ...friction.bonds.point_kernels import bond_mean, bond_step, grow, shape
 from ...friction.flags_kernels import FAST, LEAN
+from ..contacts.shear_kernels import weighted
 from ..modal_kernels import safe_point
-from .step_kernels import weighted
 from .varying_friction_kernels import PLASTIC, POINTS, held_energy, local_slide, press_springs, spring_mean, spring_step
 
 GRADIENT, STEP, TRIAL = range(3)

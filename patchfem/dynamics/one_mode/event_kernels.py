@@ -6,7 +6,7 @@ from types import FunctionType
 import numpy as np
 from numba import njit
 
-from ..modal_kernels import LEAN
+from ...friction.flags_kernels import LEAN
 from . import sdof_kernels, slip_kernels
 
 SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_parts",

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..protocol import Step
+from ..protocol import Element, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +19,11 @@ class Coulomb:
     static: float | None = None
     at_once: ClassVar[bool] = True  # nothing stretches: a changing load is taken along with the motion
     holds: ClassVar[bool] = True  # the last traction at rest
+
+    def element(self, load: float) -> Element:
+        """The law of a contact under a constant load [N]: no kernels with a slope."""
+        static = self.kinetic if self.static is None else self.static
+        return Element("", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load)
 
     def start(self, sigma):
         """State: the last traction (m,) [Pa], 0 before any motion."""
@@ -55,3 +60,8 @@ class Coulomb:
     def stored(self, state):
         """Elastic energy per area (m,) [J/m2]: none."""
         return np.zeros_like(state)
+
+
+def from_keys(friction, load: float) -> Coulomb:
+    """The law of a [friction] table."""
+    return Coulomb(friction.static if friction.kinetic is None else friction.kinetic, friction.static)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Step
+from ..protocol import Element, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +20,10 @@ class ElasticPlastic:
 
     static: float
     length: float
+
+    def element(self, load: float) -> Element:
+        """The law of a contact under a constant load [N]: one spring that slips."""
+        return parallel([self.static * load / self.length], [self.length])._replace(length=self.length)
 
     def start(self, sigma):
         """State: (traction/mu, density of springs), (2, m) [Pa]."""
@@ -58,3 +62,17 @@ class ElasticPlastic:
         """Elastic energy per area (m,) [J/m2]."""
         y, springs = state
         return self.static * self.length * np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
+
+
+def parallel(stiffness, yield_slide) -> Element:
+    """Elements side by side under one slide: stiffness (t,) [N/m], yield slide (t,) [m]."""
+    k, most = (np.asarray(part, float) for part in (stiffness, yield_slide))
+    limit, total = float(k @ most), float(k.sum())
+    numbers = np.concatenate([[0.0, k.size], k, most])
+    return Element("friction.laws.elastic_plastic_kernels", numbers, np.zeros(3 + k.size), limit,
+                   limit / total if total > 0 else 0.0, form="parallel")
+
+
+def from_keys(friction, load: float) -> ElasticPlastic:
+    """The law of a [friction] table."""
+    return ElasticPlastic(friction.static, friction.bond_length)

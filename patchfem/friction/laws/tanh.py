@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..protocol import Step
+from ..protocol import Element, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +17,11 @@ class Rate:
     speed: float
     at_once: ClassVar[bool] = True
     holds: ClassVar[bool] = False
+
+    def element(self, load: float) -> Element:
+        """The law of a contact under a constant load [N]."""
+        return Element("friction.laws.tanh_kernels", np.array([0.0, self.static * load, self.speed]), np.zeros(0),
+                       self.static * load, form="speed")
 
     def start(self, sigma):
         """State: the last traction (m,) [Pa], 0 before any motion."""
@@ -51,3 +56,8 @@ class Rate:
     def stored(self, state):
         """Elastic energy per area (m,) [J/m2]: none."""
         return np.zeros_like(state)
+
+
+def from_keys(friction, load: float) -> Rate:
+    """The law of a [friction] table."""
+    return Rate(friction.static, friction.reference_speed)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...effects import has
 from ...friction.laws.convolution import Convolution, average, limits
 
 ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
@@ -21,7 +22,7 @@ def law_on(model, patch) -> Convolution:
 def limit_share(model, patch) -> float:
     """Limit force of a rigid block over mu_s N. PatchfemError where it differs between the two ways of the slide."""
     f = model.friction
-    if patch is None or f.law != "convolution":
+    if patch is None or not has(f.law, "averaged"):
         return 1.0
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = limits(patch.x, sigma, weight, f.bond_length, f.order)

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
-from .engine import CLOSED, STEPPED, WITHOUT_MEMORY, Engine, engine_of
+from .engine import CLOSED, STEPPED, Engine, engine_of, forgets
 from .watch import UNWATCHED, Watch
 
 
@@ -52,7 +52,7 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
         first = int(np.searchsorted(time, start))
     engine = engine_of(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
-    jumps = model.friction.law in WITHOUT_MEMORY and not model.soft
+    jumps = forgets(model.friction) and not model.soft
     values = _values(model, time, slide, out, first, omega) | \
         {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], jumps)}
     span = time[-1]  # endless where a slide is endlessly slow

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core import Missing, PatchfemError
+from ...effects import has, listed
 from ...friction.bonds.engines import Choice
 from ...friction.bonds.engines import choose as choose_sum
-from ...model.accuracy import LONGEST
+from ..rig.numerics import LONGEST
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
          STEPPED: "law step by step", PLANE: "two directions"}
 PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide needs no search for the increment
-WITHOUT_MEMORY = ("coulomb", "tanh", "convolution")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
     f, soft = model.friction, bool(model.soft)
     if model.slide.across is not None:
         return Engine(PLANE, _stepped_seconds(model, slide, 1))
-    if soft and f.law == "nonlocal":
+    if soft and has(f.law, "bonds"):
         from ...slip.shear_modes import SHEAR_MODES
 
         modes = model.accuracy.shear_modes or SHEAR_MODES
@@ -52,11 +52,16 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
         return Engine(ELEMENTS, 3e-9 * points + 1e-7)
     if changes(model):
         return _stepped(model, slide, points)
-    if f.law in WITHOUT_MEMORY:
+    if forgets(f):
         return Engine(CLOSED, 1e-7)
-    if f.law == "elastic-plastic":
+    if not has(f.law, "bonds"):
         return Engine(ELEMENTS, 1e-7)
     return _summed(model, slide, points, choice or sum_of(model, slide))
+
+
+def forgets(f) -> bool:
+    """Whether a law keeps nothing of its path: it holds without a stretch, averages, or follows the speed."""
+    return any(has(f.law, trait) for trait in ("set-valued", "averaged", "creeps"))
 
 
 def changes(model) -> bool:
@@ -78,7 +83,7 @@ def sum_of(model, slide) -> Choice:
 def smooth_sum_of(model, slide) -> Choice | None:
     """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
     fit. None of a law that is no sum, or where the scene names the engine."""
-    if model.friction.law != "nonlocal" or model.accuracy.quadrature != "auto" or model.accuracy.merge is not None:
+    if not has(model.friction.law, "bonds") or model.accuracy.quadrature != "auto" or model.accuracy.merge is not None:
         return None
     found = sum_of(model, slide)
     return replace(found, engine="truncated", merge=0.0, error=found.tail) if found.engine == "merged" else found
@@ -110,7 +115,7 @@ def _summed(model, slide, points: int, found: Choice) -> Engine:
 
 def _stepped(model, slide, points: int) -> Engine:
     f, pinned = model.friction, model.accuracy.quadrature
-    if f.law == "nonlocal" and pinned == "merged":
+    if has(f.law, "bonds") and pinned == "merged":
         raise PatchfemError("'merged' where the pressure of a point changes "
                             "during the slide, or beside friction.breakaway: use 'auto', 'direct' or 'truncated'; not "
                             "yet built", "accuracy.quadrature")
@@ -120,7 +125,7 @@ def _stepped(model, slide, points: int) -> Engine:
 def _stepped_seconds(model, slide, points: int) -> float:
     """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
     f = model.friction
-    if f.law != "nonlocal" or (f.reading == "stretch" and f.order == 1):
+    if not listed(f):
         return 6e-5
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)

@@ -1,11 +1,12 @@
 """What a bench leaves open: its steps, its mesh and its sum over bonds."""
 
 from dataclasses import replace
-from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from ...response.errors import change, step_error
+from ..errors import Rung, estimate, space_rung
 from . import bench
 from .engine import LIST
 from .watch import Watch
@@ -14,30 +15,38 @@ FINER = 0.5  # merge width of the run that shows what merging does
 MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
+class Variant(NamedTuple):
+    """A coarser pass: steps per cycle, on the coarser mesh or not, how the bonds are summed."""
+
+    steps: int
+    rough: bool
+    choice: object
+
+
 def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
-    """([error by measure name, ...], seconds) of the pass `fine` at `steps` per cycle: runs at half and a quarter of
-    them, one on the coarser mesh where there is one, and what the sum over bonds loses."""
-    begin, few = perf_counter(), max(4, steps // 16 * 4)
-    half, quarter = (bench.run(model, patch, number, watch=Watch(fine.engine.choice, say))
-                     for number in (max(4, steps // 8 * 4), few))
-    first_order = model.load_varies  # twice the change, as of few steps
-    out = [step_error(fine.values, half.values, quarter.values, min(steps, 399) if first_order else steps)]
-    if coarse is not None:
-        rough = bench.run(model, coarse, few, watch=Watch(fine.engine.choice, say))
-        out.append(change(quarter.values, rough.values))
-    if fine.engine.kind == LIST:
-        out += sum_errors(model, patch, fine, quarter, few, say)
-    return out, perf_counter() - begin
+    """([error by measure name, ...], seconds) of the pass `fine` at `steps` per cycle on the ladder of `ladder_of`;
+    coarse: the patch on the coarser mesh or None."""
+    def solve(variant: Variant):
+        on = coarse if variant.rough else patch
+        return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say))
+
+    errors, seconds = estimate(solve, fine.values, ladder_of(model, coarse is not None, fine, steps))
+    return [*errors, *([stated(model, fine)] if fine.engine.kind == LIST else [])], seconds
 
 
-def sum_errors(model, patch, fine, quarter, few: int, say=None) -> list:
-    """[error by measure name, ...] of the list of bonds of the pass `fine`: the bound that the engine states, and of a
-    merged list the change of the pass `quarter`, at `few` steps per cycle, when its strips are made narrower."""
-    choice, found = fine.engine.choice, [stated(model, fine)]
-    if choice.merge > 0:
-        finer = bench.run(model, patch, few, watch=Watch(replace(choice, merge=FINER * choice.merge), say))
-        found.append({name: MERGED * gap for name, gap in change(quarter.values, finer.values).items()})
-    return found
+def ladder_of(model, meshed: bool, fine, steps: int) -> list:
+    """Rungs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there is one, and
+    for a merged list of bonds narrower strips."""
+    choice = fine.engine.choice
+    half, few = Variant(max(4, steps // 8 * 4), False, choice), Variant(max(4, steps // 16 * 4), False, choice)
+    counted = min(steps, 399) if model.load_varies else steps  # first order: twice the change, as of few steps
+    out = [Rung((half, few), lambda *values: step_error(*values, counted))]
+    if meshed:
+        out.append(space_rung(few._replace(rough=True), few))
+    if fine.engine.kind == LIST and choice.merge > 0:
+        narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
+        out.append(Rung((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few))
+    return out
 
 
 def stated(model, fine) -> dict:

@@ -57,11 +57,12 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
         contact = _with_room(contact, model, slide[a:b + 1])
         missed += hub.follow_path(slide[a:b + 1].copy(), float(time[b] - time[a]) / float(b - a), model.kind, contact,
                                   work, GOAL * model.limit, burnt[a:b + 1], forces[a:b + 1])
-        if missed and model.kind == hub.LIST:
+        if missed and hasattr(contact, "bondlist"):
             raise Missing(f"the bond list outgrew {contact.bondlist.shape[1]} entries before sample {b} of the bench; "
                           "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1", "")
         if b in at:
-            states.append((slide[b], contact.stretch.copy() if model.kind == hub.JENKINS else contact.bonds.copy()))
+            shown = model.shown(contact)
+            states.append((slide[b], shown.get("stretch", shown.get("bonds"))))
         if b == last or b - told >= BLOCK:
             watch.tell(b / last)
             told = b
@@ -70,9 +71,9 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
 
 def _with_room(contact, model, slide):
     """The contact with a list of bonds that holds what the samples slide (k,) [m] may add."""
-    have = contact.bondlist.shape[1]
-    if not have:
+    if not hasattr(contact, "bondlist"):
         return contact
+    have = contact.bondlist.shape[1]
     least = max(min(contact.growth[3], contact.growth[4]), 1e-3 * contact.growth[3])
     each = np.minimum(np.ceil(4 * np.abs(np.diff(slide)) / least), 4 * ceil(min(contact.law[6] / least, 1e6)) + 1)
     want = int(contact.tally[1] - contact.tally[0] + (each + AGED_PIECES).sum()) + 256

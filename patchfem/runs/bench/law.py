@@ -2,26 +2,23 @@
 
 import numpy as np
 
+from ...effects import has
+
 
 def law_for(model, patch=None):
     """The NumPy law object of a bench; only an averaged law looks at the patch."""
-    from ...friction.bonds.quadrature import Quadrature
-    from ...friction.bonds.recursion import Recursion
-    from ...friction.laws.coulomb import Coulomb
-    from ...friction.laws.elastic_plastic import ElasticPlastic
-    from ...friction.laws.tanh import Rate
-
     f = model.friction
-    if f.law == "coulomb":
-        return Coulomb(f.kinetic, f.static)
-    if f.law == "elastic-plastic":
-        return ElasticPlastic(f.static, f.bond_length)
-    if f.law == "tanh":
-        return Rate(f.static, f.reference_speed)
-    if f.law == "convolution":
+    if has(f.law, "averaged"):
         from .averaged import law_on
 
         return law_on(model, patch)
+    if not has(f.law, "bonds"):
+        from ...friction.record import law_from
+
+        return law_from(f, patch.pressure.load if patch is not None else model.point.load)
+    from ...friction.bonds.quadrature import Quadrature
+    from ...friction.bonds.recursion import Recursion
+
     law = model.bonds
     engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
@@ -43,7 +40,7 @@ def ends_of_rest(model, slide) -> dict:
     """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
     the first sample of a slide and the last of every rest."""
     f = model.friction
-    if f.law != "coulomb" or not f.kinetic < f.static:
+    if not has(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:
         return {}
     moves = np.sign(np.diff(slide))
     ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))

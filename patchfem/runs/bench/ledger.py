@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...effects import has
+
 ROUND = 1e-13  # of what a law dissipates: created energy below it is round-off
 
 
@@ -57,4 +59,4 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
 def _length(model) -> float:
     """Bond length [m], 0 of a law that does not stretch."""
     f = model.friction
-    return (f.bond_length or 0.0) if f.law != "convolution" else 0.0
+    return (f.bond_length or 0.0) if not has(f.law, "averaged") else 0.0

@@ -6,8 +6,9 @@ carries the load, times their own share of it.
 
 import numpy as np
 
-from ...dynamics.march.models import ContactModel, jenkins_model, list_model, points_model
+from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
 from ...friction.bonds.quadrature import cutoff
+from ...friction.record import law_from
 from .engine import ELEMENTS, Engine
 from .follow import follow
 from .law import pressed
@@ -23,6 +24,9 @@ def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
     done = follow(one_point(model, load, engine), time, slide, frames, watch, model.friction.rest_growth is not None)
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = np.full(time.size, load)
+    if engine.kind == ELEMENTS:  # the law itself tells what does not come back
+        local = np.repeat(done.slip[done.at][:, None], sigma.size, axis=1)
+        return Slid(done.force, loads, done.slip, done.ledger, done.at, tau, local)
     return Slid(done.force, loads, elastic_slip(model, slide, done.force, loads), done.ledger, done.at, tau,
                 local_slip(model, slide[done.at], tau, sigma))
 
@@ -31,7 +35,7 @@ def one_point(model, load: float, engine: Engine) -> ContactModel:
     """One point that carries the whole load [N], as a contact of the compiled loops."""
     f = model.friction
     if engine.kind == ELEMENTS:
-        return jenkins_model([f.static * load / f.bond_length], [f.bond_length])
+        return element_model(law_from(f, load).element(load))
     law, found = model.bonds, engine.choice
     if found.engine == "recursion":
         return points_model(law, [1.0], [load])

@@ -4,6 +4,8 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...dynamics.march.models import jenkins_model, points_model
+from ...effects import has
+from ...friction.record import law_from
 from ...slip.shear_modes import jenkins_set
 from ..fields import element_fields, point_fields
 from ..patch.press import shear_of
@@ -18,7 +20,7 @@ def with_shear(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     if model.side == "lower":
         raise PatchfemError(f"{model.soft} with the pressure on the lower piece: not yet "
                             "built; put the shapes on the upper piece", "")
-    if model.friction.law == "nonlocal":
+    if has(model.friction.law, "bonds"):
         return _points(model, patch, time, slide, frames, watch)
     return _elements(model, patch, time, slide, frames, watch)
 
@@ -26,9 +28,9 @@ def with_shear(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
 def _elements(model, patch, time, slide, frames, watch) -> Slid:
     """Coulomb and elastic-plastic points: parallel elements."""
     f = model.friction
-    if f.law == "coulomb" and f.kinetic < f.static:
+    if has(f.law, "set-valued") and f.kinetic < f.static:
         raise PatchfemError(f"friction.kinetic below static with {model.soft}: not yet built", "")
-    length = f.bond_length if f.law == "elastic-plastic" else 0.0
+    length = law_from(f).element(1.0).length
     found = jenkins_set(patch.giving, f.static * patch.pressure.sigma_n * patch.pieces.interface.weight, length)
     done = follow(jenkins_model(found.stiffness, found.yield_slide), time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...effects import carries, refusal
 from .ledger import Slid, frame_numbers, ledger_of, split
 from .stepped import refuse_costly
 from .watch import BLOCK, Watch
@@ -12,8 +13,8 @@ def refuse(model) -> None:
     """PatchfemError naming what a slide in two directions cannot do yet."""
     f = model.friction
     reason = ""
-    if f.law != "nonlocal":
-        reason = f"law '{f.law}': use law 'nonlocal'"
+    if not carries(f, "two-directions"):
+        reason = f"law '{f.law}': {refusal('two-directions').removesuffix('; not yet built')}"
     elif model.spread is not None:
         reason = "friction.spread, whose width turns with the path: leave one of them out"
     elif f.breakaway:

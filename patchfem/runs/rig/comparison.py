@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError
 from ...dynamics.march.march import hermite_extremes
+from ...effects import has
 from ...response import run_events
 from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
@@ -66,7 +67,7 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     stuck, own = False, {}
     if model.friction is not None:
         values |= other_measures(kept, drive, n)
-        stuck = run_events.all_stick(kept, 0.0) and model.friction.law != "tanh"
+        stuck = run_events.all_stick(kept, 0.0) and not has(model.friction.law, "creeps")
         rings, own = run_events.rings(kept, modes, drive)
         values |= rings
     outcome = _outcome(model, done, response)

@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import BaseSine, Outcome, Start
+from ...effects import has
 from ...response import run_events
 from ...response.levels import Level
 from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
@@ -17,13 +18,13 @@ from .solution import Solution, borne, seen
 from .strips import as_one, other_measures, strip_loads
 
 
-def run_exact(model, numerics, patch, share: float = 1.0, say=None, progress=None):
+def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a Coulomb rig, or of a structure without friction.
 
-    patch: the solved Patch, or None under [normal] or between masses; share: of mu N that the law keeps.
+    patch: the solved Patch, or None under [normal] or between masses.
     """
     rig, drive, modes = model.rig, model.rig.drive, model.rig.modes
-    begin, forces = perf_counter(), forces_of(model, patch, share)
+    begin, forces = perf_counter(), forces_of(model, patch)
     if rig.levels:
         done, levels, slips = _levels(model, numerics, patch, forces, progress, say)
     else:
@@ -41,9 +42,9 @@ def run_exact(model, numerics, patch, share: float = 1.0, say=None, progress=Non
                levels=levels, slips=slips, log=done.log, own=own)
 
 
-def forces_of(model, patch, share: float = 1.0) -> tuple:
-    """(static, kinetic) friction [N] of every interface (i,); share: of mu N that a law without memory keeps."""
-    rig = model.rig
+def forces_of(model, patch) -> tuple:
+    """(static, kinetic) friction [N] of every interface (i,)."""
+    rig, share = model.rig, 1.0
     if rig.strips_slide_apart:
         return tuple(np.array(column) for column in zip(*(model.limits(n) for n in strip_loads(patch))))
     if model.friction is None:
@@ -51,6 +52,10 @@ def forces_of(model, patch, share: float = 1.0) -> tuple:
     if rig.names:
         pairs = [one.limits(one.load) for one in rig.interfaces]
     else:
+        if has(model.friction.law, "averaged"):
+            from ..bench.averaged import limit_share
+
+            share = limit_share(model, patch)
         static, kinetic = model.limits(borne(model, patch))
         pairs = [(static * share, kinetic if model.friction.kinetic is not None else static * share)]
     return tuple(np.array(column) for column in zip(*pairs))

@@ -5,6 +5,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Outcome
+from ...effects import has
 from ...response import run_events
 from ...response.measures import step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
@@ -13,13 +14,6 @@ from ...structure.drive_sizes import omega_of, peak_speed
 from . import levels as rig_levels
 from .solution import Solution, sampled_loop, seen
 from .strips import joined, other_measures
-
-
-def sampled(values: dict) -> dict:
-    """Errors of measures of strips that are read off 400 samples a cycle, by the trapezoidal rule."""
-    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
-    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
-            else 1e-9 * abs(value) for name, value in values.items()}
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -48,10 +42,10 @@ class _Read:
         self.model, self.numerics, self.patch, self.contact, rig = model, numerics, patch, contact, model.rig
         self.held = 0.0  # slip [m] below which a cycle sticks
         if model.friction is not None:
-            stiff = max(float(np.sum(contact.fields.get("stiffness", [0.0]))), 1e-300)
-            length = contact.length or contact.limit / stiff
-            self.held = 1e-3 * length if contact.kind else 1e-15 * peak_speed(rig.drive) * rig.drive.period
-            self.held *= model.friction.law != "tanh"  # a law of the speed never holds
+            least = 1e-15 * peak_speed(rig.drive) * rig.drive.period
+            self.held = least if contact.set_valued else 1e-3 * contact.length
+            self.creeps = has(model.friction.law, "creeps")  # it never holds, nor sticks
+            self.held *= not self.creeps
 
     def solution(self, done, seconds: float, prepare: dict) -> Solution:
         """The Solution of a MarchResult."""
@@ -59,7 +53,7 @@ class _Read:
         rubs, stuck, rings, own = self.model.friction is not None, False, {}, {}
         if rubs:
             rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
-            stuck = run_events.all_stick(done.window, self.held) and self.model.friction.law != "tanh"
+            stuck = run_events.all_stick(done.window, self.held) and not self.creeps
         last = min(window, len(done.amplitudes))
         values = self.values(done, done.amplitudes[-last:], done.response.extra.get("ledger"), stuck) | rings
         levels, slips = self._levels(done) if rig.levels else ((), None)
@@ -74,14 +68,14 @@ class _Read:
         drive, book, known = self.model.rig.drive, part.ledger, {}
         if self.model.friction is None:
             return measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps))
-        if stuck and not self.contact.kind:  # what moves in round-off does not slide
+        if stuck and self.contact.set_valued:  # what moves in round-off does not slide
             known = dict.fromkeys(("slip_start_phase", "equivalent_stiffness", "equivalent_damping"))
             known["stick_fraction"] = 1.0
             moving = self.model.rig.modes.mass * peak_speed(drive, self.model.rig.start)**2
             book = book | {"power": book["power"] + moving}  # its energies are round-off of such a one
         found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps,
                                  loop=self._loop(part), ledger=ledger, known=known))
-        if not self.contact.kind and found["slip_amplitude"] < self.held:  # what moves is round-off
+        if self.contact.set_valued and found["slip_amplitude"] < self.held:  # what moves is round-off
             found = {name: v for name, v in found.items() if not name.startswith("equivalent_")}
         others = not self.model.rig.strips_slide_apart
         return found | (other_measures(part.window, drive, self.numerics.steps) if others else {})

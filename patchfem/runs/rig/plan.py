@@ -2,10 +2,11 @@
 
 from math import inf, pi
 
-from ...model.accuracy import LONGEST, choose, list_cost, quadrature_of
+from ...effects import has
 from ...model.model import Model
 from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
+from .numerics import LONGEST, choose, list_cost, quadrature_of
 
 
 def chain(rig) -> dict:
@@ -24,7 +25,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         return "harmonic", points, 0.3 + 0.05 * points
     steps = int(numerics.cycles * numerics.steps)
     each, points = 1e-6, unknowns.get("interface_points", 1)
-    if f is not None and f.law == "nonlocal":
+    if f is not None and has(f.law, "bonds"):
         if quadrature_of(model, numerics).engine != "recursion":
             entries, seconds = list_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
@@ -70,7 +71,7 @@ def first_words(rig, found: dict) -> list:
 
 def sum_words(model: Model) -> list:
     """Sentences on how the bonds of law 'nonlocal' are summed."""
-    if model.friction is None or model.friction.law != "nonlocal":
+    if model.friction is None or not has(model.friction.law, "bonds"):
         return []
     numerics = choose(model)
     found = quadrature_of(model, numerics)

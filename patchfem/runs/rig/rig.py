@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...model.accuracy import MOST_STEPS, choose, refuse_costly
-from ...model.engine import COMPARED, set_valued
-from ...response.errors import change, step_error, with_errors
+from ...effects import has, listed
+from ...friction.record import law_from
+from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
+from ..errors import estimate
 from ..fields import element_fields, point_fields
 from ..result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
-from .march import created_warning, run_march, sampled
+from .engines import ENGINES, Variant
+from .march import created_warning
+from .numerics import MOST_STEPS, choose, refuse_costly
+from .solution import curve_measures
 
 
 def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
@@ -24,23 +28,17 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         raise PatchfemError("the drive pushes no mode, so nothing moves; give a mode its share of it, base or output",
                             "drive.kind")
     extra = {"engine": numerics.engine, "cycles": numerics.cycles, "window": numerics.window}
-    lumps = f is not None and f.law != "convolution"
+    lumps = f is not None and not has(f.law, "averaged")
     moves = rig.load_varies or rig.strips_slide_apart
     if patch is not None and lumps and not model.soft and not numerics.per_point and not moves:
         warnings = [*warnings, "nothing spatial acts on the motion: with a rigid slide, constant load and the pressure "
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
-    if numerics.engine == "exact":
-        raw, found = _exact(model, numerics, patch, coarse[0] if estimate else None, seconds, say, progress)
-    elif numerics.engine == "harmonic":
-        from .steady import curve_measures, steady
-
-        raw, errors, more = steady(model, numerics, patch, say)
-        seconds["march"] = raw.seconds
-        found, extra = with_errors(raw.values, errors) | curve_measures(more), extra | more
-        drive = extra.pop("at", drive)
-    else:
+    if numerics.engine == "march":
         refuse_costly(model, numerics)
-        raw, numerics, found = _marched(model, numerics, patch, coarse, seconds, say, progress, estimate)
+    raw, numerics, found = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
+    extra |= raw.extra
+    drive = extra.pop("at", drive)
+    if numerics.engine not in ("exact", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
         from . import levels
@@ -67,10 +65,10 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 def _said(model, patch, raw, outcome, found) -> list:
     """Warnings of the law and of the load, in this run."""
     f, out = model.friction, warming(model, patch, raw.response, raw.book["friction"])
-    if f is not None and f.law == "tanh":
-        out = [*out, "law 'tanh' never holds: under a steady half of the limit it creeps at "
+    if f is not None and has(f.law, "creeps"):
+        out = [*out, f"law '{f.law}' never holds: under a steady half of the limit it creeps at "
                f"{0.5493 * f.reference_speed:.3g} m/s"]
-    if f is not None and f.law == "nonlocal":
+    if f is not None and has(f.law, "bonds"):
         law = model.bonds
         out = [*out, *unripe(law, float(np.abs(raw.window.slide_rate).max())), *creeping(law, outcome, found)]
     out = [*out, *created_warning(model, raw.book, model.rig.cycles)]
@@ -81,100 +79,54 @@ def _said(model, patch, raw, outcome, found) -> list:
     return out
 
 
-def _exact(model, numerics, patch, coarse, seconds, say, progress) -> tuple:
-    """(Raw of the exact engine, measures with errors): those of the mesh, where the loads of strips or the limit of an
-    averaged law come from it."""
-    from .exact import run_exact
+def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
+    """(Solution of the chosen engine, its numerics, measures with errors on the engine's ladder of coarser runs).
 
-    apart = model.rig.strips_slide_apart
-    share, rough = _shares(model, patch, coarse)
-    raw = run_exact(model, numerics, patch, share, say, progress)
-    seconds["march"] = raw.seconds
-    errors = [sampled(raw.values)] if apart else []
-    if apart and coarse is not None:
-        other = run_exact(model, numerics, coarse, 1.0, say)
-        errors, seconds["error"] = [*errors, change(raw.values, other.values)], other.seconds
-    if rough is not None:
-        other = run_exact(model, numerics, coarse, rough)
-        errors, seconds["error"] = [change(raw.values, other.values)], other.seconds
-    return raw, with_errors(raw.values, *errors, least=1e-9)
+    Steps that the scene does not pin are halved until the error of the displacement is met.
+    """
+    engine, frames, made = ENGINES[numerics.engine], FRAMES if patch is not None else 0, {}
+    go = engine.run
+    found = go(model, numerics, patch, frames, say, progress)
+    seconds |= {"march": found.seconds} | (found.prepare or {})
+    if not estimated or found.outcome is Outcome.NOT_CONVERGED:
+        return found, numerics, with_errors(found.values) | curve_measures(found.extra)
 
+    def solve(variant):
+        return go(model, variant.numerics, variant.patch)
 
-def _shares(model, patch, coarse) -> tuple:
-    """Shares of mu N that limit a rigid block, on the mesh of the patch and on the coarser one, None where it is 1."""
-    if model.friction is None or model.friction.law != "convolution":
-        return 1.0, None
-    from ..bench.averaged import limit_share
-
-    return limit_share(model, patch), None if coarse is None else limit_share(model, coarse)
-
-
-def _marched(model, numerics, patch, coarse, seconds, say, progress, estimate) -> tuple:
-    """The march with its error: half and a quarter of the steps, a coarser mesh, fewer shear modes; an automatic step
-    is halved until the error of the displacement is met."""
-    frames = FRAMES if patch is not None else 0
-    go = run_march
-    if numerics.engine in COMPARED:
-        from .comparison import run_comparison as go
-    raw = go(model, numerics, patch, frames, say, progress)
-    seconds |= {"march": raw.seconds, "reduce": raw.prepare["reduce"], "load": raw.prepare["load"], "error": 0.0}
-    if not estimate or raw.outcome is Outcome.NOT_CONVERGED:
-        return raw, numerics, with_errors(raw.values)
-    half, quarter = (go(model, replace(numerics, steps=max(1, numerics.steps // k)), patch)
-                     for k in (2, 4))
-    seconds["error"] += half.seconds + quarter.seconds
-    rest = _space_errors(model, numerics, patch, coarse, quarter, seconds)
-    tolerance = model.accuracy.tolerance
+    space, spent = estimate(solve, found.values, engine.in_space(model, numerics, patch, coarse, found), made)
     while True:
-        step = step_error(raw.values, half.values, quarter.values, numerics.steps)
-        if set_valued(model, numerics):
-            step = _beside(step, raw, lambda n, s=numerics: go(model, replace(s, steps=n), patch),
-                           numerics.steps)
-        found = with_errors(raw.values, step, *rest, least=1e-9)
-        main = found["relative_displacement_amplitude"]
-        if raw.levels:
-            from .levels import with_errors as level_errors
-
-            raw = replace(raw, levels=level_errors(raw.levels, half.levels, quarter.levels, numerics.steps))
-        met = main.error <= tolerance * abs(main.value) + main.floor
-        again = numerics.steps * 2
-        if met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
-                or raw.outcome is Outcome.EXCEEDS_TRAVEL:
-            return raw, numerics, found
-        half, quarter, numerics = raw, half, replace(numerics, steps=again)
-        seconds["error"] += raw.seconds
-        raw = go(model, numerics, patch, frames, say, progress)
-        seconds["march"] = raw.seconds
+        time, more = estimate(solve, found.values, engine.in_time(model, numerics, patch), made)
+        spent += more
+        measures = with_errors(found.values, *time, *space, least=engine.least)
+        if found.levels and time:
+            rung = engine.in_time(model, numerics, patch)[0]
+            found = replace(found, levels=_level_errors(found, rung, made, numerics))
+        if _enough(model, numerics, found, measures) or not time:
+            if spent:
+                seconds["error"] = spent
+            return found, numerics, measures | curve_measures(found.extra)
+        made[Variant(numerics, patch)] = found
+        spent += found.seconds
+        numerics = replace(numerics, steps=2 * numerics.steps)
+        found = go(model, numerics, patch, frames, say, progress)
+        seconds["march"] = found.seconds
 
 
-def _beside(step: dict, raw, run, steps: int) -> dict:
-    """Errors of a march of set-valued friction: where in a step a slide reverses is chance, so its error does not fall
-    evenly; runs at 15/16, 7/8 and 3/4 of the steps show its size. Three halves of the largest change count."""
-    out = dict(step)
-    for share in (15 / 16, 7 / 8, 3 / 4):
-        for name, gap in change(raw.values, run(max(4, round(share * steps))).values).items():
-            out[name] = max(out.get(name, 0.0), 1.5 * gap)
-    return out
+def _level_errors(found, rung, made: dict, numerics):
+    """The levels of a Solution with the errors of the time step."""
+    from .levels import with_errors as level_errors
+
+    half, quarter = (made[variant].levels for variant in rung.runs[:2])
+    return level_errors(found.levels, half, quarter, numerics.steps)
 
 
-def _space_errors(model, numerics, patch, coarse, quarter, seconds) -> list:
-    """Errors of the mesh and of the shear modes, both at a quarter of the steps."""
-    out = []
-    few = replace(numerics, steps=max(1, numerics.steps // 4))
-    if coarse[0] is not None and model.rig.load_varies:
-        rough = run_march(model, few, coarse[0])
-        out.append(change(quarter.values, rough.values))
-        seconds["error"] += rough.seconds
-    elif coarse[0] is not None and model.soft:
-        rough = run_march(model, few, coarse[0])
-        out.append(change(quarter.values, rough.values))
-        seconds["error"] += rough.seconds
-    shape = getattr(getattr(quarter.contact, "reduction", None), "stiffness", None)
-    if shape is not None and (model.rig.load_varies or (coarse[0] is not None and model.friction.law == "nonlocal")):
-        fewer = run_march(model, replace(few, shear_modes=max(1, shape.size // 2)), patch)
-        out.append(change(quarter.values, fewer.values))
-        seconds["error"] += fewer.seconds
-    return out
+def _enough(model, numerics, found, measures) -> bool:
+    """Whether the error of the displacement is met, or the steps cannot be halved again."""
+    main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
+    met = main.error <= model.accuracy.tolerance * abs(main.value) + main.floor
+    return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
+        or found.outcome is Outcome.EXCEEDS_TRAVEL
 
 
 def _rig_fields(model, numerics, patch, raw) -> dict:
@@ -189,7 +141,7 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
-        if f is not None and f.law == "convolution":
+        if f is not None and has(f.law, "averaged"):
             from ..bench.averaged import limit_tractions
 
             tau = limit_tractions(model, patch, raw.window.force[at])
@@ -198,10 +150,10 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
-    if f.law == "nonlocal" and f.reading == "stretch" and f.order == 1 and (shear or numerics.per_point):
+    if has(f.law, "bonds") and not listed(f) and (shear or numerics.per_point):
         tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
-        length = f.bond_length if f.law == "elastic-plastic" else 0.0
+        length = 0.0 if raw.model.reduction is None else law_from(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
         tau, local = element_fields(patch, raw.contact.reduction, states, length)
     else:

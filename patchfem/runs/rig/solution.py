@@ -1,10 +1,10 @@
 """What an engine gives back, and the last cycles as the measures see them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core import Outcome, Response
+from ...core import Measure, Outcome, Response
 from ...response.measures import harmonic
 from ...response.rows import Seen, measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
@@ -18,7 +18,8 @@ class Solution:
     steady: (steady amplitude, error) or (None, None); outcome: None where the amplitudes decide; snapshots of the
     interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
     levels, slips: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
-    [m] below which a cycle sticks; own: what the run itself leaves open of its measures.
+    [m] below which a cycle sticks; own: what the run itself leaves open of its
+    measures; errors: by measure, where the engine has them itself; extra: for the report.
     """
 
     values: dict
@@ -39,6 +40,8 @@ class Solution:
     notes: tuple = ()
     held: float = 0.0
     own: dict | None = None
+    errors: dict | None = None
+    extra: dict = field(default_factory=dict)
 
 
 def borne(model, patch) -> float | None:
@@ -67,4 +70,15 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     return window.slide, slide, pull, work
 
 
-__all__ = ["Solution", "borne", "measures_of", "sampled_loop", "seen"]
+def curve_measures(extra: dict) -> dict:
+    """Measures of a curve: where its largest amplitude lies."""
+    curve = extra.get("curve")
+    if curve is None:
+        return {}
+    finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
+    k = int(np.argmax(finite))
+    spacing = float(np.abs(np.diff(curve["frequency"])).max(initial=0.0))
+    return {"peak_frequency": Measure(float(curve["frequency"][k]), "Hz", spacing, spacing)}
+
+
+__all__ = ["Solution", "borne", "curve_measures", "measures_of", "sampled_loop", "seen"]

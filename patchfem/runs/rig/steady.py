@@ -9,9 +9,9 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import BaseSine, Measure, Outcome, PatchfemError
-from ...model.engine import no_closed_form
+from ...core import BaseSine, Outcome, PatchfemError
 from ...response.rows import measures_of
+from .engines import no_closed_form
 from .solution import Solution, sampled_loop, seen
 from .strips import other_measures
 
@@ -19,29 +19,18 @@ SAMPLES = 1024  # of the cycle that measures are read off
 POINTS = 121  # of a curve by the event map
 
 
-def refuse(rig) -> None:
-    """PatchfemError where no steady motion can be asked for."""
-    if rig.kind == "free" or rig.waveform not in ("sine", "sweep", "levels"):
-        raise PatchfemError("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over "
-                            "levels; use method = \"march\"", "accuracy.method")
-    if rig.waveform == "sweep" and rig.drive.displacement is not None:
-        raise PatchfemError("'harmonic' keeps the acceleration over a sweep; give drive.acceleration",
-                            "accuracy.method")
-
-
-def steady(model, numerics, patch, say=None):
-    """(Solution, errors by measure, extra for the report) of the steady motion at a sine, or of the largest on a curve
-    over a sweep or over levels, whose sine is extra["at"]."""
+def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """The steady motion at a sine, or the largest on a curve over a sweep or over levels, whose sine is extra["at"]."""
     drive = model.rig.drive
-    refuse(model.rig)
     sine = drive if isinstance(drive, BaseSine) else None
     exact = model.friction is None or not no_closed_form(model, steady=True)
     finder = (_Events if exact else _Balance)(model, numerics, patch, say)
     if sine is not None:
-        return finder.point(sine)
+        raw, errors, extra = finder.point(sine)
+        return replace(raw, errors=errors, extra=extra)
     curve, best, near = finder.curve(drive)
     raw, errors, extra = finder.point(best, near)
-    return raw, errors, extra | {"curve": curve, "at": best}
+    return replace(raw, errors=errors, extra=extra | {"curve": curve, "at": best})
 
 
 def drives_of(drive, count: int) -> list:
@@ -206,15 +195,3 @@ class _Balance:
                  "folds": np.array(branch.folds)}
         best = branch.points[int(np.argmax(amplitude))]
         return curve, BaseSine(best.level, best.omega, drive.moving), best
-
-
-def curve_measures(extra: dict) -> dict:
-    """Measures of a curve: where its largest amplitude lies."""
-    curve = extra.get("curve")
-    if curve is None:
-        return {}
-    finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
-    k = int(np.argmax(finite))
-    spacing = float(np.abs(np.diff(curve["frequency"])).max(initial=0.0))
-    return {"peak_frequency": Measure(float(curve["frequency"][k]), "Hz", spacing, spacing)}
-

@@ -1,5 +1,6 @@
 """Rules of [accuracy]: methods, what each of them can do, and the keys that a method does not use."""
 
+from ...effects import carries, has
 from .draft import Draft
 from .limits import NOT_YET_BUILT
 
@@ -14,7 +15,7 @@ def _method(draft: Draft, kind: str) -> None:
     if method != "exact" or kind != "rig" or law is None or law.law is None:
         return
     shear = contact.gives_way if contact is not None else ""
-    if law.law not in ("coulomb", "convolution") or shear:
+    if not carries(law, "exact") or shear:
         beside = f" beside {shear}" if shear else ""
         draft.say("accuracy.method", f"no exact solution exists for law '{law.law}'{beside}; use 'march' or leave "
                                      "method out")  # fmt: skip
@@ -33,8 +34,8 @@ def _harmonic(draft: Draft) -> None:
     bends = "[structure.stiffening]" if structure.stiffening is not None else ""
     if structure.bonded is not None and structure.bonded.wavelength is not None:
         bends = "structure.bonded.wavelength"
-    rigid = law is not None and law.law in ("coulomb", "convolution")
-    if bends and (rigid or any(one.law in ("coulomb", "convolution") for one in structure.interface)):
+    laws = [one.law for one in (law, *structure.interface) if one is not None]
+    if bends and any(has(one, "set-valued") for one in laws):
         draft.say("accuracy.method", f"'harmonic' with a law that jumps beside {bends}: use 'march', or law "
                                      "'elastic-plastic' with a short bond_length; not yet built")  # fmt: skip
 
@@ -45,7 +46,7 @@ def _quadrature(draft: Draft, kind: str) -> None:
     engine = accuracy and accuracy.quadrature
     if engine in (None, "auto") or f"accuracy.quadrature={engine}" in NOT_YET_BUILT:
         return
-    if law is None or law.law != "nonlocal" or kind not in ("bench", "rig"):
+    if law is None or not has(law.law, "bonds") or kind not in ("bench", "rig"):
         draft.remark(f"accuracy.quadrature = '{engine}' has no meaning without law 'nonlocal' and is not used")
         return
     alone = law.reading == "stretch" and law.order == 1

@@ -6,6 +6,7 @@ what was written. A rule says every mistake it finds and stays silent about valu
 
 from __future__ import annotations
 
+from ...effects import has
 from ..tables import Friction
 from .accuracy import _method, _quadrature
 from .contact import _contact, _load_line
@@ -51,10 +52,7 @@ def _slide(draft: Draft) -> None:
 
 
 def _ageless(law: Friction) -> bool:
-    ageless = ("coulomb", "elastic-plastic", "convolution")
-    return law.law in ageless or (law.law == "nonlocal" and law.rest_growth is None)
-
-
+    return has(law.law, "timeless") or (has(law.law, "bonds") and law.rest_growth is None)
 
 
 def _kind(draft: Draft) -> str:

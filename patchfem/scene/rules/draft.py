@@ -4,20 +4,12 @@ from typing import Any, Protocol
 
 from pydantic import BaseModel
 
+from ... import effects
 from ..tables import Tables
 from ..types import keys
 
 # selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
-LAWS: dict[str, tuple[str, str]] = {
-    "coulomb": ("", "kinetic"),
-    "tanh": ("reference_speed", ""),
-    "elastic-plastic": ("bond_length", ""),
-    "nonlocal": (
-        "bond_length",
-        "kinetic reading order rest_growth slip_growth rest_speed initial_bonds breakaway spread temperature",
-    ),
-    "convolution": ("bond_length", "order spread"),
-}
+LAWS: dict[str, tuple[str, str]] = {name: law.keys for name, law in effects.LAWS.items()}
 SLIDES: dict[str, tuple[str, str]] = {
     "constant": ("speed distance", ""),
     "sine": ("amplitude frequency", "cycles"),

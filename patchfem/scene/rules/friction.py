@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ...effects import has, takes, using
 from ..tables import Friction
 from .draft import LAWS, Draft, _needs
 
@@ -15,8 +16,8 @@ def check_spread(draft: Draft, at: str, law: Friction) -> None:
     """Say a spread beside a law without bonds, or over a width that is not known."""
     if law.spread is None:
         return
-    if law.law not in ("nonlocal", "convolution", None):
-        draft.say(f"{at}.spread", f"law '{law.law}' has no bonds to spread; spread belongs to nonlocal and convolution")
+    if not takes(law.law, "spread"):
+        draft.say(f"{at}.spread", f"law '{law.law}' has no bonds to spread; spread belongs to {using('spread')}")
     elif at == "friction" and draft.tables.normal is not None and not draft.given("normal.width"):
         draft.lacks("normal.width", "friction.spread needs it")
 
@@ -32,7 +33,7 @@ def remark_temperature(draft: Draft, at: str, law: Friction) -> None:
 
 def temperature_unused(law: Friction) -> bool:
     """Whether a surface temperature stands where it changes no growth."""
-    if law.temperature is None or law.law != "nonlocal":
+    if law.temperature is None or not has(law.law, "bonds"):
         return False
     still = not law.temperature.rest_activation and not law.temperature.slip_activation
     return still or (law.rest_growth is None and law.slip_growth is None)
@@ -48,8 +49,8 @@ def _frictions(draft: Draft) -> None:
 
 def _friction(draft: Draft, at: str, law: Friction) -> None:
     _needs(draft, at, law, "law", LAWS)
-    if draft.given(f"{at}.kinetic") and law.law not in ("coulomb", "nonlocal", None):
-        draft.say(f"{at}.kinetic", f"law '{law.law}' has one coefficient only; kinetic belongs to coulomb and nonlocal")
+    if draft.given(f"{at}.kinetic") and not takes(law.law, "kinetic"):
+        draft.say(f"{at}.kinetic", f"law '{law.law}' has one coefficient only; kinetic belongs to {using('kinetic')}")
     elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is wanted")
     elif kinetic_unused(law):
@@ -59,15 +60,15 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
         if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
             draft.lacks(f"{at}.{other}", f"{key} needs it; leave both out for a constant bond length")
-    printed = law.reading != "stretch" or law.law == "convolution"
+    printed = law.reading != "stretch" or has(law.law, "averaged")
     if law.order is not None and (law.order <= -1 or (law.order < 0 and not printed)):
         wanted = ">= 0 (reading 'stretch')" if not printed else "> -1 (reading 'report')"
-        wanted = "> -1" if law.law == "convolution" else wanted
+        wanted = "> -1" if has(law.law, "averaged") else wanted
         draft.say(f"{at}.order", f"must be {wanted}, not {law.order}")
     if law.breakaway and law.reading == "report":
         draft.say(f"{at}.breakaway", "the law as printed (reading 'report') has none; use 'stretch' or leave it out")
     contact = draft.tables.contact
-    if law.reading == "report" and law.law in ("nonlocal", None) and contact and contact.gives_way:
+    if law.reading == "report" and (law.law is None or has(law.law, "bonds")) and contact and contact.gives_way:
         draft.say(f"{at}.reading", f"'report' is refused beside {contact.gives_way}; use 'stretch' or leave it out")
     if law.static == 0 and contact and contact.gives_way:
         draft.say(f"{at}.static", f"0 beside {contact.gives_way}: no point carries friction; static > 0 is wanted, or "
@@ -77,4 +78,4 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
 def kinetic_unused(law: Friction) -> bool:
     """Whether a smaller kinetic coefficient stands where no bond ever changes its length."""
     weaker = law.kinetic is not None and law.static is not None and law.kinetic < law.static
-    return weaker and law.law == "nonlocal" and law.rest_growth is None and law.slip_growth is None
+    return weaker and has(law.law, "bonds") and law.rest_growth is None and law.slip_growth is None

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from ...effects import carries, has, listed, named, refusal
 from ..tables import Contact, Friction, Tables
 
 if TYPE_CHECKING:
@@ -49,11 +50,11 @@ def combinations(draft: Draft, kind: str) -> None:
     """Say every combination of built keys that a run of this kind cannot do yet; silent about values not there."""
     contact, law = draft.tables.contact, draft.tables.friction
     shear = contact.gives_way if contact is not None else ""
-    if kind not in ("bench", "rig") or law is None:
+    if kind not in ("bench", "rig") or law is None or law.law is None:
         return
     if kind == "rig" and (cause := _changing_load(draft)):
         _under_changing_load(draft, law, shear, cause)
-    if kind == "rig" and law.law == "nonlocal" and law.breakaway and law.order != 1:
+    if kind == "rig" and has(law.law, "bonds") and law.breakaway and law.order != 1:
         draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
     if kind == "rig":
         _yawing(draft, law, contact)
@@ -63,8 +64,8 @@ def combinations(draft: Draft, kind: str) -> None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
         if contact.strips is not None and shear:
             draft.say("contact.strips", f"beside {shear}: leave one of them out; not yet built")
-        elif contact.strips is not None and law.law == "convolution":
-            draft.say("contact.strips", "beside law 'convolution': leave it out; not yet built")
+        elif contact.strips is not None and has(law.law, "averaged"):
+            draft.say("contact.strips", f"beside law '{law.law}': leave it out; not yet built")
 
 
 def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
@@ -77,10 +78,8 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
     if contact is None or contact.strips is None:
         draft.say(key, "turns the patch about its normal: name [contact.strips], which slide each by themselves")
         return
-    listed = law.law == "nonlocal" and (law.reading == "report" or law.order not in (1, None))
-    if listed or law.law == "convolution":
-        draft.say(key, "beside strips takes law 'coulomb', 'tanh', 'elastic-plastic' or 'nonlocal' of reading "
-                       "'stretch' with order = 1; not yet built")  # fmt: skip
+    if not carries(law, "joints"):
+        draft.say(key, f"beside strips with {named(law)}: {refusal('joints')}")
     accuracy = draft.tables.accuracy
     if accuracy is not None and accuracy.method not in ("auto", "march", "exact", None):
         draft.say("accuracy.method", f"'{accuracy.method}' beside strips that yaw: use 'march'; not yet built")
@@ -105,19 +104,19 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     if contact is None and cause != "normal.amplitude":
         draft.say(cause, "one rigid point leaves no room for heave or pitch: name [contact] in place of [normal]")
     accuracy = draft.tables.accuracy
-    if accuracy is not None and accuracy.method == "exact" and law.law == "coulomb" and not shear:
+    if accuracy is not None and accuracy.method == "exact" and carries(law, "exact") and not shear:
         draft.say("accuracy.method", f"no exact solution exists {beside}; use 'march' or leave method out")
     if accuracy is not None and accuracy.method in ("duhamel", "newmark", "euler", "harmonic"):
         draft.say("accuracy.method", f"'{accuracy.method}' {beside} takes the load as constant: use 'march'; not yet "
                                      "built")  # fmt: skip
-    if law.law == "convolution":
-        draft.say("friction.law", f"'convolution' {beside}: use another law; not yet built")
-    elif law.law == "nonlocal" and (law.reading == "report" or law.order not in (1, None) or law.breakaway):
+    if not has(law.law, "bonds") and not carries(law, "varying-load"):
+        draft.say("friction.law", f"'{law.law}' {beside}: {refusal('varying-load')}")
+    elif listed(law) or (has(law.law, "bonds") and law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", f"{beside}: use reading = \"stretch\" with order = 1 and no breakaway; not yet "
                                      "built")  # fmt: skip
-    if shear and law.law == "coulomb":
-        draft.say("friction.law", f"'coulomb' {beside} and {shear}: use law 'elastic-plastic' with a short "
+    if shear and has(law.law, "set-valued") and carries(law, "shear"):
+        draft.say("friction.law", f"'{law.law}' {beside} and {shear}: use law 'elastic-plastic' with a short "
                                   "bond_length, which is Coulomb behind stiff springs; not yet built")  # fmt: skip
     if structure is not None and structure.stiffening is not None:
         draft.say("structure.stiffening", f"{beside}: leave one of them out; not yet built")
@@ -137,11 +136,11 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
     least = -1 if law.reading == "report" else 0
-    if law.law == "nonlocal" and law.order != 1 and (law.order == 0 or _inside(law.order, least)):
+    if has(law.law, "bonds") and law.order != 1 and (law.order == 0 or _inside(law.order, least)):
         draft.say("friction.order", f"{law.order:g} beside {shear}: use order = 1; not yet built")
-    if law.law in ("tanh", "convolution"):
-        draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out; not yet built")
-    if law.law == "coulomb" and law.static is not None and _inside(law.kinetic, -1, law.static):
+    if not has(law.law, "bonds") and not carries(law, "shear"):
+        draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out, or {refusal('shear')}")
+    if has(law.law, "set-valued") and law.static is not None and _inside(law.kinetic, -1, law.static):
         draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside {shear}: leave kinetic "
                                       "out; not yet built")  # fmt: skip
 
@@ -152,13 +151,11 @@ def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
         return f"beside {shear}"
     if kind == "bench":
         return ""
-    if law.law in ("coulomb", "tanh", "elastic-plastic", "convolution"):
+    if not has(law.law, "bonds"):
         return f"in a rig with law '{law.law}'"
-    if law.law == "nonlocal" and law.reading == "report":
+    if law.reading == "report":
         return "in a rig with reading 'report'"
-    if law.law == "nonlocal" and law.order is not None and law.order != 1:
-        return f"in a rig with order = {law.order:g}"
-    return ""
+    return f"in a rig with order = {law.order:g}" if listed(law) else ""
 
 
 def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:

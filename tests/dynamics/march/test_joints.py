@@ -7,13 +7,17 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, Start
 from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.march.joints import SlotsModel, bonds, coulomb, cubic, elastic_plastic, interlock, rate
+from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
 from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws import elastic_plastic_kernels as kernels
+from patchfem.friction.laws.coulomb import Coulomb
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic, parallel
+from patchfem.friction.laws.stretch import points_element
+from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import release
 
 OMEGA = 2 * np.pi * 143
@@ -38,6 +42,25 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
                       shape[0], mass, None, rows, shapes=shape)
 
 
+ALL = tuple(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh"))
+
+
+def coulomb(port, static, kinetic):
+    return Joint(port, Coulomb(kinetic, static).element(1.0))
+
+
+def elastic_plastic(port, limit, length):
+    return Joint(port, ElasticPlastic(limit, length).element(1.0))
+
+
+def bonds(port, law, load):
+    return Joint(port, points_element(law, [1.0], [load]))
+
+
+def rate(port, limit, speed):
+    return Joint(port, Rate(limit, speed).element(1.0))
+
+
 def one(omega=OMEGA, zeta=0.003):
     unit = np.ones(1)
     return ModalBasis(("axial",), omega * unit, zeta * unit, unit, unit, unit, 1.0)
@@ -56,8 +79,8 @@ PAIRS = {
 def test_exact_one_element_is_the_contact_of_its_own_loop(law):
     model, element = PAIRS[law]
     alone = march(one(), DRIVE, model, 6, 100, window=6)
-    turns = march(one(), DRIVE, SlotsModel(None, (element(),), np.ones((1, 1)), 49.0), 6, 100, window=6)
-    as_patch = march(one(), DRIVE, SlotsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0), 6, 100,
+    turns = march(one(), DRIVE, JointsModel(None, (element(),), np.ones((1, 1)), 49.0), 6, 100, window=6)
+    as_patch = march(one(), DRIVE, JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0), 6, 100,
                      window=6)
     scale = np.abs(alone.response.slide).max()
     for other in (turns, as_patch):
@@ -78,7 +101,7 @@ def test_exact_potential_springs_keep_their_energy_and_find_their_period(element
     """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
     start, errors = Start(np.array([1.0]), np.zeros(1)), []
     for steps in (20, 100, 500):
-        model = SlotsModel(None, (element,), np.ones((1, 1)), 1.0)
+        model = JointsModel(None, (element,), np.ones((1, 1)), 1.0)
         got = march(one(0.0, 0.0), release(2 * np.pi), model, 30, steps, window=30, start=start)
         assert got.outcome is None
         assert got.ledger["work_in"] == pytest.approx(got.ledger["stored"], rel=1e-9)
@@ -115,7 +138,7 @@ def test_order_three_masses_with_three_unlike_interfaces():
     laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
     truth = by_dop853(modes, drive, [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)], 4 * drive.period,
                       np.linspace(0, 4 * drive.period, 101))
-    model = SlotsModel(None, tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)), modes.interfaces, 1.0)
+    model = JointsModel(None, tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)), modes.interfaces, 1.0)
     errors = []
     for steps in (100, 200, 400, 800):
         got = march(modes, drive, model, 4, steps, window=4)
@@ -134,7 +157,7 @@ def test_exact_two_alike_interfaces_stop_together():
     modes = chain([1.0, 0.0])
     both = ModalBasis(("1", "2"), np.ones(2), np.full(2, 0.003), np.array([1.0, 0]), np.ones(2), np.array([1.0, 0]),
                       1.0, None, np.eye(2))
-    model = SlotsModel(None, (coulomb(0, 0.8, 0.8), coulomb(1, 0.8, 0.8)), np.eye(2), 1.0)
+    model = JointsModel(None, (coulomb(0, 0.8, 0.8), coulomb(1, 0.8, 0.8)), np.eye(2), 1.0)
     got = march(both, BaseSine(1.0, 1.0), model, 30, 200)
     alone = march(one(1.0), BaseSine(1.0, 1.0), coulomb_model(0.8, 0.8), 30, 200)
     assert np.array_equal(*got.response.extra["slides"].T)
@@ -158,8 +181,8 @@ def test_always_energy_closes_and_friction_only_takes(seed):
               "tanh": lambda p: rate(p, limit[p], length[p])}
     elements = [makers[kind](p) for p, kind in enumerate(kinds)]
     elements += [cubic(0, rng.uniform(0, 3)), interlock(n - 1, rng.uniform(0, 3), rng.uniform(0.5, 5))]
-    got = march(modes, BaseSine(1.0, rng.uniform(0.3, 3.0)), SlotsModel(None, tuple(elements), modes.interfaces, 1.0),
-                5, int(rng.integers(20, 120)))
+    got = march(modes, BaseSine(1.0, rng.uniform(0.3, 3.0)), JointsModel(None, tuple(elements), modes.interfaces, 1.0,
+                                                                             ALL), 5, int(rng.integers(20, 120)))
     assert got.outcome is None, got.message
     book = got.ledger
     miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
@@ -177,7 +200,7 @@ def test_exact_strips_that_yaw_are_those_of_the_event_engine():
     modes = ModalBasis(("axial", "yaw"), omega, np.full(2, 0.003), faces[0], unit, unit, 0.884, None, faces)
     limit = 34.7 * np.linspace(0.2, 1.8, 8) / 8
     elements = tuple(coulomb(k, f, f) for k, f in enumerate(limit))
-    got = march(modes, DRIVE, SlotsModel(None, elements, faces, 43.0), 30, 800, window=5)
+    got = march(modes, DRIVE, JointsModel(None, elements, faces, 43.0), 30, 800, window=5)
     truth = simulate(modes, DRIVE, limit, limit, 30, 5)
     assert got.outcome is None
     assert got.amplitudes[-5:] == pytest.approx(truth.amplitudes[-5:], rel=2e-3)
@@ -186,11 +209,11 @@ def test_exact_strips_that_yaw_are_those_of_the_event_engine():
 
 def test_exact_iwan_elements_wipe_out_a_minor_loop():
     """A hundred parallel elements, limits spread evenly, along 0 .8 .2 .6 .2 .8 -.8 .8: forces, loss of a cycle."""
-    stiffness, limit, now = np.full(100, 0.01), (np.arange(100) + 0.5) / 100, np.zeros(3)
-    kernels, stretch, forces, lost = load("friction.bonds.point_kernels"), np.zeros(100), [], 0.0
+    element = parallel(np.full(100, 0.01), (np.arange(100) + 0.5) / 100)
+    num, mem, forces, lost = element.numbers[None], element.memory[None].copy(), [], 0.0
     for dq in np.diff([0, 0.8, 0.2, 0.6, 0.2, 0.8, -0.8, 0.8]):
-        burnt = kernels.jenkins_step(dq, stretch, stiffness, limit, now)
-        forces.append(now[0])
+        burnt = kernels.commit(num, mem, 0, dq, 0.0, 0.0, 0.0, 1.0, 0.0)
+        forces.append(kernels.state(num, mem, 0, 0.0, 0.0)[0])
         lost = lost + burnt if dq in (-1.6, 1.6) else 0.0
     assert forces == pytest.approx([0.48, -0.03, 0.33, -0.03, 0.48, -0.48, 0.48], abs=1e-12)
     assert lost == pytest.approx(0.34136, abs=1e-12)
@@ -207,7 +230,7 @@ def test_exact_an_elastic_rod_on_a_friction_bed():
                         modes.interfaces[0], 1.0, None, modes.interfaces)
     limit = np.full(n, h)
     limit[0] = h / 2
-    model = SlotsModel(None, tuple(coulomb(k, f, f) for k, f in enumerate(limit)), modes.interfaces, 1.0)
+    model = JointsModel(None, tuple(coulomb(k, f, f) for k, f in enumerate(limit)), modes.interfaces, 1.0)
     got = march(pulled, drive, model, 2, 1500, window=1)
     assert got.outcome is None
     swing = np.ptp(got.window.slide) / 2

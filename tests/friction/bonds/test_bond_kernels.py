@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from list_paths import energy_by_hand, follow_list
 from scipy.special import gammainc
 
-from patchfem.dynamics.march.models import growth_numbers
 from patchfem.friction.bonds import bond_kernels, bond_math_kernels
 from patchfem.friction.bonds.bond_list import law_numbers, room, share_table
 from patchfem.friction.bonds.engines import choose
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.stretch import growth_numbers
 
 ONE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem import closed_forms
-from patchfem.dynamics.march import loop_kernels, step_kernels
-from patchfem.dynamics.march.models import points_model
+from patchfem.dynamics.march.models import load_kernels, points_model
 from patchfem.friction.bonds.parameters import Bonds, elastic_part
 from patchfem.friction.bonds.point_kernels import loose_mean, loose_step
 from patchfem.friction.bonds.quadrature import Quadrature
@@ -60,9 +59,9 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     law = bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
     model = points_model(law, [1.0], [1.0])
-    contact, work = model.build(loop_kernels)
+    contact, work = model.build()
     burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    assert loop_kernels.follow_path(path, 1.0, model.kind, contact, work, 1e-12, burnt, forces) == 0
+    assert load_kernels().follow_path(path, 1.0, model.kind, contact, work, 1e-12, burnt, forces) == 0
     run = walk(Recursion(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
@@ -141,8 +140,3 @@ def test_always_breakaway_and_a_changing_load_are_passive_on_400_paths():
 @pytest.mark.slow
 def test_always_breakaway_and_a_changing_load_are_passive_on_20000_paths():
     assert min(worst_loss(1000 + seed, 20, 60) for seed in range(1000)) >= -1e-12
-
-
-def test_exact_the_kind_of_points_stays_small_without_breakaway():
-    assert points_model(bonds(0.0), [1.0], [1.0]).fields["bonds"].shape[0] == 4
-    assert step_kernels.Contact._fields.index("growth") > 0

@@ -18,14 +18,15 @@ from scipy.special import gammainc
 from patchfem import closed_forms
 from patchfem.closed_forms.dynamics import sliding_amplitude
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.march.march import GOAL, march, modes_arrays, steps_arrays
-from patchfem.dynamics.march.models import growth_numbers, jenkins_model, load_kernels, points_model
+from patchfem.dynamics.march.march import GOAL, march, plant_of
+from patchfem.dynamics.march.models import jenkins_model, load_kernels, points_model
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds import point_kernels
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import BondState, Recursion
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.stretch import growth_numbers
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
@@ -196,14 +197,14 @@ def free_rows(basis, model, start, per_cycle, count):
     hub = load_kernels()
     drive = BaseSine(0.0, basis.omega[0])
     prop = propagator(basis, drive, per_cycle)
-    contact, work = model.build(hub)
+    contact, _ = model.build(hub)
     n = basis.omega.size
     state = np.zeros((2, n))
     state[0] = start
-    modes, steps, table = modes_arrays(basis, hub), steps_arrays(prop, hub), prop.tables(drive, 0, 1)
+    plant, table = plant_of(basis, prop), prop.tables(drive, 0, 1)
     ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 6))
-    done = hub.march(0, count, state, np.zeros(1), modes, steps, table, basis.mass, model.kind, False, contact, work,
-                     1e-3 * GOAL * model.limit, np.inf, ledger, rows)
+    done = hub.march(model.kind, 0, count, state, plant, table, contact, 1e-3 * GOAL * model.limit, np.inf, ledger,
+                     rows)
     assert done == (count, 0)
     return rows, ledger, prop
 

@@ -1,14 +1,15 @@
 """Numerical choices of a coupled run: engine, steps per cycle, shear modes, quadrature, and what they would cost."""
 
 from dataclasses import dataclass
-from math import sqrt
+from math import ceil, sqrt
 
 import numpy as np
 
-from ..core import Missing
-from ..structure.drive_sizes import fastest, omega_of, sinusoidal
-from .engine import COMPARED, engine_of, unique_steps
-from .model import Model
+from ...core import Missing
+from ...effects import has
+from ...model.model import Model
+from ...structure.drive_sizes import fastest, omega_of, sinusoidal
+from .engines import COMPARED, engine_of
 
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
@@ -32,7 +33,7 @@ class Numerics:
 def choose(model: Model, per_point: bool = False) -> Numerics:
     """Engine and numerical choices of a coupled run; PatchfemError for a method that cannot do it."""
     accuracy, rig, drive = model.accuracy, model.rig, model.rig.drive
-    engine = engine_of(model)
+    engine = engine_of(model).name
     window = int(max(1, min(10, rig.cycles // 10)))
     if rig.levels:
         window = min(window, int(rig.level_cycles))
@@ -53,9 +54,20 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
                     frozenset(pinned))
 
 
+def unique_steps(model: Model) -> int:
+    """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
+    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
+    f, modes = model.friction, model.rig.modes
+    if f is None or not has(f.law, "bonds") or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
+        return 0
+    load = model.nominal_load
+    stiff = f.static * load / f.bond_length * (f.static / f.kinetic - 1)
+    return 2 * ceil(0.55 * model.rig.drive.period * sqrt(stiff * float((modes.slide**2).sum()) / (2 * modes.mass)))
+
+
 def quadrature_of(model: Model, numerics: Numerics):
     """The engines.Choice of a nonlocal law; a stroke is taken as the drive's own amplitude."""
-    from ..friction.bonds.engines import choose as engine_for
+    from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy
     stroke = max(4 * model.speed / omega_of(model.rig.drive) / law.length, 1e-9)
@@ -74,7 +86,7 @@ def list_cost(model: Model, numerics: Numerics) -> tuple:
 def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
     """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = model.friction
-    if f is None or f.law != "nonlocal" or quadrature_of(model, numerics).engine == "recursion":
+    if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
         return
     entries, seconds = list_cost(model, numerics)
     if seconds > limit:

@@ -1,0 +1,6 @@
+"""What one interface of a march is to the compiled loops: a contact with solve, given, commit, state and hold.
+
+In: the numbers and memory of a law. Out: the slide and the path-mean force of a step, the memory after it. A contact is
+one law on one slide (`element_kernels`, of any law), set-valued Coulomb friction, points behind shear modes, or a list
+of bonds; `arrays` has their tuples. Read `element_kernels` first.
+"""

@@ -1,0 +1,49 @@
+"""A contact, `arrays.Element`, with one slide and one law on it.
+
+Such are elements side by side, a law of the speed, points that slide alike. The functions are those that
+`march.loop_kernels` asks of every contact.
+"""
+
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+from ...friction.laws import elastic_plastic_kernels as law
+from . import element_solve_kernels as solver
+
+SET_VALUED = False
+
+
+@njit(error_model="numpy", **LEAN)
+def solve(free, beta, q, v, dt, c, goal):
+    """(dq, path-mean force, iterations) of a step with dq = free - beta force; the memory stays as it is."""
+    c.eps[0] = law.middle(c.num, c.mem, 0, v, dt)
+    guess = 2 * c.last[0] - c.last[1]
+    return solver.solve_element(free, beta, c.num, c.mem, 0, q, c.eps[0], dt, guess, c.bound[0], goal)
+
+
+@njit(error_model="numpy", **LEAN)
+def given(dq, q, v, dt, c, goal):
+    """(path-mean force, whether it was found) over a slide increment that is prescribed."""
+    c.eps[0] = law.middle(c.num, c.mem, 0, v, dt)
+    return law.mean(c.num, c.mem, 0, q, dq, c.eps[0], dt)[0], True
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(dq, force, q, v0, v1, dt, c):
+    """Move the memory by the step; (energy dissipated [J], True)."""
+    c.last[1] = c.last[0]
+    c.last[0] = dq
+    return law.commit(c.num, c.mem, 0, dq, force, v0, v1, dt, c.eps[0]), True
+
+
+@njit(error_model="numpy", **LEAN)
+def state(c, q, v):
+    """(force [N], stored energy [J], irreversible slip [m]) at slide q [m] and speed v [m/s]."""
+    return law.state(c.num, c.mem, 0, q, v)
+
+
+@njit(error_model="numpy", **LEAN)
+def hold(c, force):
+    """Nothing: what holds is in the law."""
+
+

@@ -1,0 +1,26 @@
+"""Slide of one element over a step: its law against what the modes give, for any law with a slope."""
+
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+from ...friction.laws import elastic_plastic_kernels as law
+from ..modal_kernels import narrowed
+
+
+@njit(error_model="numpy", **LEAN)
+def solve_element(free, beta, num, mem, e, q, eps, dt, guess, bound, goal):
+    """(dq, mean force, iterations) with dq = free - beta F(dq), |F| <= bound [N], infinite where nothing bounds it;
+    iterations < 0 when it failed. goal [N]: of the residual over beta, besides the last digit of the slide."""
+    reach = 1.001 * beta * bound  # a contact that slides all the way lies inside, not on the edge
+    low, high = free - reach, free + reach
+    dq, force = min(max(guess, low), high), 0.0
+    for count in range(1, 200):
+        force, slope = law.mean(num, mem, e, q, dq, eps, dt)
+        miss = dq - free + beta * force
+        digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(force))
+        if abs(miss) <= goal * beta + digit:
+            return dq, force, count
+        low, high, dq = narrowed(low, high, dq, miss, max(1 + beta * slope, 0.1), count - 40)
+        if high - low <= digit:
+            return dq, force, count
+    return dq, force, -200

@@ -1,0 +1,79 @@
+"""A contact, `arrays.BondList`, of one shared list of bonds: force, solve without a slope, commit, energy book.
+
+The functions are those that `march.loop_kernels` asks of every contact.
+"""
+
+import numpy as np
+from numba import njit
+
+from ...friction.bonds.bond_kernels import list_mean, list_slope, list_step
+from ...friction.bonds.bond_sum_kernels import MOMENTS
+from ...friction.flags_kernels import LEAN
+from ..modal_kernels import narrowed
+
+SET_VALUED = False
+
+
+@njit(error_model="numpy", **LEAN)
+def pulled(dq, c, v0, dt):
+    """(path-mean force [N], slope [N/m]) of a bond list; a slope of zero stands for an unknown one."""
+    scale = c.force[0]
+    if c.law[1] == MOMENTS:
+        force, slope = list_slope(dq, c.bondlist, c.tally, c.now, c.law, c.growth, v0, dt)
+        return scale * force, scale * slope
+    return scale * list_mean(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, dt), 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def solve(free, beta, q, v, dt, c, goal):
+    """(dq, path-mean force, iterations) of a step with dq = free - beta force, by secants; iterations < 0 when it
+    failed."""
+    here, gain = 2 * c.last[0] - c.last[1], 1 + beta * c.force[0] / c.law[2]
+    low, high, last, last_miss = -np.inf, np.inf, here, 0.0
+    for count in range(1, 300):
+        force = pulled(here, c, v, dt)[0]
+        miss = here - free + beta * force
+        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.bound[0]):
+            return here, force, count
+        if count > 1:
+            gain = (miss - last_miss) / (here - last) if here != last else 1.0
+            gain = gain if gain > 0.1 else 1.0
+        last, last_miss = here, miss
+        low, high, here = narrowed(low, high, here, miss, gain, count - 8)
+    return last, force, -300
+
+
+@njit(error_model="numpy", **LEAN)
+def given(dq, q, v, dt, c, goal):
+    """(path-mean force, True) over a slide increment that is prescribed."""
+    return pulled(dq, c, v, dt)[0], True
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(dq, force, q, v0, v1, dt, c):
+    """Move the list by the solved step. Returns (work that is not stored [J], whether the list had room).
+
+    That work is dissipated where positive; the printed law also creates energy, and both are summed apart.
+    """
+    c.last[1] = c.last[0]
+    c.last[0] = dq
+    before = c.tally[4]
+    ok = list_step(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, v1, dt)
+    net = force * dq - c.force[0] * (c.tally[4] - before)
+    if net < 0:
+        c.tally[6] -= net
+    else:
+        c.tally[7] += net
+    return net, ok
+
+
+@njit(error_model="numpy", **LEAN)
+def state(c, q, v):
+    """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands."""
+    force = c.force[0] * c.tally[5]
+    return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
+
+
+@njit(error_model="numpy", **LEAN)
+def hold(c, force):
+    """Nothing: what holds is in the list."""

@@ -1,0 +1,13 @@
+"""A compiled law without memory along the samples of a cycle; the text runs with any law of the speed."""
+
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+from ...friction.laws import tanh_kernels as law
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def along(num, speed, force, slope):
+    """Force [N] and slope [N s/m] at speeds (N,) [m/s] of the law with the numbers num (1, k)."""
+    for i in range(speed.size):
+        force[i], slope[i] = law.mean(num, num, 0, 0.0, speed[i], 0.0, 1.0)

@@ -1,0 +1,36 @@
+"""Points of eq. 2.17 in the stretch reading with p = 1 as the loops take them; the law itself is `bonds.recursion`."""
+
+import numpy as np
+
+from ..bonds.parameters import Bonds
+from ..protocol import Element
+
+
+def growth_numbers(law: Bonds) -> np.ndarray:
+    """(a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10, a_s = -1 for a constant bond length, and the breakaway share."""
+    if not law.grows:
+        return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
+    return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length,
+                     law.breakaway])
+
+
+def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
+    """Points that slide alike, on nodal areas (m,) [m2] under sigma (m,) [Pa].
+
+    pattern: (x, sigma on x) when the pressure stays on the lower piece; `area` and `sigma` then belong to the points of
+    the upper one, which stand at x at first.
+    """
+    area, sigma = np.asarray(area, float), np.asarray(sigma, float)
+    numbers = np.concatenate([[0.0, area.size], growth_numbers(law), law.static * area / law.length, sigma])
+    memory = np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)])
+    kernels = "friction.laws.stretch_kernels"
+    if pattern is not None:
+        x, on_lower = (np.asarray(part, float) for part in pattern)
+        numbers = np.concatenate([numbers, [x.size], x, np.zeros(area.size), x, on_lower])
+        kernels = "friction.laws.stretch_lower_kernels"
+    return Element(kernels, numbers, memory, law.static * float(area @ sigma), law.length, False, "points")
+
+
+def bonds_of(memory) -> np.ndarray:
+    """Bonds (5, m) of the memory of `points_element`: m, z, s2, local slide and play of every point."""
+    return np.asarray(memory)[1:].reshape(5, -1)

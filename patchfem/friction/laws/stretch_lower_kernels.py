@@ -1,0 +1,75 @@
+"""Compiled bonds as in `stretch_kernels` under a pressure that stays on the lower piece.
+
+num: as there, with room for the pressures of the points, then the size p of the pattern, the places of the points (m,)
+[m], room (m,), places (p,) [m] and pressures (p,) [Pa] of the pattern. What forms under a point in a step has the mean
+of the pressures at the ends of its way; where none is left the bonds are lost.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
+from ..flags_kernels import LEAN
+from .stretch_kernels import FREE, GROWTH, WEIGHT, middle, points, state
+
+__all__ = ["commit", "mean", "middle", "state"]
+
+
+@njit(error_model="numpy", **LEAN)
+def pressure_at(place, x, sigma):
+    """Pressure [Pa] of the pattern sigma (m,) on x (m,) at one place, linear between nodes, 0 outside."""
+    if place < x[0] or place > x[-1]:
+        return 0.0
+    j = min(np.searchsorted(x, place, side="right") - 1, x.size - 2)
+    part = (place - x[j]) / (x[j + 1] - x[j])
+    return (1 - part) * sigma[j] + part * sigma[j + 1]
+
+
+@njit(error_model="numpy", **LEAN)
+def pattern(num, e):
+    """(places of the points (m,), pressures they come to (m,), places (p,), pressures (p,) of the pattern)."""
+    m = int(num[e, 1])
+    p, at = int(num[e, WEIGHT + 2 * m]), WEIGHT + 2 * m + 1
+    x = at + 2 * m
+    return num[e, at:at + m], num[e, at + m:x], num[e, x:x + p], num[e, x + p:x + 2 * p]
+
+
+@njit(error_model="numpy", **LEAN)
+def mean(num, mem, e, q, dq, eps, dt):
+    """Path-mean force [N] and slope [N/m] at fixed pressures; 20 ns per point."""
+    weight, source, bonds = points(num, mem, e)
+    place, end, x, sigma = pattern(num, e)
+    force, slope = 0.0, 0.0
+    for j in range(weight.size):
+        here = place[j] + q
+        end[j] = pressure_at(here + dq, x, sigma)
+        source[j] = 0.5 * (pressure_at(here, x, sigma) + end[j])
+        if num[e, FREE] > 0:
+            f, s = loose_mean(bonds[0, j], bonds[1, j], bonds[4, j], num[e, FREE] * eps, dq, source[j], eps)
+        else:
+            f, s = bond_mean(bonds[0, j], bonds[1, j], dq, source[j], eps)
+        force += weight[j] * f
+        slope += weight[j] * s
+    return force, slope
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(num, mem, e, dq, force, v0, v1, dt, eps):
+    """Move the bonds under the pressures of the last `mean`; returns the energy that they dissipate or lose [J]."""
+    weight, source, bonds = points(num, mem, e)
+    _, end, _, _ = pattern(num, e)
+    lost = 0.0
+    for j in range(weight.size):
+        m, z, s2, play = bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j]
+        if num[e, FREE] > 0:
+            m, z, s2, play, part = loose_step(m, z, s2, play, num[e, FREE] * eps, dq, source[j], eps)
+        else:
+            m, z, s2, part = bond_step(m, z, s2, dq, source[j], eps)
+        lost += weight[j] * part / 2
+        bonds[3, j] += dq
+        if end[j] <= 0:
+            lost += weight[j] * s2 / 2
+            m, z, s2 = 0.0, 0.0, 0.0
+        bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j] = m, z, s2, play
+    mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
+    return lost

@@ -1,0 +1,44 @@
+"""The one estimate of the errors of a run: coarser runs of the same model, and what their changes say.
+
+An engine names its ladder: rungs in which a run is coarser, in time, in space, in modes or in its sum over bonds. Every
+rung says which runs it takes and how their measures become an error. A run that several rungs take is made once.
+"""
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import NamedTuple
+
+from ..response.errors import change
+
+
+class Rung(NamedTuple):
+    """One way of being coarser. runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the
+    run beside, *values of the runs) -> error by measure; beside: the variant that they are compared with, None: the
+    run itself."""
+
+    runs: tuple
+    rule: Callable
+    beside: object = None
+
+
+def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
+    """([error by measure name, ...] one per rung, seconds of the coarser runs).
+
+    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: Rungs; made:
+    variant -> run of those that are made already, filled.
+    """
+    begin, made = perf_counter(), {} if made is None else made
+
+    def values(variant) -> dict:
+        if variant not in made:
+            made[variant] = solve(variant)
+        return made[variant].values
+
+    errors = [rung.rule(fine if rung.beside is None else values(rung.beside), *map(values, rung.runs))
+              for rung in ladder]
+    return errors, perf_counter() - begin
+
+
+def space_rung(coarser, beside=None) -> Rung:
+    """The rung of a coarser mesh, fewer modes or narrower strips: their change is the error."""
+    return Rung((coarser,), change, beside)

@@ -1,0 +1,190 @@
+"""The engines of a rig as records: what each refuses, how it solves, in what a run of it can be coarser, what it costs.
+
+`choose` in `numerics` takes the engine that the scene names, or the first that does not refuse.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib import import_module
+from typing import NamedTuple
+
+from ...core import PatchfemError
+from ...effects import LAWS, has, listed
+from ...model.model import Model
+from ...response.errors import change, step_error
+from ..errors import Rung, space_rung
+
+
+class Variant(NamedTuple):
+    """A coarser run: its numerics and the patch that it takes."""
+
+    numerics: object
+    patch: object
+
+
+class Engine(NamedTuple):
+    """refuses(model) -> None, or the PatchfemError that says why and what to do; solve: "module function" of this
+    folder, function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch) and
+    in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays."""
+
+    name: str
+    refuses: Callable
+    solve: str
+    in_time: Callable
+    in_space: Callable
+    least: float = 1e-9
+
+    @property
+    def run(self) -> Callable:
+        """The function that solves, imported when it is wanted."""
+        module, function = self.solve.split()
+        return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
+
+
+def no_closed_form(model: Model, steady: bool = False) -> str:
+    """Why a run has no exact solution; empty where it has one. steady: under the sine of a curve, not the drive's own
+    waveform."""
+    rig, soft = model.rig, model.soft
+    laws = [one.numbers.law for one in rig.interfaces]
+    if odd := [law for law in laws if "exact" not in LAWS[law].carries.split()]:
+        return f"for law '{odd[0]}'{f' with {soft}' if soft else ''}"
+    if soft and laws:
+        return f"with {soft}"
+    if rig.load_varies:
+        return "under a load that changes"
+    if rig.strips_slide_apart and rig.waveform == "levels":
+        return "with strips that yaw, level by level"
+    if not steady and not rig.drive.segments:
+        return f"under a drive of waveform '{rig.waveform}'"
+    if rig.cubic is not None:
+        return "with [structure.stiffening]"
+    if rig.interlock is not None:
+        return "with structure.bonded.wavelength"
+    return ""
+
+
+def set_valued(model: Model, numerics) -> bool:
+    """Whether a march meets Coulomb's law as it stands: without the give of pieces, skin or holder."""
+    laws, patch = [one.numbers.law for one in model.rig.interfaces], model.patch
+    gives = patch is not None and bool(patch.gives_way or patch.slide_spring)
+    return numerics.engine == "march" and not gives and any(has(law, "set-valued") for law in laws)
+
+
+def _exact_refuses(model: Model) -> PatchfemError | None:
+    why = no_closed_form(model)
+    return PatchfemError(f"no exact solution exists {why}; use method = \"march\"", "accuracy.method") if why else None
+
+
+def _march_refuses(model: Model) -> PatchfemError | None:
+    f, soft, lower = model.friction, model.soft, model.side == "lower"
+    if f is not None:
+        recursion = has(f.law, "bonds") and not listed(f)
+        if lower and (soft or not recursion):
+            what = soft if soft else f"law '{f.law}' other than the stretch reading with order = 1"
+            return PatchfemError(f"pressure on the lower piece with {what} in the rig: not yet built; put the shapes "
+                                 "on the upper piece", "")
+        if soft and listed(f):
+            return PatchfemError(f"{soft} with order = {f.order:g}: not yet built; use order = 1", "")
+    if lower and model.accuracy.quadrature not in ("auto", "recursion"):
+        return PatchfemError(f"accuracy.quadrature: '{model.accuracy.quadrature}' with pressure on the lower piece in "
+                             "the rig: not yet built; use \"recursion\" or the upper piece", "")
+    return None
+
+
+def _comparison_refuses(model: Model) -> PatchfemError | None:
+    if not model.soft:
+        return None
+    return PatchfemError(f"'{model.accuracy.method}' takes an interface as a whole, not {model.soft}; use method = "
+                         "\"march\"", "accuracy.method")
+
+
+def _harmonic_refuses(model: Model) -> PatchfemError | None:
+    rig = model.rig
+    if rig.kind == "free" or rig.waveform not in ("sine", "sweep", "levels"):
+        return PatchfemError("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over "
+                             "levels; use method = \"march\"", "accuracy.method")
+    if rig.waveform == "sweep" and rig.drive.displacement is not None:
+        return PatchfemError("'harmonic' keeps the acceleration over a sweep; give drive.acceleration",
+                             "accuracy.method")
+    return None
+
+
+def _no_rungs(*_) -> list:
+    return []
+
+
+def sampled(values: dict) -> dict:
+    """Errors of measures that are read off 400 samples a cycle."""
+    loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
+    return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
+            else 1e-9 * abs(value) for name, value in values.items()}
+
+
+def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+    """The mesh, where the loads of strips or the limit of an averaged law come from it. Strips that slide apart are
+    read off 400 samples a cycle besides, by the trapezoidal rule."""
+    averaged = model.friction is not None and has(model.friction.law, "averaged")
+    meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
+    samples = [Rung((), sampled)] if model.rig.strips_slide_apart else []
+    return [*samples, space_rung(Variant(numerics, coarse))] if meshed else samples
+
+
+def _fewer(numerics, share: int):
+    """Numerics with the steps divided by `share`."""
+    return replace(numerics, steps=max(1, numerics.steps // share))
+
+
+def _march_in_time(model: Model, numerics, patch) -> list:
+    """Half and a quarter of the steps. Of set-valued friction three neighbouring step counts besides: where in a step a
+    slide reverses is chance, so its error does not fall evenly; three halves of the largest change count."""
+    halves = [Variant(_fewer(numerics, share), patch) for share in (2, 4)]
+    if not set_valued(model, numerics):
+        return [Rung(tuple(halves), lambda *values: step_error(*values, numerics.steps))]
+    beside = [Variant(replace(numerics, steps=max(4, round(share * numerics.steps))), patch)
+              for share in (15 / 16, 7 / 8, 3 / 4)]
+
+    def rule(fine, half, quarter, *others):
+        out = step_error(fine, half, quarter, numerics.steps)
+        for other in others:
+            for name, gap in change(fine, other).items():
+                out[name] = max(out.get(name, 0.0), 1.5 * gap)
+        return out
+
+    return [Rung((*halves, *beside), rule)]
+
+
+def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+    """The mesh and the number of shear modes, both at a quarter of the steps."""
+    few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
+    quarter = Variant(few, patch)
+    if coarse is not None and (varies or model.soft):
+        out.append(space_rung(Variant(few, coarse), quarter))
+    shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
+    if shape is not None and (varies or (coarse is not None and has(model.friction.law, "bonds"))):
+        out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter))
+    return out
+
+
+def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
+    """What the balance leaves, and what half the harmonics change."""
+    return [Rung((), lambda fine: solution.errors)]
+
+
+EXACT = Engine("exact", _exact_refuses, "exact run_exact", _no_rungs, _exact_in_space)
+MARCH = Engine("march", _march_refuses, "march run_march", _march_in_time, _march_in_space)
+HARMONIC = Engine("harmonic", _harmonic_refuses, "steady run_steady", _no_rungs, _own_errors, 0.0)
+COMPARED = ("duhamel", "newmark", "euler")
+ENGINES = {one.name: one for one in (EXACT, MARCH, HARMONIC, *(
+    Engine(name, _comparison_refuses, "comparison run_comparison", _march_in_time, _march_in_space)
+    for name in COMPARED))}
+AUTOMATIC = (EXACT, MARCH)  # in the order in which they are tried
+
+
+def engine_of(model: Model) -> Engine:
+    """The engine that a scene names, or the first of AUTOMATIC that does not refuse; PatchfemError with its reason."""
+    named = ENGINES.get(model.accuracy.method)
+    for one in AUTOMATIC if named is None else (named,):
+        reason = one.refuses(model)
+        if reason is None:
+            return one
+    raise reason
