@@ -124,7 +124,7 @@ class Measures(Mapping):
 
     def __repr__(self) -> str:
         rows = [(name, *rounded(one.value, one.error), one.unit) for name, one in self._measures.items()]
-        first, second, third = (max(len(row[place]) for row in rows) for place in range(3))
+        first, second, third = (max((len(row[place]) for row in rows), default=0) for place in range(3))
         return "\n".join(f"{name:<{first}}  {value:>{second}} {'±' if error else ' '} {error:<{third}}  {unit}"
                          for name, value, error, unit in rows)
 

@@ -39,9 +39,17 @@ behind a name counts the interfaces (strips, where strips slide apart): `slip_am
 
 def text() -> str:
     """The whole page."""
-    sections = [HEAD, "## Tables and keys", *_keys(), "## Effects", _effects(), "## Units", _units(), "## Materials",
-                _materials(), "## Measures", MEASURED, "### Of a pressed patch", _measures(STATIC),
-                "### Of a motion", _measures([row for row in MOTION if row.name != "normal_load"])]
+    units = [(kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`') for kind, units in KINDS.items()]
+    stuff = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
+             for name, m in MATERIALS.items()]
+    still, moving = ([(f"`{one.name}`", one.unit, f"{one.floor:g}", one.text) for one in rows]
+                     for rows in (STATIC, MOTION))
+    head = ("measure", "unit", "floor", "meaning")
+    sections = [HEAD, "## Tables and keys", *_keys(), "## Effects", _effects(),
+                "## Units", _table(("kind", "units, the first in SI", "example"), units),
+                "## Materials", _table(("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"), stuff),
+                "## Measures", MEASURED, "### Of a pressed patch", _table(head, still),
+                "### Of a motion", _table(head, moving)]
     return "\n\n".join(section.strip("\n") for section in sections) + "\n"
 
 
@@ -60,10 +68,9 @@ def _is_table(model: type, name: str) -> bool:
 
 
 def _keys() -> list:
-    heads = {}
+    heads, out = {}, []
     for header, model in tables():
         heads.setdefault(model, []).append(header)
-    out = []
     for model, named in heads.items():
         parent = model.__mro__[1]
         own = [key for key, name in keys(model).items() if name in model.__annotations__ and not _is_table(model, name)]
@@ -72,17 +79,21 @@ def _keys() -> list:
             about += f" It carries the keys of {heads[parent][0]} as well."
         if any(header.strip("[]") in NOT_YET_BUILT for header in named):
             about += " Not yet built."
-        rows = [_row(model, key, named[0].strip("[]")) for key in own]
-        title = ", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"
-        out += [f"### {title}", about] + ([_table(("key", "kind", "default", "required", "meaning"), rows)] if rows
-                                          else [])
+        out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
+        if own:
+            out.append(_table(("key", "kind", "default", "required", "meaning"),
+                              [_row(model, key, named[0].strip("[]")) for key in own]))
     return out
 
 
 def _row(model: type, key: str, at: str) -> tuple:
     name = keys(model)[key]
     field, path = model.model_fields[name], f"{at}.{key}".strip(".")
-    default = "" if field.is_required() or field.default in (None, "") else _value(model, name, field.default)
+    default = "" if field.is_required() or field.default in (None, "") else field.default
+    if isinstance(default, int | float):
+        default = " ".join([f"{default:g}", *list(KINDS.get(kind_of(model, name), ()))[:1]])
+    elif default:
+        default = f"`{default}`"
     required = "yes" if field.is_required() else _needed(path)
     said = meaning(model, key) + ("; not yet built" if path in NOT_YET_BUILT else "")
     return f"`{key}`", _kind(model, name), default, required, said
@@ -109,53 +120,24 @@ def _kind(model: type, name: str) -> str:
         words = ["material"]
     elif Coating in types:
         words.append("table")
-    elif float in types or int in types:
-        words.append("number" if float in types else "whole number")
-    elif not words:
-        words.append("text")
-    many = next(("list of " if ... in get_args(part) else "pair of " for part in types if get_origin(part) is tuple), "")
-    return ", ".join([many + ", ".join(dict.fromkeys(words)), *_limits(model, name)])
-
-
-def _limits(model: type, name: str) -> list:
-    field = model.model_fields[name]
-    marks = [inner for mark in (*field.metadata, *parts(field.annotation)) for inner in
-             (mark, *getattr(mark, "metadata", ()))]
-    found = [f"{sign} {getattr(mark, word):g}" for mark in marks for word, sign in SIGNS.items()
-             if isinstance(getattr(mark, word, None), int | float)]
-    return list(dict.fromkeys(found))
-
-
-def _value(model: type, name: str, value) -> str:
-    kind = kind_of(model, name)
-    return f"{value:g} {next(iter(KINDS[kind]))}" if kind else f"`{value}`" if isinstance(value, str) else f"{value:g}"
+    elif float in types or int in types or not words:
+        words.append("number" if float in types else "whole number" if int in types else "text")
+    arrays = [get_args(part) for part in types if get_origin(part) is tuple]
+    many = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
+    marks = [inner for mark in (*model.model_fields[name].metadata, *types)
+             for inner in (mark, *getattr(mark, "metadata", ()))]
+    limits = [f"{sign} {getattr(mark, word):g}" for mark in marks for word, sign in SIGNS.items()
+              if isinstance(getattr(mark, word, None), int | float)]
+    return ", ".join([many + ", ".join(dict.fromkeys(words)), *dict.fromkeys(limits)])
 
 
 def _effects() -> str:
     rows = []
     for name, effect in EFFECTS.items():
         selector, _, value = name.partition("=")
-        needs, can = NEEDS.get(selector, {}).get(value, ("", ""))
-        if not name.startswith("structure.interface."):
-            rows.append((f"`{name}`", needs.replace(" ", ", "), can.replace(" ", ", "), effect.equations))
+        used = [words.replace(" ", ", ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
+        rows += [(f"`{name}`", *used, effect.equations)] if not name.startswith("structure.interface.") else []
     return _table(("effect", "needs", "may have", "equations"), rows)
-
-
-def _units() -> str:
-    return _table(("kind", "units, the first in SI", "example"),
-                  [(kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`')
-                   for kind, units in KINDS.items()])
-
-
-def _materials() -> str:
-    return _table(("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
-                  [(f"`{name}`", f"{m.young / 1e9:g}", f"{m.poisson:g}", f"{m.density:g}", m.source)
-                   for name, m in MATERIALS.items()])
-
-
-def _measures(rows) -> str:
-    return _table(("measure", "unit", "floor", "meaning"),
-                  [(f"`{row.name}`", row.unit, f"{row.floor:g}", row.text) for row in rows])
 
 
 def _table(head: tuple, rows: list) -> str:

@@ -28,7 +28,7 @@ class Result:
     extra: dict
 
     def __repr__(self) -> str:
-        counts = [f"{len(found)} {word}{'s' * (len(found) != 1)}" for found, word in
+        counts = [f"{len(found) or 'no'} {word}{'s' * (len(found) != 1)}" for found, word in
                   ((self.measures, "measure"), (self.warnings, "warning"))]
         return f"Result of {self.plan.model.source.path.name}, {self.outcome}: {self.outcome.sentence}\n" \
                f"  {' and '.join(counts)}, {self.seconds.get('total', 0.0):.2f} s"
