@@ -8,7 +8,7 @@ A law is carried by the bench, by a rig of one interface under a constant load, 
 of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw), "varying-load" in a rig,
 "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events. Traits: "set-valued" (it holds
 without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
-"timeless" (no rate of the slide changes its force), "creeps" (it never holds).
+"timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds).
 """
 
 from typing import NamedTuple
@@ -53,9 +53,10 @@ EFFECTS = {
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
-                                 ("", "kinetic"), "shear joints varying-load comparison exact", "set-valued timeless"),
+                                 ("", "kinetic"), "shear joints varying-load comparison exact",
+                                 "set-valued timeless memoryless"),
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
-                              "joints varying-load harmonic comparison", "creeps"),
+                              "joints varying-load harmonic comparison", "memoryless creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
                                          "reversal)", ("bond_length", ""),
                                          "shear joints varying-load harmonic comparison", "timeless"),
@@ -65,7 +66,7 @@ EFFECTS = {
                                   "shear joints varying-load harmonic two-directions", "bonds"),
     "friction.law=convolution": _law("laws.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds "
                                      "(Oden, Pires)", ("bond_length", "order spread"), "exact",
-                                     "averaged set-valued timeless"),
+                                     "averaged set-valued timeless memoryless"),
     "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
                                        "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",

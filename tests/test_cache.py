@@ -22,15 +22,15 @@ SCENE = (
 MARCH = """\
 import json, sys
 import patchfem.runs.run as simulate
-from patchfem.compiled import load
 from patchfem.dynamics.march.models import load_kernels
 from patchfem.scene.scene import loads
 said = []
 result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estimate=False)
-hub, loop = load_kernels(), load("dynamics.march.jenkins_kernels").march_jenkins
+kind = "dynamics.contacts.element_kernels", "friction.laws.elastic_plastic_kernels"
+loop = load_kernels().loop_of(kind).march
 print(json.dumps({"amplitude": result.measures["relative_displacement_amplitude"].value,
                   "peak": result.measures["friction_force_peak"].value, "home": simulate.__file__, "said": said,
-                  "missed": sum(sum(f.stats.cache_misses.values()) for f in (loop, hub.contact_state)),
+                  "missed": sum(loop.stats.cache_misses.values()),
                   "hit": sum(loop.stats.cache_hits.values())}))
 """
 
@@ -61,8 +61,8 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_march(tmp_path):
     assert again["missed"] == 0 and again["hit"] > 0 and again["said"] == []
     assert (again["amplitude"], again["peak"]) == (first["amplitude"], first["peak"])
 
-    law = home / "patchfem" / "friction" / "kernels.py"
-    text, count = re.subn(r"(def jenkins_mean\(.*?\n    return )force / dq, 0.5 \* slope",
+    law = home / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
+    text, count = re.subn(r"(def mean\(.*?\n    return )force / dq, 0.5 \* slope",
                           r"\g<1>0.8 * force / dq, 0.4 * slope", law.read_text("utf-8"), count=1, flags=re.S)
     assert count == 1
     law.write_text(text, "utf-8")

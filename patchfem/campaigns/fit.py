@@ -7,10 +7,10 @@ from time import perf_counter
 import numpy as np
 
 from ..core import NotConverged, Outcome, PatchfemError
+from ..effects import has
 from ..identify.least_squares import Fit, fit
 from ..identify.words import remarks
 from ..inputs.loops import Loop, read_loop
-from ..runs.bench.engine import forgets
 from ..scene.quantities import KINDS
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
@@ -143,7 +143,7 @@ def _doubts(loop: Loop, miss, held, rms: float, step_error: float, scene: Scene)
         if tied > 0.3:
             out.append(f"the residual is correlated from row to row ({tied:.2f}): the law misses something, and the "
                        "intervals, which take rows as independent, are too narrow")
-    if abs(loop.reading[0]) > 0.2 * peak and not forgets(scene.friction) and not held[0]:
+    if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0]:
         out.append(f"the first row carries {abs(loop.reading[0]) / peak:.0%} of the peak, where the model starts "
                    "unstressed: hold the first cycle out or begin the record at rest")
     if step_error > scene.accuracy.tolerance * peak:

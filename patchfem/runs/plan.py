@@ -93,8 +93,14 @@ def _bonds(model: Model) -> dict:
     if f is None or not load > 0:
         return {}
     rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
-    stretches = f.bond_length and not has(f.law, "averaged")
-    return {"bonds": f.static * load / f.bond_length if stretches else rigid}
+    if has(f.law, "bonds"):
+        return {"bonds": f.static * load / f.bond_length}
+    if has(f.law, "averaged"):
+        return {"bonds": rigid}
+    from ..friction.record import law_from
+
+    one = law_from(f, load).element(load)
+    return {"bonds": one.limit / one.length if one.length else rigid}
 
 
 def _verdict(model: Model, groups: dict, size: int, said: list) -> list:

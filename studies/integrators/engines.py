@@ -15,10 +15,13 @@ from switched import PROBLEMS, follow
 from patchfem.compiled import load
 from patchfem.core import ModalBasis, NotConverged, Start
 from patchfem.dynamics.comparison import duhamel, euler, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh
+from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
 from patchfem.dynamics.march import march as marching
+from patchfem.dynamics.march import models
 from patchfem.dynamics.one_mode import sdof, sdof_kernels
 from patchfem.dynamics.one_mode.sdof_samples import position
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import Rate
 from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
@@ -112,8 +115,8 @@ def one_mode(one: Problem, _, kernels=None) -> np.ndarray:
 
 def march(one: Problem, steps: int) -> np.ndarray:
     """The march at `steps` per cycle."""
-    model = marching.coulomb_model(one.limit, one.limit) if one.elements is None \
-        else marching.jenkins_model(*one.elements)
+    model = models.coulomb_model(one.limit, one.limit) if one.elements is None \
+        else models.jenkins_model(*one.elements)
     found = marching.march(one.modes, one.drive, model, one.cycles, steps, one.last, start=one.start)
     return found.window.slide[::steps // POINTS][1:]
 
@@ -122,7 +125,7 @@ def _compared(method, one: Problem, steps: int, law, **how) -> np.ndarray:
     modes, laws = one.modes, (law,)
     if one.elements is not None:
         k, y = one.elements
-        laws = tuple(ElasticPlastic(a * b, b) for a, b in zip(k, y))
+        laws = tuple(Smooth(ElasticPlastic(a * b, b).element(1.0)) for a, b in zip(k, y))
         modes = replace(modes, faces=np.tile(modes.slide, (k.size, 1)))
     found = method.run(modes, one.drive, laws, one.cycles * one.drive.period, steps, start=one.start, **how)
     return (found.z[-one.last * steps - 1:] @ modes.slide)[::steps // POINTS][1:]
@@ -153,7 +156,7 @@ def newmark_cured(one: Problem, steps: int) -> np.ndarray:
 
 def euler_tanh(one: Problem, steps: int) -> np.ndarray:
     """Explicit Euler and friction limit tanh(v/1e-3)."""
-    return _compared(euler, one, steps, Tanh(one.limit, 1e-3))
+    return _compared(euler, one, steps, Smooth(Rate(one.limit, 1e-3).element(1.0)))
 
 
 def advancer(tolerance: float, size: float):

@@ -5,6 +5,9 @@ from scipy.linalg import expm
 from scipy.optimize import root
 
 from patchfem.core import BaseSine, ModalBasis, Segment
+from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import Piecewise
 
 
@@ -43,8 +46,31 @@ def free_motion(modes, drive: BaseSine, times) -> tuple:
     return states[:, :n], states[:, n:2 * n]
 
 
+def tanh(limit, speed):
+    """limit tanh(v/speed)."""
+    return Smooth(Rate(limit, speed).element(1.0))
+
+
+def elastic_plastic(limit, length, printed=False):
+    """A spring limit/length that slips at the limit."""
+    return Smooth(ElasticPlastic(limit, length).element(1.0), printed)
+
+
+def numbers(laws) -> list:
+    """(kind, limit, second number, third number) of every law for the twins: Coulomb 0, tanh 1, elastic-plastic 2."""
+    out = []
+    for law in laws:
+        if isinstance(law, Coulomb):
+            out.append((0, law.static, law.kinetic, law.stick_speed))
+        elif law.element.form == "speed":
+            out.append((1, law.limit, law.element.numbers[2], 0.0))
+        else:
+            out.append((2, law.limit, law.element.length, law.printed))
+    return out
+
+
 def law_force(law, speed, travel, before, hold):
-    """Force of a row of numbers, as printed in its docstring."""
+    """Force of a row of `numbers`."""
     kind, limit, second, third = law
     if kind == 0:
         return np.clip(hold, -limit, limit) if abs(speed) < third else second * np.sign(speed)

@@ -70,13 +70,15 @@ class Grid:
     iterations: np.ndarray
 
 
-def grid(modes: ModalBasis, drive, laws: np.ndarray, duration: float, steps_per_cycle: int,
-         start: Start | None) -> Grid:
+def grid(modes: ModalBasis, drive, law: tuple, duration: float, steps_per_cycle: int, start: Start | None) -> Grid:
     """Equal steps of drive.period/steps_per_cycle over `duration` [s], the forces of the start in place.
+
+    law: (rows, compiled loops) of the laws.
 
     PatchfemError for fewer than 4 steps per cycle, no step at all, more than memory holds, a start that does not fit or
     an interface that slides in no mode.
     """
+    laws, kernels = law
     n, i = modes.omega.size, len(laws)
     if steps_per_cycle < 4:
         raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are wanted")
@@ -100,20 +102,16 @@ def grid(modes: ModalBasis, drive, laws: np.ndarray, duration: float, steps_per_
     values = np.ascontiguousarray(drive.values(time), float)
     found = Grid(h, time, values, z, v, np.zeros((i, steps + 1)), np.zeros((i, steps + 1)),
                  np.zeros(steps + 1, np.int64))
-    found.force[:, 0] = first_forces(modes, laws, values[0], z[0], v[0])
+    found.force[:, 0] = first_forces(modes, laws, kernels, values[0], z[0], v[0])
     return found
 
 
-def first_forces(modes: ModalBasis, laws: np.ndarray, drive: float, z, v) -> np.ndarray:
+def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, v) -> np.ndarray:
     """Friction forces (i,) [N] of a start: elastic ones are unstrained, held ones hold as far as they can."""
     faces = modes.interfaces
     speed, force = faces @ v, np.zeros(len(laws))
     free = -modes.base * drive - modes.omega**2 * z - modes.dampers @ v
-    for c, law in enumerate(laws):
-        if law[0] == 1:
-            force[c] = law[1] * np.tanh(speed[c] / law[2])
-        elif law[0] == 0 and abs(speed[c]) >= law[3]:
-            force[c] = law[2] * np.sign(speed[c])
+    kernels.first_forces(laws, speed, force)
     held = (laws[:, 0] == 0) & (np.abs(speed) < laws[:, 3])
     if np.any(held):
         cross = faces @ faces.T / modes.mass

@@ -1,29 +1,38 @@
 """Compiled loops of the comparison methods: Duhamel's integral by fixed point, Newmark with a stick speed, Euler.
 
-A law is a row (kind, limit, second number, third number) as `point_laws.rows` writes it.
+laws (i, k): a row per interface as `point_laws.rows` writes it: 0 for set-valued friction, limit, kinetic force, stick
+speed; or 1, limit, 0, whether as printed, and the numbers of its law. The text runs with any laws.
 """
 
 import numpy as np
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
+from ...friction.laws import tanh_kernels as law
+from ..modal_kernels import narrowed
 
-COULOMB, TANH, ELASTIC = 0, 1, 2
+COULOMB, HEAD = 0, 4  # first number of a row of set-valued friction; numbers of a row before those of its law
 
 
 @njit(error_model="numpy", **LEAN)
-def law_force(law, speed, travel, before, hold):
-    """Force [N] of a law at a slide speed [m/s]; travel [m] since the force was `before` [N], `hold` [N] is what keeps
-    the speed as it is."""
-    if law[0] == COULOMB:
-        if abs(speed) < law[3]:
-            return min(max(hold, -law[1]), law[1])
-        return law[2] * np.sign(speed)
-    if law[0] == TANH:
-        return law[1] * np.tanh(speed / law[2])
-    if law[3] != 0 and abs(before) >= law[1]:
+def law_force(laws, c, speed, travel, before, hold):
+    """Force [N] of interface c at a slide speed [m/s]; travel [m] since the force was `before` [N], `hold` [N] is what
+    keeps the speed as it is."""
+    if laws[c, 0] == COULOMB:
+        if abs(speed) < laws[c, 3]:
+            return min(max(hold, -laws[c, 1]), laws[c, 1])
+        return laws[c, 2] * np.sign(speed)
+    if laws[c, 3] != 0 and abs(before) >= laws[c, 1]:
         return before
-    return min(max(before + law[1] / law[2] * travel, -law[1]), law[1])
+    return law.at_end(laws[:, HEAD:], c, before, speed, travel)[0]
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def first_forces(laws, speed, force):
+    """Forces (i,) [N] of a start at slide speeds (i,) [m/s]; of interfaces that a force may hold, 0."""
+    for c in range(force.size):
+        held = laws[c, 0] == COULOMB and abs(speed[c]) < laws[c, 3]
+        force[c] = 0.0 if held else law_force(laws, c, speed[c], 0.0, 0.0, 0.0)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -100,7 +109,7 @@ def duhamel_loop(maps, coupling, solve, omega, dampers, faces, base, mass, drive
             for c in range(m):
                 q, w = dot(faces[c], z[k + 1]), dot(faces[c], v[k + 1])
                 along = pull(faces[c], z[k + 1], v[k + 1], omega, dampers, base, drive[k + 1], scratch)
-                wanted = law_force(laws[c], w, q - dot(faces[c], z[k]), force[c, k],
+                wanted = law_force(laws, c, w, q - dot(faces[c], z[k]), force[c, k],
                                    holding(c, along, faces, trial, mass))
                 residual[c, k + 1] = wanted - trial[c]
                 if criterion == 0:
@@ -124,29 +133,22 @@ def duhamel_loop(maps, coupling, solve, omega, dampers, faces, base, mass, drive
 
 
 @njit(error_model="numpy", **LEAN)
-def implicit_force(law, speed, travel, back_speed, back_travel, before):
+def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
     """Force [N] that a law gives at the end of a step in which every newton takes `back_speed` [m/s] off the slide
     speed and `back_travel` [m] off the travel that they would be without it."""
-    if law[0] == ELASTIC:
-        if law[3] != 0 and abs(before) >= law[1]:
-            return before
-        spring = law[1] / law[2]
-        return min(max((before + spring * travel) / (1 + spring * back_travel), -law[1]), law[1])
-    low, high, force = -law[1], law[1], 0.0
-    for _ in range(200):
-        bend = np.tanh((speed - back_speed * force) / law[2])
-        miss = force - law[1] * bend
-        if miss > 0:
-            high = force
-        else:
-            low = force
-        guess = force - miss / (1 + law[1] * (1 - bend * bend) * back_speed / law[2])
-        if not low < guess < high:
-            guess = 0.5 * (low + high)
-        if abs(guess - force) <= 1e-15 * law[1]:
-            return guess
-        force = guess
-    return force
+    limit = laws[c, 1]
+    if laws[c, 3] != 0 and abs(before) >= limit:
+        return before
+    low, high, force = -1.001 * limit, 1.001 * limit, before
+    for count in range(200):
+        found, by_speed, by_travel = law.at_end(laws[:, HEAD:], c, before, speed - back_speed * force,
+                                                travel - back_travel * force)
+        last = force
+        gain = 1 + by_speed * back_speed + by_travel * back_travel
+        low, high, force = narrowed(low, high, force, force - found, gain, count - 40)
+        if abs(force - last) <= 1e-15 * limit:
+            break
+    return min(max(force, -limit), limit)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -163,7 +165,7 @@ def sweeps(laws, stuck, direction, speed, travel, soft_speed, soft_travel, befor
                     w -= soft_speed[c, d] * force[d]
                     q -= soft_travel[c, d] * force[d]
             if laws[c, 0] != COULOMB:
-                new = implicit_force(laws[c], w, q, soft_speed[c, c], soft_travel[c, c], before[c])
+                new = implicit_force(laws, c, w, q, soft_speed[c, c], soft_travel[c, c], before[c])
             else:
                 new = w / soft_speed[c, c] if stuck[c] else laws[c, 2] * direction[c]
             change = max(change, abs(new - force[c]) / laws[c, 1])
@@ -300,7 +302,7 @@ def euler_loop(omega, dampers, faces, base, mass, drive, laws, h, z, v, force):
         for c in range(m):
             along = pull(faces[c], z[k], v[k], omega, dampers, base, drive[k], accel)
             travel = dot(faces[c], z[k]) - dot(faces[c], z[k - 1]) if k > 0 else 0.0
-            now[c] = law_force(laws[c], dot(faces[c], v[k]), travel, now[c], holding(c, along, faces, now, mass))
+            now[c] = law_force(laws, c, dot(faces[c], v[k]), travel, now[c], holding(c, along, faces, now, mass))
             force[c, k] = now[c]
         if k + 1 < drive.size:
             accelerate(z[k], v[k], omega, dampers, faces, base, mass, drive[k], now, accel)

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from ...core import ModalBasis, PatchfemError, Start
 from .comparison import Comparison, finish, grid
-from .point_laws import ElasticPlastic, rows, sticking_warnings
+from .point_laws import Smooth, loops, rows, sticking_warnings
 
 CRITERIA = ("displacement", "velocity", "force")
 
@@ -49,14 +49,14 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
         raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: wanted "
                             "are a finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations")
-    from .comparison_kernels import duhamel_loop  # after compiled.load, which says where it is kept
 
     law = rows(laws, len(modes.interfaces))
-    found = grid(modes, drive, law, duration, steps_per_cycle, start)
+    compiled = loops(laws)
+    found = grid(modes, drive, (law, compiled), duration, steps_per_cycle, start)
     dampers = np.ascontiguousarray(modes.dampers, float)
     maps, coupling = kernels(modes, found.h), dampers - np.diag(np.diag(dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
-    failures = duhamel_loop(
+    failures = compiled.duhamel_loop(
         maps, coupling, solve, np.array(modes.omega), dampers,
         np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
         CRITERIA.index(convergence), float(tolerance), float(relax), int(most), found.z, found.v, found.force,
@@ -79,8 +79,8 @@ def _warnings(modes, laws, law, found, convergence, tolerance, relax, failures) 
     if failures:
         out.append(f"{failures} of {found.time.size - 1} steps ended without convergence after the last iteration")
     for one, face in zip(laws, modes.interfaces):
-        if isinstance(one, ElasticPlastic):
-            turn = found.h * np.sqrt(one.limit / one.length * np.sum(face**2) / modes.mass)
+        if isinstance(one, Smooth) and one.compliance:
+            turn = found.h * np.sqrt(np.sum(face**2) / modes.mass / one.compliance)
             if turn > 0.5:
                 out.append(f"the elastic part of the friction turns by {turn:.2g} rad in a step; it needs "
                            f"{np.ceil(turn / 0.5):.0f} times the steps per cycle")

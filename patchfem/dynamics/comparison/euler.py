@@ -8,18 +8,18 @@ import numpy as np
 
 from ...core import ModalBasis, Start
 from .comparison import Comparison, finish, grid
-from .point_laws import ElasticPlastic, Tanh, rows, sticking_warnings
+from .point_laws import Smooth, loops, rows, sticking_warnings
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400,
         start: Start | None = None) -> Comparison:
     """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface."""
-    from .comparison_kernels import euler_loop  # after compiled.load, which says where it is kept
 
     law = rows(laws, len(modes.interfaces))
-    found = grid(modes, drive, law, duration, steps_per_cycle, start)
+    kernels = loops(laws)
+    found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
     with np.errstate(over="ignore", invalid="ignore"):
-        euler_loop(
+        kernels.euler_loop(
             np.array(modes.omega), np.ascontiguousarray(modes.dampers, float),
             np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
             found.h, found.z, found.v, found.force)
@@ -45,11 +45,13 @@ def _warnings(modes, laws, h) -> list:
                    f"'{modes.names[i]}' and leaves {left[i]:.3g} of {own:.3g}{grows}")
     for one, face in zip(laws, modes.interfaces):
         share = np.sum(face**2) / modes.mass
-        if isinstance(one, Tanh) and h * one.limit * share / one.speed > 2:
-            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 * one.speed / (one.limit * share):.3g} s: the "
+        if not isinstance(one, Smooth):
+            continue
+        if h * one.steepness * share > 2:
+            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / (one.steepness * share):.3g} s: the "
                        "friction changes its sign from step to step while the interface hardly moves")
-        if isinstance(one, ElasticPlastic):
-            turn = h * np.sqrt(one.limit / one.length * share)
+        if one.compliance:
+            turn = h * np.sqrt(share / one.compliance)
             out.append(f"explicit Euler takes {turn / 2:.3g} off the damping ratio of the elastic contact, which has "
                        "none of its own")
     return out

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core import ModalBasis, PatchfemError, Start
 from .comparison import Comparison, finish, grid
-from .point_laws import Coulomb, rows, sticking_warnings
+from .point_laws import Coulomb, loops, rows, sticking_warnings
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, stick_speed: float | None = None,
@@ -23,13 +23,13 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     """
     if stick_speed is not None and not (np.isfinite(stick_speed) and stick_speed >= 0):
         raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: a finite speed >= 0 is wanted")
-    from .comparison_kernels import newmark_loop  # after compiled.load, which says where it is kept
 
     law = rows(laws, len(modes.interfaces), stick_speed)
-    found = grid(modes, drive, law, duration, steps_per_cycle, start)
+    kernels = loops(laws)
+    found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
     h, dampers = found.h, np.ascontiguousarray(modes.dampers, float)
     inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * dampers + h * h / 4 * np.diag(modes.omega**2))
-    stops = newmark_loop(
+    stops = kernels.newmark_loop(
         inverse, np.array(modes.omega), dampers, np.ascontiguousarray(modes.interfaces, float), np.array(modes.base),
         float(modes.mass), found.drive, law, h, bool(by_force), found.z, found.v, found.force, found.residual,
         found.iterations)

@@ -5,6 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import PatchfemError
+from ...friction.protocol import Element
+from ..contacts.dispatch import COULOMB, law_of, number_of
+
+HEAD = 4  # numbers of a row before those of its law
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,63 +25,95 @@ class Coulomb:
         """Largest force [N]."""
         return self.static
 
-    def row(self, stick_speed: float | None = None) -> tuple:
+    @property
+    def kernels(self) -> str:
+        """Module of its compiled form."""
+        return COULOMB
+
+    def row(self, stick_speed: float | None = None) -> np.ndarray:
         """Numbers for the compiled loops; stick_speed [m/s] overrides the law's own."""
-        return 0.0, self.static, self.kinetic, self.stick_speed if stick_speed is None else stick_speed
+        return np.array([0.0, self.static, self.kinetic, self.stick_speed if stick_speed is None else stick_speed])
 
 
-@dataclass(frozen=True, slots=True)
-class Tanh:
-    """limit tanh(v/speed) [N] (2.4, 2.7); speed v_0 [m/s]."""
+@dataclass(frozen=True, eq=False, slots=True)
+class Smooth:
+    """A law that has one force at the end of a step, of the force before, the slide in between and the speed there.
 
-    limit: float
-    speed: float
-
-    def row(self, stick_speed: float | None = None) -> tuple:
-        """Numbers for the compiled loops."""
-        return 1.0, self.limit, self.speed, 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class ElasticPlastic:
-    """F' = (limit/length) v up to +-limit [N], elastic again on reversal (3.12 as it has to be); length [m].
-
-    printed: 3.12 word for word: once at the limit the force stays there for ever.
+    element: the law under its load. printed: eq. 3.12 word for word: once at the limit the force stays there for ever.
     """
 
-    limit: float
-    length: float
+    element: Element
     printed: bool = False
 
-    def row(self, stick_speed: float | None = None) -> tuple:
+    @property
+    def limit(self) -> float:
+        """Largest force [N]."""
+        return self.element.limit
+
+    @property
+    def kernels(self) -> str:
+        """Module of its compiled form."""
+        return self.element.kernels
+
+    @property
+    def compliance(self) -> float:
+        """Elastic slide per force [m/N], 0 of a law that does not stretch."""
+        return self.element.length / self.limit
+
+    @property
+    def steepness(self) -> float:
+        """Force per speed at rest [N s/m], 0 of a law that does not feel the speed."""
+        return self.limit / self.element.numbers[2] if self.element.form == "speed" else 0.0
+
+    def row(self, stick_speed: float | None = None) -> np.ndarray:
         """Numbers for the compiled loops."""
-        return 2.0, self.limit, self.length, float(self.printed)
+        return np.array([1.0, self.limit, 0.0, float(self.printed), *self.element.numbers])
 
 
 def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
-    """(i, 4) numbers of the laws; PatchfemError where they do not fit the interfaces or cannot be."""
+    """(i, HEAD + k) numbers of the laws; PatchfemError where they do not fit the interfaces or cannot be."""
     if len(laws) != interfaces:
         raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give each interface its own")
-    out = np.array([law.row(stick_speed) for law in laws], float).reshape(len(laws), 4)
-    for law, row in zip(laws, out):
-        if not np.all(np.isfinite(row)) or row[1] <= 0 or np.any(row < 0) or (row[0] > 0 and row[2] == 0):
+    found, number = [law.row(stick_speed) for law in laws], number_of(kernels_of(laws))
+    out = np.zeros((len(laws), max([HEAD + 1, *(len(row) for row in found)])))
+    for k, (law, row) in enumerate(zip(laws, found)):
+        smooth = row[0] > 0
+        if not np.all(np.isfinite(row)) or row[1] <= 0 or np.any(row < 0) or (smooth and np.any(row[HEAD + 1:] == 0)):
             raise PatchfemError(f"{law}: friction needs finite numbers above zero")
-        if row[0] == 0 and row[2] > row[1]:
+        if not smooth and row[2] > row[1]:
             raise PatchfemError(f"{law}: friction.kinetic is above friction.static")
+        out[k, :len(row)] = row
+        out[k, HEAD] = number[law.kernels]
     return out
+
+
+def kernels_of(laws) -> tuple:
+    """Modules of the compiled laws, each once."""
+    return tuple(sorted({law.kernels for law in laws}))
+
+
+def loops(laws):
+    """The compiled loops of the comparison methods for these laws."""
+    from ... import compiled
+
+    smooth = tuple(name for name in kernels_of(laws) if name != COULOMB)
+    law = law_of(smooth or (COULOMB,), ("at_end",))
+    return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})
 
 
 def sticking_warnings(laws, stick_speed: float | None = None) -> list:
     """What the laws by themselves get wrong, as sentences."""
     out = []
     for law in laws:
-        if isinstance(law, Tanh):
-            out.append(f"limit*tanh(v/v_0) never sticks: at half of its limit the interface creeps at "
-                       f"{np.arctanh(0.5) * law.speed:.3g} m/s for ever")
-        elif isinstance(law, ElasticPlastic) and law.printed:
+        if isinstance(law, Coulomb):
+            if not law.row(stick_speed)[3]:
+                out.append("Coulomb friction without a stick branch: the force is + or - kinetic, so a held interface "
+                           "shakes and creeps; name accuracy.stick_speed")
+        elif law.steepness:
+            speed = float(np.arctanh(0.5)) * law.limit / law.steepness
+            out.append(f"limit*tanh(v/v_0) never sticks: at half of its limit the interface creeps at {speed:.3g} m/s "
+                       "for ever")
+        elif law.printed:
             out.append("eq. 3.12 as printed keeps the force at its limit for ever once it is there, whatever the "
                        "motion does; use printed = false")
-        elif isinstance(law, Coulomb) and not law.row(stick_speed)[3]:
-            out.append("Coulomb friction without a stick branch: the force is + or - kinetic, so a held interface "
-                       "shakes and creeps; name accuracy.stick_speed")
     return list(dict.fromkeys(out))

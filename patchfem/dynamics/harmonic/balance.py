@@ -9,13 +9,13 @@ import numpy as np
 from ...core import Response
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
-from .laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, law_of_model, synthesis
+from .laws import Interlock, Jenkins, OfSpeed, Spring, Stretch, Track, law_of_model, synthesis
 from .point import Periodic, point
 from .stability import with_stability
 
-__all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "Periodic", "Spring", "Stretch", "Tanh", "backbone",
-           "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime", "response",
-           "with_stability"]
+__all__ = ["Backbone", "Branch", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "Stretch",
+           "backbone", "branches", "cycle_energy", "law_of_model", "levels", "periodic_response", "point", "regime",
+           "response", "with_stability"]
 
 
 STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
@@ -37,7 +37,8 @@ def regime(periodic: Periodic) -> tuple:
             if isinstance(law, Jenkins):
                 slips += float(law.stiffness @ (law.limit_slide * (2 * law.limit_slide < swing)))
             elif found.limit:
-                held = isinstance(law, Stretch) and np.ptp(track.q - found.stretch / found.limit) < STUCK * law.length
+                length = getattr(law, "length", 0.0)
+                held = np.ptp(track.q - found.stretch / found.limit) < STUCK * length
                 slips += 0.0 if held else found.limit
     share = slips / whole if whole else 0.0
     return ("no friction" if not whole else "stuck" if not slips else "slides" if share > 1 - 1e-12 else

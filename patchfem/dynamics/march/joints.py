@@ -10,37 +10,10 @@ from ... import compiled
 from ...core import Response
 from ...friction.protocol import Element
 from ..contacts import arrays
+from ..contacts.dispatch import COULOMB, law_of, number_of
 from .hub import HERE, contact_of
 from .march import GOAL, Run
 from .models import SET_VALUED, ContactModel, coulomb_model
-
-COULOMB = "friction.laws.coulomb_kernels"
-DISPATCH = '''"""Laws of elements side by side: num[e, 0] says which one is meant. Written by dynamics.march.joints."""
-
-from numba import njit
-
-{imports}
-from patchfem.friction.flags_kernels import LEAN
-
-
-@njit(error_model="numpy", **LEAN)
-def middle(num, mem, e, v, dt):
-{middle}
-
-@njit(error_model="numpy", **LEAN)
-def mean(num, mem, e, q, dq, eps, dt):
-{mean}
-
-@njit(error_model="numpy", **LEAN)
-def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-{commit}
-
-@njit(error_model="numpy", **LEAN)
-def state(num, mem, e, q, v):
-{state}
-'''
-SIGNATURES = {"middle": "num, mem, e, v, dt", "mean": "num, mem, e, q, dq, eps, dt",
-              "commit": "num, mem, e, dq, force, v0, v1, dt, eps", "state": "num, mem, e, q, v"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,26 +39,6 @@ def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
 
 def _spring(port: int, numbers, potential) -> Joint:
     return Joint(port, Element(f"{HERE}.spring_kernels", np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
-
-
-def number_of(laws: tuple) -> dict:
-    """num[e, 0] of every compiled law: 0 for Coulomb's, which the loop asks for its step, from 1 on for the others."""
-    return {COULOMB: 0} | {law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)}
-
-
-@cache
-def law_of(laws: tuple):
-    """The compiled module of one law, or of several that num[e, 0] tells apart."""
-    if len(laws) == 1:
-        return compiled.load(laws[0])
-    numbers, calls = number_of(laws), {}
-    for name, signature in SIGNATURES.items():
-        lines = [f"    if num[e, 0] == {numbers[law]}:\n        return law_{numbers[law]}.{name}({signature})\n"
-                 for law in laws[:-1]]
-        calls[name] = "".join(lines) + f"    return law_{numbers[laws[-1]]}.{name}({signature})\n"
-    imports = "\n".join(f"import patchfem.{law} as law_{numbers[law]}" for law in laws)
-    text = DISPATCH.format(imports=imports, **calls)
-    return compiled.written(f"{HERE}.laws_{compiled.digest(text)}", text)
 
 
 @cache

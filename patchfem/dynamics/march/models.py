@@ -17,7 +17,7 @@ SET_VALUED = f"{HERE}.coulomb_kernels"  # the contact without a slope
 
 
 def load_kernels(say=None):
-    """The hub of the march, `dynamics.march.hub`; `say` is told when it has to compile first."""
+    """The hub of the march, `hub`; `say` is told when its loops have to be compiled first."""
     return load("dynamics.march.hub", say)
 
 

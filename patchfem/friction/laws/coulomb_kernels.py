@@ -3,11 +3,12 @@
 Twin: `coulomb.Coulomb`. num: static, kinetic force [N]; mem: the last force [N].
 """
 
+import numpy as np
 from numba import njit
 
 from ..flags_kernels import LEAN, middle
 
-__all__ = ["commit", "mean", "middle", "state"]
+__all__ = ["at_end", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -32,6 +33,12 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """All work of the step is dissipated [J]."""
     mem[e, 0] = force
     return force * dq
+
+
+@njit(error_model="numpy", **LEAN)
+def at_end(num, e, before, speed, travel):
+    """(kinetic force [N] against a speed [m/s], no slopes)."""
+    return num[e, 2] * np.sign(speed), 0.0, 0.0
 
 
 @njit(error_model="numpy", **LEAN)

@@ -8,7 +8,7 @@ from numba import njit
 
 from ..flags_kernels import FAST, LEAN, middle
 
-__all__ = ["commit", "mean", "middle", "state"]
+__all__ = ["at_end", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -58,6 +58,14 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
         past[3 + j] = end
     past[0], past[1], past[2] = pull, 0.5 * energy, shared / total if total > 0 else 0.0
     return lost
+
+
+@njit(error_model="numpy", **LEAN)
+def at_end(num, e, before, speed, travel):
+    """(force [N], its slope over the speed [N s/m], over the travel [N/m]) of a single element after a slide `travel`
+    [m] from the force `before` [N]."""
+    end, _, elastic = pulled(before / num[e, 2], travel, num[e, 3])
+    return num[e, 2] * end, 0.0, num[e, 2] if elastic == travel else 0.0
 
 
 @njit(error_model="numpy", **LEAN)

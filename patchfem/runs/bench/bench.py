@@ -5,8 +5,9 @@ from time import perf_counter
 
 import numpy as np
 
+from ...effects import has
 from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
-from .engine import CLOSED, STEPPED, Engine, engine_of, forgets
+from .engine import CLOSED, STEPPED, Engine, engine_of
 from .watch import UNWATCHED, Watch
 
 
@@ -52,7 +53,7 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
         first = int(np.searchsorted(time, start))
     engine = engine_of(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
-    jumps = forgets(model.friction) and not model.soft
+    jumps = has(model.friction.law, "memoryless") and not model.soft
     values = _values(model, time, slide, out, first, omega) | \
         {"work_check": work_check(out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], jumps)}
     span = time[-1]  # endless where a slide is endlessly slow

@@ -52,16 +52,11 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
         return Engine(ELEMENTS, 3e-9 * points + 1e-7)
     if changes(model):
         return _stepped(model, slide, points)
-    if forgets(f):
+    if has(f.law, "memoryless"):
         return Engine(CLOSED, 1e-7)
     if not has(f.law, "bonds"):
         return Engine(ELEMENTS, 1e-7)
     return _summed(model, slide, points, choice or sum_of(model, slide))
-
-
-def forgets(f) -> bool:
-    """Whether a law keeps nothing of its path: it holds without a stretch, averages, or follows the speed."""
-    return any(has(f.law, trait) for trait in ("set-valued", "averaged", "creeps"))
 
 
 def changes(model) -> bool:

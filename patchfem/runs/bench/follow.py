@@ -61,8 +61,7 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
             raise Missing(f"the bond list outgrew {contact.bondlist.shape[1]} entries before sample {b} of the bench; "
                           "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1", "")
         if b in at:
-            shown = model.shown(contact)
-            states.append((slide[b], shown.get("stretch", shown.get("bonds"))))
+            states.append((slide[b], next(iter(model.shown(contact).values()), None)))
         if b == last or b - told >= BLOCK:
             watch.tell(b / last)
             told = b

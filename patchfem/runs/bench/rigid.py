@@ -7,6 +7,7 @@ carries the load, times their own share of it.
 import numpy as np
 
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
+from ...effects import has
 from ...friction.bonds.quadrature import cutoff
 from ...friction.record import law_from
 from .engine import ELEMENTS, Engine
@@ -18,17 +19,18 @@ from .watch import Watch
 
 def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> Slid:
     """Slide the interface along path = (time [s], slide [m]), both (k,), with `frames` frames of its tractions."""
-    time, slide = path
+    (time, slide), f = path, model.friction
     sigma, weight = pressed(model, patch)
     load = float(weight @ sigma)
-    done = follow(one_point(model, load, engine), time, slide, frames, watch, model.friction.rest_growth is not None)
+    paced = f.rest_growth is not None or not (has(f.law, "bonds") or has(f.law, "timeless"))
+    done = follow(one_point(model, load, engine), time, slide, frames, watch, paced)
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = np.full(time.size, load)
-    if engine.kind == ELEMENTS:  # the law itself tells what does not come back
-        local = np.repeat(done.slip[done.at][:, None], sigma.size, axis=1)
-        return Slid(done.force, loads, done.slip, done.ledger, done.at, tau, local)
-    return Slid(done.force, loads, elastic_slip(model, slide, done.force, loads), done.ledger, done.at, tau,
-                local_slip(model, slide[done.at], tau, sigma))
+    if engine.kind == ELEMENTS:
+        slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
+    else:
+        slip, local = elastic_slip(model, slide, done.force, loads), local_slip(model, slide[done.at], tau, sigma)
+    return Slid(done.force, loads, slip, done.ledger, done.at, tau, local)
 
 
 def one_point(model, load: float, engine: Engine) -> ContactModel:

@@ -8,7 +8,8 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError
 from ...dynamics.march.march import hermite_extremes
-from ...effects import has
+from ...effects import carries, has, refusal
+from ...friction.record import law_from
 from ...response import run_events
 from ...response.measures import window_amplitudes, window_ends
 from ...response.outcome import steady_of
@@ -26,24 +27,22 @@ def laws_of(model, load: float) -> list:
 
     out, accuracy = [], model.accuracy
     for one in model.rig.interfaces:
-        f, (static, kinetic) = one.numbers, one.limits(load if one.load is None else one.load)
-        if f.law == "coulomb":
-            out.append(point_laws.Coulomb(static, kinetic, accuracy.stick_speed or 0.0))
-        elif f.law == "tanh":
-            out.append(point_laws.Tanh(static, f.reference_speed))
-        elif f.law == "elastic-plastic":
-            out.append(point_laws.ElasticPlastic(static, f.bond_length))
+        f, bears = one.numbers, load if one.load is None else one.load
+        if not carries(f, "comparison"):
+            raise PatchfemError(f"'{accuracy.method}' with law '{f.law}': {refusal('comparison')}; or use method = "
+                                "\"march\"", "accuracy.method")
+        if has(f.law, "set-valued"):
+            out.append(point_laws.Coulomb(*one.limits(bears), accuracy.stick_speed or 0.0))
         else:
-            raise PatchfemError(f"'{accuracy.method}' takes law 'coulomb', 'tanh' or 'elastic-plastic', not '{f.law}'; "
-                                "use method = \"march\"", "accuracy.method")
+            out.append(point_laws.Smooth(law_from(f, bears).element(bears)))
     return out
 
 
 def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=None):
     """Solution of a comparison method at numerics.steps per cycle; arguments as `march.run_march`."""
-    from ...compiled import load
+    from ...dynamics.march.models import load_kernels
 
-    load("dynamics.comparison.comparison_kernels", say)
+    load_kernels(say)
     rig, modes, drive = model.rig, model.rig.modes, model.rig.drive
     laws, begin = laws_of(model, borne(model, patch)), perf_counter()
     done = _integrated(model, numerics, laws)
@@ -113,9 +112,7 @@ def _with_interfaces(response, modes):
 
 def _with_slip(response, laws):
     """The irreversible slip of elastic-plastic interfaces in place of their slide."""
-    from ...dynamics.comparison.point_laws import ElasticPlastic
-
-    give = np.array([law.length / law.limit if isinstance(law, ElasticPlastic) else 0.0 for law in laws])
+    give = np.array([getattr(law, "compliance", 0.0) for law in laws])
     if not give.any():
         return response
     extra = response.extra

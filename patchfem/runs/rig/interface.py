@@ -14,7 +14,7 @@ from .strips import strip_loads
 
 
 def model_of(model: Model, numerics: Numerics, patch):
-    """The model that a march takes: one contact, or joints where interfaces or springs stand beside it."""
+    """The contact that a march takes: one, or joints where interfaces or springs stand beside it."""
     rig, many = model.rig, len(model.rig.modes.interfaces) > 1
     alone = None if many else contact_model(model, numerics, patch)
     if not many and not rig.bends:
@@ -37,7 +37,7 @@ def model_of(model: Model, numerics: Numerics, patch):
 
 
 def _element(one: Rubbing, load: float, speed: float) -> Element:
-    """The law of an interface under a load [N]; speed [m/s]: size of the speeds to expect."""
+    """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers
     if not carries(f, "joints"):
         raise PatchfemError(f"{named(f)} beside other interfaces: {refusal('joints')}", f"{one.key}.law")
@@ -52,7 +52,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     """The ContactModel of the one interface of a rig; patch: the solved Patch or None under [normal]."""
     from ...dynamics.march import models
 
-    f = model.friction
+    f, soft = model.friction, model.soft
     if f is None:
         return models.coulomb_model(0.0, 0.0)
     if model.rig.load_varies:
@@ -61,34 +61,33 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return model_of(model, patch, numerics.shear_modes)
     load = patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "bonds"):
-        return _bonds_model(model, numerics, patch, load)
+        return _bonds(model, numerics, patch, load)
     if has(f.law, "averaged"):
         from ..bench.averaged import limit_share
 
         return models.coulomb_model(*(f.static * load * limit_share(model, patch),) * 2)
-    law = law_from(f, load)
-    if model.soft:
-        from ...slip.shear_modes import jenkins_set
+    one = law_from(f, load).element(load)
+    if not soft:
+        return models.element_model(one)
+    from ...slip.shear_modes import jenkins_set
 
-        if has(f.law, "set-valued") and f.kinetic < f.static:
-            raise PatchfemError(f"friction.kinetic below static with {model.soft}: not yet built; the exact set of "
-                                "elements needs static = kinetic", "")
-        per_node = patch.pressure.sigma_n * patch.pieces.interface.weight
-        found = jenkins_set(patch.giving, f.static * per_node, law.element(load).length)
-        return models.jenkins_model(found.stiffness, found.yield_slide, found)
-    return models.element_model(law.element(load))
+    if has(f.law, "set-valued") and f.kinetic < f.static:
+        raise PatchfemError(f"friction.kinetic below static with {soft}: not yet built; the exact set of elements "
+                            "needs static = kinetic", "")
+    found = jenkins_set(patch.giving, f.static * patch.pressure.sigma_n * patch.pieces.interface.weight, one.length)
+    return models.jenkins_model(found.stiffness, found.yield_slide, found)
 
 
-def _bonds_model(model: Model, numerics: Numerics, patch, load: float):
-    """The sum over bonds: a list of them, points behind shear modes, points of a pattern, or one point."""
+def _bonds(model: Model, numerics: Numerics, patch, load: float):
+    """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
     from ...dynamics.march import models
 
-    law, found = model.bonds, quadrature_of(model, numerics)
+    law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if found.engine != "recursion":
         from ...friction.bonds.quadrature import cutoff
 
         reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
-        return models.list_model(law, model.friction.static * load, reach, found.merge)
+        return models.list_model(law, limit, reach, found.merge)
     if model.soft:
         from ..patch.press import shear_of
 

@@ -153,7 +153,7 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
     if has(f.law, "bonds") and not listed(f) and (shear or numerics.per_point):
         tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
-        length = 0.0 if raw.model.reduction is None else law_from(f).element(1.0).length
+        length = 0.0 if raw.contact.reduction is None else law_from(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
         tau, local = element_fields(patch, raw.contact.reduction, states, length)
     else:

@@ -115,8 +115,8 @@ class _Balance:
 
         rig = model.rig
         if len(rig.modes.interfaces) > 1:
-            raise PatchfemError("'harmonic' with several interfaces of laws other than 'coulomb': not yet built; use "
-                                "method = \"march\"", "accuracy.method")
+            raise PatchfemError("'harmonic' with several interfaces of laws without an exact solution: not yet built; "
+                                "use method = \"march\"", "accuracy.method")
         parts = []
         if model.friction is not None:
             parts.append((0, contact_model(model, numerics, patch)))

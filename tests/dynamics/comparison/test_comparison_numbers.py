@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from comparison_cases import FREE_FREE, PLAIN, SDOF, UNIT, basis, sine
+from comparison_cases import FREE_FREE, PLAIN, SDOF, UNIT, basis, elastic_plastic, sine, tanh
 
 from patchfem.core import Segment, Start
 from patchfem.dynamics.comparison import duhamel, euler, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb, ElasticPlastic, Tanh
+from patchfem.dynamics.comparison.point_laws import Coulomb
 from patchfem.structure.drives import Piecewise, release
 
 STICK_SLIP = 0.28704671337871602595  # exact peak, D = .8, 2 xi = .006
@@ -55,14 +55,14 @@ def test_exact_a_static_branch_cures_it():
     (0.01, 0.0095, -0.302, -0.049), (0.03, 0.03, -0.66, None), (0.1, 0.1, 0.37, None)])
 def test_exact_elastic_plastic_friction(length, early, x20, x40):
     """Figs 21 and 22, and what the contact's own vibration does to the offsets."""
-    found = figure(ElasticPlastic(3.0, length), 0.01)
+    found = figure(elastic_plastic(3.0, length), 0.01)
     assert found["early"] == pytest.approx(early, rel=0.05) and found["jumps"] == 0
     assert found["x20"] == pytest.approx(x20, abs=5e-3) and found["run"].failures == 0
     assert x40 is None or found["x40"] == pytest.approx(x40, abs=2e-3)
 
 
 def test_exact_the_printed_law_runs_away():
-    found = figure(ElasticPlastic(3.0, 0.03, True), 0.01)
+    found = figure(elastic_plastic(3.0, 0.03, True), 0.01)
     assert found["x20"] == pytest.approx(-91, abs=0.5) and found["x40"] == pytest.approx(-734, abs=2)
 
 
@@ -104,7 +104,7 @@ def test_exact_figure_5_by_euler(h, top, within):
     modes = basis([1.0], [0.02], [[1.0]], [1.0])
     drive, start = plate()
     steps = round(drive.period / h)
-    found = euler.run(modes, drive, (Tanh(0.1, 0.01),), 10 * drive.period, steps, start)
+    found = euler.run(modes, drive, (tanh(0.1, 0.01),), 10 * drive.period, steps, start)
     x = found.z[-2 * steps:, 0] + np.sin(0.1 * found.time[-2 * steps:])
     assert np.abs(x).max() == pytest.approx(top, abs=within)
     assert euler.damping_left(modes, h) == pytest.approx([0.02 - h / 2])
@@ -114,7 +114,7 @@ def test_exact_figure_5_by_euler(h, top, within):
 def test_exact_figure_5_by_an_implicit_method():
     modes = basis([1.0], [0.02], [[1.0]], [1.0])
     drive, start = plate()
-    found = newmark.run(modes, drive, (Tanh(0.1, 0.01),), 10 * drive.period, 20000, start=start)
+    found = newmark.run(modes, drive, (tanh(0.1, 0.01),), 10 * drive.period, 20000, start=start)
     last = slice(-20001, None)
     t, x = found.time[last], found.z[last, 0] + np.sin(0.1 * found.time[last])
     assert np.abs(x).max() == pytest.approx(0.13712, abs=2e-5)
@@ -133,7 +133,7 @@ def test_exact_two_masses(ratio, x1, x2):
     modes = basis([1.0, 1.0], [0.02, 0.02], [[-1.0, 1.0]], [0.0, -1.0])
     drive = sine(ratio)
     settled = np.ceil(500 / drive.period)
-    found = newmark.run(modes, drive, (Tanh(0.1, 0.01),), settled * drive.period, 2000)
+    found = newmark.run(modes, drive, (tanh(0.1, 0.01),), settled * drive.period, 2000)
     top = np.abs(found.z[-4001:]).max(axis=0)
     assert top == pytest.approx([x1, x2], rel=1e-3)
     assert found.ledger["error"] == pytest.approx(0.0, abs=2e-3 * found.ledger["work_in"])
@@ -144,7 +144,7 @@ def two_masses(ratio, steps):
     modes = basis([1.0, 1.0], [0.02, 0.02], [[-1.0, 1.0]], [0.0, -1.0])
     drive = sine(ratio)
     duration = np.ceil(500 / drive.period) * drive.period
-    return modes, drive, newmark.run(modes, drive, (Tanh(0.1, 0.01),), duration, steps)
+    return modes, drive, newmark.run(modes, drive, (tanh(0.1, 0.01),), duration, steps)
 
 
 def test_exact_two_masses_ring_slowly_driven():

@@ -13,14 +13,20 @@ from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
-from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Stretch, Tanh, Track, analysis, synthesis
+from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, OfSpeed, Spring, Stretch, Track, analysis, synthesis
 from patchfem.dynamics.harmonic.point import balance_of, group_of, point
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
+from patchfem.friction.laws.tanh import Rate
 
 DRIVE = BaseSine(1.0, 1.0)
 PEAKS = {10: 0.249538145, 100: 0.285786312, 1000: 0.288449682}  # DOP853 at 1e-12, D = 0.8, xi = 0.003
+
+
+def of_speed(limit, speed):
+    """limit tanh(v/speed)."""
+    return OfSpeed(Rate(limit, speed).element(1.0))
 
 
 def harmonics(seed, count, size=1.0):
@@ -70,7 +76,7 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
 
 
 @pytest.mark.parametrize("law", [Jenkins([10.0, 3.0], [0.08, 0.2]), Stretch(0.8, 0.1), Spring(2.0, 5.0),
-                                 Interlock(3.0, 0.5), Tanh(0.8, 0.3)], ids=lambda law: type(law).__name__)
+                                 Interlock(3.0, 0.5), of_speed(0.8, 0.3)], ids=lambda law: type(law).__name__)
 def test_exact_slopes_are_the_derivative_of_the_forces(law):
     group, q = Group(sdof(), law, 4096), harmonics(3, 5)[None]
     fold, v, eps = group(q, 1.3), pack(harmonics(3, 5)[None]), 1e-6
@@ -143,7 +149,7 @@ def test_exact_the_jacobian_of_the_balance():
     for damping in (None, c):
         modes = ModalBasis(("r", "a", "b"), np.array([0.0, 1.0, 3.0]), 0.02 * one, faces[0], one, one, 1.3, damping,
                            faces)
-        group = Group(modes, [(0, Tanh(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, Stretch(0.5, 0.4))], 1024)
+        group = Group(modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, Stretch(0.5, 0.4))], 1024)
         balance = Balance(modes, group.rows, group)
         x = np.random.default_rng(4).normal(size=balance.size(1.1, 3)) * 0.5
         here = balance.system(x, 1.1, 0.7, 3)
@@ -272,7 +278,7 @@ def test_exact_both_rows_of_a_group():
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
 
-@pytest.mark.parametrize("law", [Stretch(0.8, 0.05), Tanh(0.4, 0.05), Interlock(1.0, 0.5)],
+@pytest.mark.parametrize("law", [Stretch(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
                          ids=lambda law: type(law).__name__)
 def test_exact_other_laws_obey_the_equation_of_motion(law):
     """The accelerations of the harmonics against those the law's own force gives."""

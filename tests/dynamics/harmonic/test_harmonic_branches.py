@@ -15,9 +15,10 @@ from patchfem.dynamics.harmonic.continuation import follow
 from patchfem.dynamics.harmonic.floquet import exponentials, is_stable, kind_of_loss, multipliers, product
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance
-from patchfem.dynamics.harmonic.laws import Jenkins, Spring, Stretch, Tanh, synthesis
+from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, Stretch, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
+from patchfem.friction.laws.tanh import Rate
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -29,6 +30,11 @@ CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the flexure at 1 mm
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
 FRICTION = [*STIFF, (0, Jenkins([1e6], [4e-6]))]
+
+
+def of_speed(limit, speed):
+    """limit tanh(v/speed)."""
+    return OfSpeed(Rate(limit, speed).element(1.0))
 
 
 # ---- following a curve
@@ -210,10 +216,10 @@ def test_exact_multipliers_of_the_linear_modes():
 def test_exact_the_determinant_is_liouvilles():
     """det = exp(-int tr) for smooth laws: also with a rate, where the trace varies."""
     modes, drive = sdof(0.05), BaseSine(1.0, 1.2)
-    for law in (Spring(0.1, 0.7), Tanh(0.3, 0.2)):
+    for law in (Spring(0.1, 0.7), of_speed(0.3, 0.2)):
         p = point(modes, drive, law, tolerance=1e-6)
         r = periodic_response(p, modes, drive, 4096)
-        rate = 0.3 / 0.2 / np.cosh(r.slide_rate[:-1] / 0.2)**2 if isinstance(law, Tanh) else np.zeros(4096)
+        rate = 0.3 / 0.2 / np.cosh(r.slide_rate[:-1] / 0.2)**2 if isinstance(law, OfSpeed) else np.zeros(4096)
         trace = (0.1 + rate.mean()) * drive.period
         assert np.linalg.det(monodromy_of(p, modes)) == pytest.approx(np.exp(-trace), rel=1e-5)
 
@@ -286,7 +292,7 @@ def test_exact_small_matrices():
 def test_exact_the_jacobian_of_the_free_balance():
     """Against central differences, with a law of the rate and coupled modes."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = Group(modes, [Tanh(0.4, 0.3), Spring(0.3, 0.8), Stretch(0.5, 0.4)], 1024)
+    group = Group(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), Stretch(0.5, 0.4)], 1024)
     equations = FreeBalance(Balance(modes, group.rows, group), 1, 3, 2.0)
     x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
     found = np.stack([(equations.system(x + d, 0.6)[0] - equations.system(x - d, 0.6)[0]) / 2e-6

@@ -9,7 +9,7 @@ from varying_load_cases import LAWS, LOAD, MASS, balance, crowned, modes
 
 from patchfem.core import BaseSine, PatchfemError, Start
 from patchfem.dynamics.march import march as plain
-from patchfem.dynamics.march import varying_load
+from patchfem.dynamics.march import models, varying_load
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion, advance
@@ -102,10 +102,10 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
     force, soft = atlas.reference.forces(0.0, 0.0), giving(crowned().x)
     if name == "plastic":
         group = jenkins_set(soft, 0.3 * force, 1e-6)
-        model = plain.jenkins_model(group.stiffness, group.yield_slide)
+        model = models.jenkins_model(group.stiffness, group.yield_slide)
     else:
         bonds = {"bonds": Bonds(0.3, 1e-6), "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)}
-        model = plain.points_model(bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21))
+        model = models.points_model(bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21))
     want = plain.march(basis, drive, model, 3, 1600, 3).response
     got = varying_load.march(basis, drive, atlas, law, 3, 1600, 3, shear=reduced(atlas, law)).response
     assert np.abs(got.force).max() > 0.7 * 0.3 * LOAD and 3e-6 < np.abs(got.slide).max() < 2e-5

@@ -170,7 +170,7 @@ def test_exact_engine_of_a_scene(tmp_path):
                                          ("recursion", 1, "stretch", "element")):
         found = build(rig(tmp_path, engine, reading, order))
         numerics = settings_of(found)
-        assert contact_model(found, numerics, None).contact.endswith(f".{kind}_kernels")
+        assert contact_model(found, numerics, None).contact == f"dynamics.contacts.{kind}_kernels"
         used = quadrature_of(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"sum over bonds by {used}" in line for line in plan(found).verdict)

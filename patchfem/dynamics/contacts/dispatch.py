@@ -1,0 +1,42 @@
+"""Several compiled laws as one: a module written beside the compiled code that asks num[e, 0] which law is meant."""
+
+from functools import cache
+
+from ... import compiled
+
+COULOMB = "friction.laws.coulomb_kernels"
+SIGNATURES = {"middle": "num, mem, e, v, dt", "mean": "num, mem, e, q, dq, eps, dt",
+              "commit": "num, mem, e, dq, force, v0, v1, dt, eps", "state": "num, mem, e, q, v",
+              "at_end": "num, e, before, speed, travel"}
+MARCHED = ("middle", "mean", "commit", "state")  # what a march asks of a law
+HEAD = '''"""Laws side by side: num[e, 0] says which one is meant. Written by patchfem.dynamics.contacts.dispatch."""
+
+from numba import njit
+
+{imports}
+from patchfem.friction.flags_kernels import LEAN
+'''
+FUNCTION = '''
+
+@njit(error_model="numpy", **LEAN)
+def {name}({signature}):
+{calls}'''
+
+
+def number_of(laws: tuple) -> dict:
+    """num[e, 0] of every compiled law: 0 for Coulomb's, which the loops ask for its step, from 1 on for the others."""
+    return {COULOMB: 0} | {law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)}
+
+
+@cache
+def law_of(laws: tuple, names: tuple = MARCHED):
+    """The compiled module of one law, or of several that num[e, 0] tells apart; names: functions that are asked for."""
+    if len(laws) == 1:
+        return compiled.load(laws[0])
+    numbers, text = number_of(laws), ""
+    for name in names:
+        calls = [f"    return law_{numbers[law]}.{name}({SIGNATURES[name]})\n" for law in laws]
+        asked = [f"    if num[e, 0] == {numbers[law]}:\n    {call}" for law, call in zip(laws, calls)]
+        text += FUNCTION.format(name=name, signature=SIGNATURES[name], calls="".join([*asked[:-1], calls[-1]]))
+    text = HEAD.format(imports="\n".join(f"import patchfem.{law} as law_{numbers[law]}" for law in laws)) + text
+    return compiled.written(f"dynamics.contacts.laws_{compiled.digest(text)}", text)
