@@ -1,8 +1,9 @@
 """What every law of friction returns for a step, and how it hands itself to compiled code.
 
 A law is start(sigma) -> state, step(state, dq, s0, s1, dt) -> Step for an increment of slide over a pressure that
-changes along the way, and press(state, s0, s1) -> Step for a pressure that changes in time at rest. None of them
-changes the state it was given. No traction outlives the contact, and at rest none exceeds mu sigma.
+changes along the way, and, of laws that a varying load carries, press(state, s0, s1) -> Step for a pressure that
+changes in time at rest. None of them changes the state it was given. No traction outlives the contact, and at rest none
+exceeds mu sigma.
 
 element(load) -> Element is the same law of a whole contact for the loops. The kernels that an Element names are a
 module with three compiled functions of one signature, num (e, k) and mem (e, k) the numbers and memories of e contacts:
@@ -10,7 +11,10 @@ mean(num, mem, e, q, dq, eps, dt) -> (path-mean force [N], its slope over dq [N/
 commit(num, mem, e, dq, force, v0, v1, dt, eps) -> energy dissipated [J], which moves the memory over that increment;
 state(num, mem, e, q, v) -> (force [N], stored energy [J], irreversible part of the slide q [m]).
 A law whose bonds grow has middle(num, mem, e, v, dt) -> eps [m] besides, the bond length of the step. num[e, 0] is left
-to the loops.
+to the loops. What a law is carried by besides asks for more: press in varying loads; at_end(num, e, before, speed,
+travel) -> (force, slopes over speed and travel) at the end of a step in comparison methods; of form "flow" in harmonic
+balance flow(num, e, z, dq, dt) -> (stretch z [m] after, its slopes over z, dq and dt) and pull(num, e, z, v) -> (force,
+its slopes over z and v).
 """
 
 from typing import NamedTuple

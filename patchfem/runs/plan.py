@@ -26,6 +26,13 @@ class Plan:
     groups: dict
     verdict: tuple
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
+                          for name, count in self.unknowns.items())
+        lines = [f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
+                 f"{self.steps} steps, about {self.seconds:.1f} s and {self.bytes / 1e6:.0f} MB"]
+        return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
+
     def as_json(self) -> dict:
         """The object `patchfem plan --json` prints."""
         return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
@@ -86,8 +93,14 @@ def _bonds(model: Model) -> dict:
     if f is None or not load > 0:
         return {}
     rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
-    stretches = f.bond_length and not has(f.law, "averaged")
-    return {"bonds": f.static * load / f.bond_length if stretches else rigid}
+    if has(f.law, "bonds"):
+        return {"bonds": f.static * load / f.bond_length}
+    if has(f.law, "averaged"):
+        return {"bonds": rigid}
+    from ..friction.record import law_from
+
+    one = law_from(f, load).element(load)
+    return {"bonds": one.limit / one.length if one.length else rigid}
 
 
 def _verdict(model: Model, groups: dict, size: int, said: list) -> list:

@@ -75,7 +75,7 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
     if len(laws) != interfaces:
         raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give each interface its own")
     found, number = [law.row(stick_speed) for law in laws], number_of(kernels_of(laws))
-    out = np.zeros((len(laws), max(HEAD + 1, *(len(row) for row in found))))
+    out = np.zeros((len(laws), max([HEAD + 1, *(len(row) for row in found)])))
     for k, (law, row) in enumerate(zip(laws, found)):
         smooth = row[0] > 0
         if not np.all(np.isfinite(row)) or row[1] <= 0 or np.any(row < 0) or (smooth and np.any(row[HEAD + 1:] == 0)):
@@ -97,7 +97,7 @@ def loops(laws):
     from ... import compiled
 
     smooth = tuple(name for name in kernels_of(laws) if name != COULOMB)
-    law = law_of(smooth, ("at_end",)) if smooth else compiled.load(COULOMB)
+    law = law_of(smooth or (COULOMB,), ("at_end",))
     return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})
 
 

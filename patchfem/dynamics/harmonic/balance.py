@@ -37,7 +37,8 @@ def regime(periodic: Periodic) -> tuple:
             if isinstance(law, Jenkins):
                 slips += float(law.stiffness @ (law.limit_slide * (2 * law.limit_slide < swing)))
             elif found.limit:
-                held = isinstance(law, Stretch) and np.ptp(track.q - found.stretch / found.limit) < STUCK * law.length
+                length = getattr(law, "length", 0.0)
+                held = np.ptp(track.q - found.stretch / found.limit) < STUCK * length
                 slips += 0.0 if held else found.limit
     share = slips / whole if whole else 0.0
     return ("no friction" if not whole else "stuck" if not slips else "slides" if share > 1 - 1e-12 else

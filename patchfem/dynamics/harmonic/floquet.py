@@ -33,12 +33,13 @@ class Mark:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fading:
-    """Memory u [1] of bonds: u' = gain q' - loss u per cell (N,), per slide [1/m] and per angle [1]; force limit u."""
+    """Memory u of bonds or of a flow: u' = gain q' - loss u per cell (N,), per slide and per angle [1]; force limit u,
+    limit [N] one number or per cell (N,)."""
 
     row: int
     gain: np.ndarray
     loss: np.ndarray
-    limit: float
+    limit: float | np.ndarray
 
 
 def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()) -> np.ndarray:
@@ -56,7 +57,7 @@ def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), f
     for k, mark in enumerate(marks):
         a[:, n:2 * n, 2 * n + k] = -mark.hold[:, None] * grip[:, mark.row]
     for k, one in enumerate(fading, 2 * n + len(marks)):
-        a[:, n:2 * n, k] = -one.limit * grip[:, one.row]
+        a[:, n:2 * n, k] = -np.multiply.outer(np.broadcast_to(one.limit, cells), grip[:, one.row])
         a[:, k, n:2 * n] = one.gain[:, None] * rows[one.row]
         a[:, k, k] = -one.loss
     steps = exponentials(a * (2 * np.pi / cells))

@@ -96,21 +96,28 @@ def fold(tracks: list, sampled: list) -> Fold:
     lines = [*added("force"), *added("slope"), *(rates if moving else ())]
     lines = [np.zeros(samples) if line is None else line for line in lines]
     found = analysis(np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h)
-    slope, rate = local(found[rows:2 * rows]), None
+    slope, rate = local(found[rows:2 * rows]), np.zeros((rows, h + 1), complex)
+    turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
     at = (3 if moving else 2) * rows
     if moving:
         turned, k = local(found[2 * rows:at]), np.arange(1, h + 1)
         slope[..., 1:h + 1] += turned[..., h + 1:] * (k * omega)
         slope[..., h + 1:] -= turned[..., 1:h + 1] * (k * omega)
         speed = 1j * k * x[:, 1:]
-        rate = np.einsum("ikl,il->ik", turned, np.concatenate([np.zeros((rows, 1)), speed.real, speed.imag], axis=1))
+        rate += np.einsum("ikl,il->ik", turned, np.concatenate([np.zeros((rows, 1)), speed.real, speed.imag], axis=1))
     for i, (track, hold) in enumerate(zip(tracks, holds)):
         if hold is not None and len(hold):
             phase = np.arange(h + 1) * track.turning[0][:, None]
             basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
             slope[i] += found[at:at + len(hold), :h + 1].T @ basis
             at += len(hold)
-    return Fold(found[:rows, :h + 1], slope, rate)
+    for i, laws in enumerate(sampled):
+        for one in laws:
+            if one.tangent is not None:
+                to_slide, to_omega = one.tangent()
+                slope[i] += analysis(to_slide.T, h).T
+                rate[i] += analysis(to_omega, h)
+    return Fold(found[:rows, :h + 1], slope, rate if turns else None)
 
 
 def _sum(arrays: list):

@@ -5,6 +5,7 @@ their number, so what aliases is only the corners of the force, (slope jump)(2 p
 damps every harmonic by (k pi/N)^2/6 besides. Turning points lie where the harmonics have them, not at samples.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import NamedTuple
@@ -30,9 +31,17 @@ def speed_kernels(law: str):
     return instance("dynamics.harmonic.speed_kernels", {"law": load(law)})
 
 
+@cache
+def flow_kernels(law: str):
+    """The loop over the samples of a compiled law of one number of memory."""
+    return instance("dynamics.harmonic.flow_kernels", {"law": load(law)})
+
+
 class Sampled(NamedTuple):
     """Along N samples: force [N], slope over the slide [N/m], over the rate of the slide [N s/m], derivatives (R, N) to
-    the places of the R turning points, friction limit [N] and limit-weighted elastic stretch [N m]."""
+    the places of the R turning points, friction limit [N] and limit-weighted elastic stretch [N m]; tangent() of a law
+    whose memory is not that of turning points: derivatives (N, 2 H + 1) of the force to the harmonics of the slide,
+    real parts and then imaginary ones, and (N,) to the frequency of the cycle."""
 
     force: np.ndarray
     slope: np.ndarray | None = None
@@ -40,6 +49,7 @@ class Sampled(NamedTuple):
     hold: np.ndarray | None = None
     limit: float = 0.0
     stretch: np.ndarray | None = None
+    tangent: Callable | None = None
 
 
 class Track:
@@ -214,6 +224,56 @@ class OfSpeed:
         return Sampled(force, None, slope, None, self.element.limit, np.zeros(track.samples))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Flow:
+    """A law whose memory is its stretch alone, which flows along the slide: its Element of form "flow"."""
+
+    element: Element
+
+    @property
+    def length(self) -> float:
+        """Slide over which it stretches before it slips [m]."""
+        return self.element.length
+
+    @property
+    def total(self) -> float:
+        """Tangent stiffness at rest [N/m]."""
+        return self.element.limit / self.element.length
+
+    def sharpness(self, amplitude: float) -> int:
+        """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
+        return _samples(self.length / max(amplitude, 1e-300))
+
+    def along(self, track: Track) -> tuple:
+        """Stretch z (N,) [m] of the periodic state, its slopes (3, N) over itself, the slide increment and the time of
+        the steps that follow, forces (N,) and their slopes (2, N) over z and the speed."""
+        n = track.samples
+        z, steps, force, slopes = np.empty(n), np.empty((3, n)), np.empty(n), np.empty((2, n))
+        flow_kernels(self.element.kernels).cycle(self.element.numbers[None], track.q, track.omega * track.rate,
+                                                 2 * np.pi / (track.omega * n), z, steps, force, slopes)
+        return z, steps, force, slopes
+
+    def sample(self, track: Track) -> Sampled:
+        """Force at the samples of the periodic state, which is that of a virgin contact where several are."""
+        z, steps, force, slopes = self.along(track)
+
+        def tangent():
+            h, angle = track.x.size - 1, np.arange(track.samples) * (2 * np.pi / track.samples)
+            phase = np.outer(angle, np.arange(h + 1))
+            wave, k = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1), np.arange(1, h + 1)
+            rate = np.concatenate([0 * wave[:, :1], -k * np.sin(phase[:, 1:]), -k * np.cos(phase[:, 1:])], axis=1)
+            dt = 2 * np.pi / (track.omega * track.samples)
+            out = np.empty((track.samples, 2 * h + 2))
+            out[:, :-1], out[:, -1] = np.roll(wave, -1, axis=0) - wave, -dt / track.omega
+            flow_kernels(self.element.kernels).tangents(steps, out)
+            out *= slopes[0][:, None]
+            out[:, :-1] += slopes[1][:, None] * track.omega * rate
+            out[:, -1] += slopes[1] * track.rate
+            return out[:, :-1], out[:, -1]
+
+        return Sampled(force, limit=self.element.limit, stretch=self.element.limit * z, tangent=tangent)
+
+
 def _samples(share: float) -> int:
     """Samples of a cycle for a stick over `share` of the amplitude: it takes the angle acos(1 - 2 share)."""
     angle = np.arccos(max(1 - 2 * share, -1.0))
@@ -229,6 +289,8 @@ def law_of_model(model):
         return Jenkins(one.numbers[2:2 + count], one.numbers[2 + count:])
     if form == "speed":
         return OfSpeed(one)
+    if form == "flow":
+        return Flow(one)
     if model.set_valued:
         raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
                             "law = \"elastic-plastic\" with a short bond_length")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from .floquet import Fading, Mark, is_stable, monodromy, multipliers
-from .laws import Stretch
+from .laws import Flow, Stretch
 
 
 def with_stability(periodic, modes, cells: int = 0):
@@ -21,6 +21,10 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
     marks, fading = [], []
     for i, (track, laws) in enumerate(zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)):
         for law in laws:
+            if isinstance(law, Flow):
+                fading.append(_flow(i, law, track))
+                by_rate[i] += _mean(law.along(track)[3][1], 0.5)
+                continue
             found = law.sample(track)
             if isinstance(law, Stretch):
                 fading.append(_bonds(i, law, track, found))
@@ -76,6 +80,13 @@ def _marks(row: int, track, hold, share, slope) -> list:
             slope[cell] += (1 - x) * line[(cell + 1) % line.size]
             out.append(Mark(row, int(cell), float(x), mean))
     return out
+
+
+def _flow(row: int, law: Flow, track) -> Fading:
+    _, (kept, by_slide, _), _, (by_memory, _) = law.along(track)
+    loss = -np.log(np.maximum(kept, 1e-300))
+    gain = by_slide * np.divide(loss, 1 - kept, out=np.ones_like(loss), where=loss > 1e-9)
+    return Fading(row, gain, loss * (track.samples / (2 * np.pi)), _mean(by_memory, 0.5))
 
 
 def _bonds(row: int, law: Stretch, track, found) -> Fading:

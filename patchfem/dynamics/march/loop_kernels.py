@@ -71,18 +71,18 @@ def holding(motion, plant, drive, accel, spare):
 def follow(path, dt, c, goal, lost, forces):
     """Resultant along a slide path (k,) [m] that is given, with steps of dt [s].
 
-    forces (k, 3): force at the sample, mean over the step that follows, irreversible slip; lost (k, 2): energy
-    dissipated in the step that follows, energy stored at the sample. Returns the steps that did not converge or found
-    the memory of the contact full.
+    forces (k, 3): force at the sample, at the mean speed of the steps beside it, mean over the step that follows,
+    irreversible slip; lost (k, 2): energy dissipated in the step that follows, energy stored at the sample. Returns the
+    steps that did not converge or found the memory of the contact full.
     """
     bad, before = 0, 0.0
     for i in range(path.size):
-        force, energy, slip = contact.state(c, path[i], before)
+        dq = path[i + 1] - path[i] if i < path.size - 1 else before * dt
+        v = dq / dt if dt > 0 else 0.0
+        force, energy, slip = contact.state(c, path[i], 0.5 * (before + v) if i else v)
         forces[i, 0], forces[i, 2], lost[i, 1] = force, slip, energy
         if i == path.size - 1:
             break
-        dq = path[i + 1] - path[i]
-        v = dq / dt if dt > 0 else 0.0
         mean, good = contact.given(dq, path[i], v, dt, c, goal)
         forces[i, 1] = mean
         lost[i, 0], ok = contact.commit(dq, mean, path[i], v, v, dt, c)

@@ -5,6 +5,8 @@ area/eps_0 of every point [m], its pressure [Pa]; mem: bond length [m], then m, 
 point, (5, m).
 """
 
+from math import exp
+
 from numba import njit
 
 from ..bonds.point_kernels import bond_mean, grow, loose_mean, loose_step, rigid_step
@@ -62,6 +64,24 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
             lost += weight[j] * part / 2
     mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
     return lost
+
+
+@njit(error_model="numpy", **LEAN)
+def flow(num, e, z, dq, dt):
+    """(stretch z [m] of full-grown bonds of constant length after a slide dq, its slopes over z, dq and dt)."""
+    length = num[e, GROWTH + 3]
+    end = length if dq > 0 else -length
+    kept = exp(-abs(dq) / length)
+    return end + (z - end) * kept, kept, (1 - z / end) * kept, 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def pull(num, e, z, v):
+    """(force [N] of full-grown bonds stretched by z [m], its slopes over z and the speed)."""
+    m, stiffness = int(num[e, 1]), 0.0
+    for j in range(m):
+        stiffness += num[e, WEIGHT + j] * num[e, WEIGHT + m + j]
+    return stiffness * z, stiffness, 0.0
 
 
 @njit(error_model="numpy", **LEAN)

@@ -70,6 +70,9 @@ def _friction(draft: Draft, at: str, law: Friction) -> None:
     contact = draft.tables.contact
     if law.reading == "report" and (law.law is None or has(law.law, "bonds")) and contact and contact.gives_way:
         draft.say(f"{at}.reading", f"'report' is refused beside {contact.gives_way}; use 'stretch' or leave it out")
+    if law.static == 0 and law.law is not None and takes(law.law, "stiffness"):
+        draft.say(f"{at}.static", f"0 beside law '{law.law}', whose stiffness needs a force to end at; static > 0 is "
+                                  "wanted")  # fmt: skip
     if law.static == 0 and contact and contact.gives_way:
         draft.say(f"{at}.static", f"0 beside {contact.gives_way}: no point carries friction; static > 0 is wanted, or "
                                   f"leave out {contact.gives_way}")  # fmt: skip

@@ -54,6 +54,8 @@ def combinations(draft: Draft, kind: str) -> None:
         return
     if kind == "rig" and (cause := _changing_load(draft)):
         _under_changing_load(draft, law, shear, cause)
+    if kind == "bench" and _still(law) and draft.tables.normal is not None and draft.tables.normal.amplitude:
+        draft.say("normal.amplitude", f"beside law '{law.law}': {refusal('varying-load')}")
     if kind == "rig" and has(law.law, "bonds") and law.breakaway and law.order != 1:
         draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
     if kind == "rig":
@@ -140,7 +142,8 @@ def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
         draft.say("friction.order", f"{law.order:g} beside {shear}: use order = 1; not yet built")
     if not has(law.law, "bonds") and not carries(law, "shear"):
         draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out, or {refusal('shear')}")
-    if has(law.law, "set-valued") and law.static is not None and _inside(law.kinetic, -1, law.static):
+    weakens = law.static is not None and _inside(law.kinetic, -1, law.static)
+    if has(law.law, "set-valued") and carries(law, "shear") and weakens:
         draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside {shear}: leave kinetic "
                                       "out; not yet built")  # fmt: skip
 
@@ -150,12 +153,17 @@ def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
     if shear:
         return f"beside {shear}"
     if kind == "bench":
-        return ""
+        return f"with law '{law.law}'" if _still(law) else ""
     if not has(law.law, "bonds"):
         return f"in a rig with law '{law.law}'"
     if law.reading == "report":
         return "in a rig with reading 'report'"
     return f"in a rig with order = {law.order:g}" if listed(law) else ""
+
+
+def _still(law: Friction) -> bool:
+    """Whether a law knows no pressure that changes: it remembers, and no changing load carries it."""
+    return not (has(law.law, "memoryless") or has(law.law, "bonds") or carries(law, "varying-load"))
 
 
 def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:

@@ -285,8 +285,8 @@ def test_refuses_an_uneven_pressure_on_a_rig():
 
 
 @pytest.mark.parametrize("text, sets, says", [
-    (SLIDE, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
-    (SHORT, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out; not yet built"),
+    (SLIDE, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out, or use law 'coulomb'"),
+    (SHORT, [SHEAR], "friction.law: 'convolution' beside \\[contact.shear\\]: leave it out, or use law 'coulomb'"),
     (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
     (SLIDE, ["contact.strips.count=4"], "contact.strips: beside law 'convolution'"),
     (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),

@@ -97,7 +97,7 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
     patch = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "26 lbf"\n'
              'substrate = "steel"\n[contact.shear]\n[friction]\nlaw = "tanh"\nstatic = 0.3\n{}'
              '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n')
-    with pytest.raises(SceneError, match=r"'tanh' beside .contact\.shear.: leave it out; not yet built"):
+    with pytest.raises(SceneError, match=r"'tanh' beside .contact\.shear.: leave it out, or use law 'coulomb'"):
         loads(patch.format('reference_speed = "1 mm/s"\n'))
     with pytest.raises(SceneError, match="reference_speed: missing"):
         loads(patch.format("").replace("[contact.shear]\n", ""))
