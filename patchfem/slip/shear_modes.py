@@ -5,8 +5,8 @@ Point i feels the local slide q - sum_j C_ij f_j. Both forms hold for the contac
 * Points that yield at a fixed force D_i (Coulomb, or elastic-plastic at constant load and tilt) are together exactly a
 set of parallel Jenkins elements. The inverse of C has off-diagonals <= 0 and row sums > 0, so slip zones only grow
 within a stroke (Masing). Corner nodes of bilinear cells can have a small negative row sum; such a node holds on until
-its neighbours have slipped. That costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401. Six such nodes with 1.4
-% of the load were there; leaving them out would cost that.
+its neighbours have slipped. That costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401. Leaving such nodes out
+would cost their load, 1.4 % for the six of that patch.
 
 * Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight. A few modes carry the resultant.
 """
