@@ -67,6 +67,8 @@ EFFECTS = {
     "friction.law=convolution": _law("laws.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds "
                                      "(Oden, Pires)", ("bond_length", "order spread"), "exact",
                                      "averaged set-valued timeless memoryless"),
+    "friction.law=iwan": _law("laws.iwan", "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max)"
+                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic", "timeless"),
     "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
                                        "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",

@@ -200,6 +200,9 @@ class Friction(Table):
     kinetic: NotNegative | None = None
     reference_speed: Speed | None = None
     bond_length: Length | None = None
+    stiffness: quantity("stiffness", gt=0) | None = None
+    chi: number(gt=-1, le=0) | None = None
+    beta: NotNegative | None = None
     reading: Literal["stretch", "report"] = "stretch"
     order: Number = 1.0
     rest_growth: Acceleration | None = None
