@@ -69,6 +69,8 @@ EFFECTS = {
                                      "averaged set-valued timeless memoryless"),
     "friction.law=iwan": _law("laws.iwan", "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max)"
                               " (Segalman)", ("stiffness chi beta", ""), "joints harmonic", "timeless"),
+    "friction.law=bouc-wen": _law("laws.bouc_wen", "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
+                                  ("stiffness", "exponent shape"), "joints harmonic", "timeless"),
     "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
                                        "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",

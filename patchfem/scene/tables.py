@@ -203,6 +203,8 @@ class Friction(Table):
     stiffness: quantity("stiffness", gt=0) | None = None
     chi: number(gt=-1, le=0) | None = None
     beta: NotNegative | None = None
+    exponent: Positive = 1.0
+    shape: number(gt=0, le=1) = 0.5
     reading: Literal["stretch", "report"] = "stretch"
     order: Number = 1.0
     rest_growth: Acceleration | None = None
