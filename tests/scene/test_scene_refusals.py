@@ -167,7 +167,7 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     found = mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
                      "friction.reference_speed=1 mm/s")  # fmt: skip
     assert found == [f"--set: friction.kinetic: law '{law}' has one coefficient only; "
-                     "kinetic belongs to coulomb and nonlocal"]  # fmt: skip
+                     "kinetic belongs to coulomb, nonlocal and lugre"]  # fmt: skip
 
 
 def test_refuses_report_reading_beside_shear():
