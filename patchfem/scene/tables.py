@@ -162,6 +162,12 @@ class Contact(Table):
     strips: Strips | None = None
 
     @property
+    def shapes(self) -> dict:
+        """Name -> table of every shape given: the tables that lie `on` a piece."""
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: part for name, part in parts.items() if hasattr(part, "on")}
+
+    @property
     def gives_way(self) -> str:
         """What lets the patch slip part by part under one slide of the holders, as written; empty where nothing."""
         if self.shear is not None:
