@@ -22,6 +22,44 @@ Read the package in this order. A module imports its own entry of the list and t
 18. `identify`    values from measurements with intervals
 19. `campaigns`   many runs: fits, error against cost
 20. `export`      summary, netCDF, VTK, report
+21. `api`         load, build, plan and run from Python
+
+From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .api import (
+        Measure,
+        Missing,
+        Model,
+        NotConverged,
+        Outcome,
+        PatchfemError,
+        Plan,
+        Result,
+        Scene,
+        SceneError,
+        build,
+        load,
+        plan,
+        run,
+    )
+
 __version__ = "0.4.0"
+__all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
+           "SceneError", "build", "load", "plan", "run"]
+
+
+def __getattr__(name: str):
+    if name not in __all__:
+        raise AttributeError(f"module 'patchfem' has no attribute {name!r}")
+    from . import api
+
+    globals().update({each: getattr(api, each) for each in __all__})
+    return globals()[name]
+
+
+def __dir__() -> list:
+    return [*__all__, "__version__"]

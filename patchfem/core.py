@@ -4,9 +4,12 @@ Letters for shapes, the same everywhere: m interface points, n modes, k times, t
 Signs: compression, normal stress and load > 0; slip = upper - lower; rotation > 0 opens the gap at +x.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from math import floor, isfinite, log10
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -210,12 +213,56 @@ class BaseSine:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measure:
-    """One number with its unit and its numerical error (half-width; None where none is estimated)."""
+    """One number with its unit, its numerical error (half-width; None where none is estimated) and what it means.
+
+    `str` of it is the value and its error, both rounded by the error: ``1.4808e-05 ± 4.4e-08 m``.
+    """
 
     value: float | None
     unit: str
     error: float | None = None
     floor: float = 0.0
+    text: str = ""
+
+    def __str__(self) -> str:
+        value, error = rounded(self.value, self.error)
+        return " ".join([value, *(["±", error] if error else []), *([self.unit] if self.unit != "1" else [])])
+
+    def __repr__(self) -> str:
+        return f"{self} ({self.text})" if self.text else str(self)
+
+
+class Row(NamedTuple):
+    """One measure that a run may have: its name, its unit, the absolute floor of its error and its meaning.
+
+    of: its function of the solution, None where a run of another kind or an engine alone has it; grain: samples of a
+    cycle that its reading may be off by.
+    """
+
+    name: str
+    unit: str
+    floor: float
+    text: str
+    of: Callable | None = None
+    grain: float = 0.0
+
+
+def rounded(value: float | None, error: float | None = None) -> tuple[str, str]:
+    """Value and error as texts that end at the same digit, the second of the error; six digits of the value at most.
+
+    A dash stands for no value, an empty text for no error.
+    """
+    if value is None:
+        return "-", ""
+    second = "" if error is None else f"{error:.2g}"
+    if not error or not isfinite(error) or not isfinite(value) or value == 0:
+        return f"{value:.6g}", second
+    size, place = floor(log10(abs(value))), int(f"{error:.1e}".split("e")[1]) - 1  # of the first and the last digit
+    if place < size - 5:
+        return f"{value:.6g}", second
+    if not -4 <= size < 6 or place > 0:
+        return f"{value:.{max(0, size - place)}e}", f"{error:.1e}"
+    return f"{value:.{-place}f}", f"{error:.{-place}f}"
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -133,13 +133,14 @@ def _split_file(model: Model, level: int) -> tuple:
     from ..mesh.tensor import TensorGrid, finer
     from ..model.pieces import bodies_of
     from ..runs.patch.press import solve
-    from ..runs.patch.values import UNITS, values
+    from ..runs.patch.rows import TABLE
+    from ..runs.patch.values import values
 
     low, high = bodies_of(model.patch)
     for _ in range(level):
         low, high = (None if body is None else finer(body) if isinstance(body, TensorGrid) else halved(body)
                      for body in (low, high))
-    return values(solve(model.patch, low, high, True)), UNITS
+    return values(solve(model.patch, low, high, True)), {name: row.unit for name, row in TABLE.items()}
 
 
 def turned_by(runs: list) -> list:

@@ -3,7 +3,7 @@
 import csv
 from pathlib import Path
 
-from .pictures import _figure, _styled, _svg
+from .pictures import drawing, styled
 
 
 def write(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> tuple:
@@ -22,10 +22,10 @@ def write(folder: Path, knob: str, runs: list, tolerance: float, names: list) ->
     return table, picture
 
 
-@_styled
-def draw(knob: str, runs: list, tolerance: float, names: list) -> str:
+@styled
+def draw(knob: str, runs: list, tolerance: float, names: list):
     """Relative error of each measure against the seconds of a run, as SVG text."""
-    figure, (axis,) = _figure(1, 5.0)
+    figure, (axis,) = drawing(1, 5.0)
     chain, alone = [one for one in runs if one.value is not None], [one for one in runs if one.value is None]
     for number, name in enumerate(names):
         points = [(one.seconds, _relative(one, name)) for one in chain]
@@ -47,7 +47,7 @@ def draw(knob: str, runs: list, tolerance: float, names: list) -> str:
     star = "; star: the mesh that the tolerance chooses" if alone else ""
     axis.set(xlabel="seconds of a run", ylabel="relative error", title=f"What accuracy costs: {knob}{star}")
     axis.legend(fontsize=8)
-    return _svg(figure)
+    return figure
 
 
 def _relative(one, name: str):

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from .pictures import BLUE, GREY, ORANGE, _figure, _styled, _svg, axis_unit
+from .pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
 
 G = 9.80665
 STYLES = {"stable": "-", "stuck": "-", "unstable": "--", "unbounded": ":"}
@@ -48,14 +48,14 @@ def caption(found: dict) -> str:
     return text + (" Shaded: no bounded motion." if not np.all(np.isfinite(found["amplitude"])) else "")
 
 
-@_styled
-def curve(found: dict) -> str:
+@styled
+def curve(found: dict):
     """Amplitude of the steady motion over frequency or level, its regime by colour and line: stable ones whole,
     unstable ones broken; folds marked."""
     along, what, unit = axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
     value = np.asarray(found["amplitude"]) * scale
-    figure, (axis,) = _figure(1, 3.8)
+    figure, (axis,) = drawing(1, 3.8)
     parts = spans(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     for regime, first, last in parts:
@@ -70,7 +70,7 @@ def curve(found: dict) -> str:
     axis.set(xlabel=f"{what} [{unit}]", ylabel=f"half peak-to-peak [{name}]", title="Steady motion at the output")
     axis.set_ylim(bottom=0)
     axis.legend()
-    return _svg(figure)
+    return figure
 
 
 def _gaps(axis, along, value) -> None:
@@ -81,15 +81,15 @@ def _gaps(axis, along, value) -> None:
         axis.axvspan(along[max(first - 1, 0)], along[min(last, along.size - 1)], color=GREY, alpha=0.12, lw=0)
 
 
-@_styled
-def levels(rows: list) -> str:
+@styled
+def levels(rows: list):
     """Amplitude after every level, in the order of the test; arrows run upwards and downwards."""
     drive = np.array([row["drive"] for row in rows]) / G
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
     name, scale = axis_unit(amplitude, "m")
     error = np.array([row["errors"].get("relative_displacement_amplitude", 0.0) for row in rows]) * scale
     held = np.array([row["stuck"] for row in rows])
-    figure, (axis,) = _figure(1, 3.6)
+    figure, (axis,) = drawing(1, 3.6)
     y, seen = amplitude * scale, set()
     for k in range(len(rows) - 1):
         up = drive[k + 1] >= drive[k]
@@ -106,4 +106,4 @@ def levels(rows: list) -> str:
     axis.set(xlabel="base acceleration [g]", ylabel=f"half peak-to-peak [{name}]", title="Level by level")
     axis.set_ylim(bottom=0)
     axis.legend()
-    return _svg(figure)
+    return figure

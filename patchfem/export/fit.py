@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .pictures import BLUE, GREY, ORANGE, _figure, _styled, _svg, axis_unit
+from .pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
 
 LABEL = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
 
@@ -23,10 +23,10 @@ def write_rows(path: Path, time, displacement, measured, model, held, quantity: 
             rows.writerow([*(repr(value) for value in values), int(out)])
 
 
-@_styled
-def draw(displacement, measured, model, held, quantity: str) -> str:
+@styled
+def draw(displacement, measured, model, held, quantity: str):
     """Measured and fitted reading against displacement, and what is left over along the rows, as SVG text."""
-    figure, (loop, rest) = _figure(2, 3.6)
+    figure, (loop, rest) = drawing(2, 3.6)
     name, unit = LABEL[quantity]
     along, size = axis_unit(displacement, "m")
     up, scale = axis_unit(measured, "N") if unit == "N" else ("1", 1.0)
@@ -40,7 +40,7 @@ def draw(displacement, measured, model, held, quantity: str) -> str:
     rest.axhline(0, color="0.4", lw=0.8)
     rest.set(xlabel="row", ylabel=f"fitted - measured [{up}]", title="What is left over")
     loop.legend(loc="center", frameon=False)
-    return _svg(figure)
+    return figure
 
 
 def lines_of(answer: dict) -> list:

@@ -69,7 +69,7 @@ def write(result: Result, path: Path) -> dict:
     begin = perf_counter()
     text = result.plan.model.source.resolved
     (path / "scene.resolved.toml").write_text(text, encoding="utf-8")
-    _write_netcdf(result, path / "result.nc", text)
+    _write_netcdf(result, path / "result.nc")
     data = report_data(result)
     if result.patch is not None:
         from .fields.bodies import write_fields
@@ -121,7 +121,14 @@ def _between(result: Result) -> dict:
                for name, (many, one) in columns.items()}}
 
 
-def _write_netcdf(result: Result, path: Path, text: str) -> None:
+def _write_netcdf(result: Result, path: Path) -> None:
+    from . import netcdf
+
+    netcdf.write(dataset(result), path)
+
+
+def dataset(result: Result):
+    """The xarray.Dataset of result.nc: histories, interface frames, levels, events, curve, provenance."""
     from . import netcdf
 
     histories, modal = _histories(result)
@@ -142,7 +149,7 @@ def _write_netcdf(result: Result, path: Path, text: str) -> None:
         data = netcdf.with_curve(data, extra["curve"])
     if "regime" in extra:
         data = data.assign_attrs(regime=extra["regime"], largest_multiplier=_multiplier(extra))
-    netcdf.write(data, path, summary_of(result), text, versions())
+    return netcdf.described(data, summary_of(result), result.plan.model.source.resolved, versions())
 
 
 def _multiplier(extra: dict) -> float:

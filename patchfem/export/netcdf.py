@@ -119,14 +119,18 @@ def _attributes(name: str, dimensions: int = 1) -> dict:
     return {"units": unit, "long_name": text}
 
 
-def write(data: xr.Dataset, path: Path, summary: dict, scene_text: str, versions: dict) -> None:
-    """Write through a temporary file beside `path`; provenance holds no host name and no path."""
-    data = data.assign_attrs({
+def described(data: xr.Dataset, summary: dict, scene_text: str, versions: dict) -> xr.Dataset:
+    """With where the numbers come from: program, scene, outcome, measures; no host name and no path."""
+    return data.assign_attrs({
         "Conventions": "CF-1.11", "title": summary["title"], "source": f"patchfem {summary['patchfem']}",
         "outcome": summary["outcome"], "scene": scene_text,
         "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
         "summary": json.dumps({k: summary[k] for k in ("kind", "measures", "warnings")}, ensure_ascii=False),
         "versions": json.dumps(versions)})
+
+
+def write(data: xr.Dataset, path: Path) -> None:
+    """Write through a temporary file beside `path`."""
     encoding = {name: {"zlib": True, "complevel": 1} for name in data.data_vars if data[name].ndim}
     partial = Path(path).with_name(Path(path).name + ".partial")
     data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)

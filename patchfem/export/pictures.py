@@ -2,6 +2,7 @@
 
 import io
 import re
+from functools import partial, wraps
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def whole_from(time, period: float, window_start: float) -> float:
     return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
 
 
-def _figure(columns: int = 1, height: float = 3.2, **layout):
+def drawing(columns: int = 1, height: float = 3.2, **layout):
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -81,20 +82,32 @@ def _figure(columns: int = 1, height: float = 3.2, **layout):
 
 def _svg(figure) -> str:
     """The drawing alone, without date, creator or any address but those of the XML namespaces."""
+    import matplotlib
+
     text = io.StringIO()
-    figure.savefig(text, format="svg", dpi=180, metadata={"Date": None})
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(text, format="svg", dpi=180, metadata={"Date": None})
     body = text.getvalue()
     return re.sub(r"\s*<metadata>.*?</metadata>", "", body[body.index("<svg"):], flags=re.DOTALL)
 
 
-def _styled(draw):
-    def wrapped(*args, **kwargs):
+def styled(draw):
+    """A function that draws a Figure, as one that answers with its SVG text; its `figure` gives the Figure itself,
+    which a notebook shows as the same SVG."""
+    @wraps(draw)
+    def figure(*args, **kwargs):
         import matplotlib
 
         with matplotlib.rc_context(STYLE):
-            return draw(*args, **kwargs)
-    wrapped.__doc__ = draw.__doc__
-    return wrapped
+            drawn = draw(*args, **kwargs)
+        drawn._repr_svg_ = partial(_svg, drawn)
+        return drawn
+
+    @wraps(draw)
+    def svg(*args, **kwargs) -> str:
+        return _svg(figure(*args, **kwargs))
+    svg.figure = figure
+    return svg
 
 
 def part_in_contact(x, sigma) -> tuple | None:
@@ -106,12 +119,12 @@ def part_in_contact(x, sigma) -> tuple | None:
     return max(x[0], x[used[0]] - pad), min(x[-1], x[used[-1]] + pad)
 
 
-@_styled
-def interface(x, fields: dict) -> str:
+@styled
+def interface(x, fields: dict):
     """sigma_n(x) of the pressed state and, where some shear acts, tau(x) with the frame of the largest resultant."""
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
     both = tau is not None and bool(np.any(tau))
-    figure, axes = _figure(2 if both else 1, 3.2)
+    figure, axes = drawing(2 if both else 1, 3.2)
     part = part_in_contact(x, sigma) or (x[0], x[-1])
     along, mm = axis_unit(part, "m")
     unit, scale = axis_unit(sigma, "Pa")
@@ -129,7 +142,7 @@ def interface(x, fields: dict) -> str:
                     title=f"Shear stress, largest resultant at {fields['time'][frame] * per:.4g} {name}")
     for axis in axes:
         axis.set(xlabel=f"x [{along}]", xlim=(part[0] * mm, part[1] * mm))
-    return _svg(figure)
+    return figure
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:
@@ -145,8 +158,8 @@ def closer(x, depth, sigma, ratio: float) -> tuple:
     return left, left + width, height
 
 
-@_styled
-def bodies(x, depths, mises, sigma) -> str:
+@styled
+def bodies(x, depths, mises, sigma):
     """Von Mises stress [Pa] of both pieces, pressed: the whole pair, and closer where sigma (m,) [Pa] is not zero.
 
     depths, mises: (ny,) rows and (nx - 1, ny - 1) cells of the lower and of the upper piece; colours end at all but the
@@ -155,7 +168,7 @@ def bodies(x, depths, mises, sigma) -> str:
     tall, depth = 3.7, max(depths, key=lambda rows: rows[-1])
     wide = min(max(tall * (x[-1] - x[0]) / (2 * depth[-1]), 1.5), 4.2)
     rest = WIDTH - wide - 2.3
-    figure, axes = _figure(2, tall + 0.7, width_ratios=(wide, rest))
+    figure, axes = drawing(2, tall + 0.7, width_ratios=(wide, rest))
     box = closer(x, depth, sigma, rest / tall)
     (unit, scale), top = axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"), 0.0
     for axis, (left, right, height) in zip(axes[::-1], (box, (x[0], x[-1], depth[-1]))):
@@ -179,29 +192,29 @@ def bodies(x, depths, mises, sigma) -> str:
     axes[0].set_title("Von Mises stress")
     axes[1].set_title("The framed part")
     figure.colorbar(mesh, ax=list(axes), label=unit, extend="max", fraction=0.05, pad=0.02)
-    return _svg(figure)
+    return figure
 
 
-@_styled
-def loop(slide, force, title: str) -> str:
+@styled
+def loop(slide, force, title: str):
     """Friction force [N] against slide [m]."""
-    figure, (axis,) = _figure(1, 3.6)
+    figure, (axis,) = drawing(1, 3.6)
     along, um = axis_unit(slide, "m")
     up, scale = axis_unit(force, "N")
     axis.plot(slide * um, force * scale, color=BLUE, lw=1.0)
     axis.set(xlabel=f"slide [{along}]", ylabel=f"friction force [{up}]", title=title)
-    return _svg(figure)
+    return figure
 
 
-@_styled
-def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles") -> str:
+@styled
+def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles"):
     """The whole run beside its last cycles (a rig) or beside its friction force (a bench).
 
     history: time, displacement, force; window: the last cycles alone, with base and block acceleration;
     period [s] of the drive, None where every sample was kept.
     """
     forced = window is None and bool(np.any(history["force"]))
-    figure, axes = _figure(2 if window or forced else 1, 3.6)
+    figure, axes = drawing(2 if window or forced else 1, 3.6)
     name, per = axis_unit(history["time"], "s")
     start = window["time"][0] if window else 0.0
     _whole_run(axes[0], history, period, per, start)
@@ -212,7 +225,7 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
         axes[1].set(xlabel=f"time [{name}]", ylabel=f"friction force [{up}]", title="Friction force")
     if window:
         _last_cycles(axes[1], window, title)
-    return _svg(figure)
+    return figure
 
 
 def _whole_run(axis, history, period, per, window_start) -> None:
@@ -253,13 +266,13 @@ def _last_cycles(axis, window: dict, title: str) -> None:
     axis.legend(handles=lines, loc="upper center", ncols=2, bbox_to_anchor=(0.5, -0.17))
 
 
-@_styled
-def measured(rows: list, frequency: float, level: float, acceleration, displacement) -> str:
+@styled
+def measured(rows: list, frequency: float, level: float, acceleration, displacement):
     """Measured acceleration and displacement against input at one frequency, with the computed point.
 
     rows: objects of the measured table; acceleration, displacement: (value, error) computed, in SI, or None.
     """
-    figure, axes = _figure(2, 3.6)
+    figure, axes = drawing(2, 3.6)
     near = [r for r in rows if abs(r.frequency - frequency) < 0.5]
     legend = {}
     for axis, name, unit, scale, found in ((axes[0], "acceleration", "g", 9.80665, acceleration),
@@ -282,4 +295,4 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
         axis.margins(x=0.08, y=0.1)
         axis.set_ylim(bottom=0)
     figure.legend(list(legend.values()), list(legend), loc="outside lower center", ncols=max(1, len(legend)))
-    return _svg(figure)
+    return figure

@@ -2,12 +2,15 @@
 
 import re
 import tomllib
+from collections.abc import Callable
 from html import escape
-from math import floor, isfinite, log10, pi
+from math import isfinite, pi
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from ..core import rounded
 from . import curves, pictures
 
 CSS = """
@@ -32,21 +35,13 @@ WORKSHOP = {  # as pictures.LADDERS
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 SETTLED = ("steady", "stuck", "done")
+DASH = "&ndash;"
 
 
 def matched(value, error=None) -> tuple:
-    """Value and error as texts that end at the same digit, the second of the error; six digits of the value at most."""
-    if value is None:
-        return "&ndash;", "&ndash;"
-    second = "&ndash;" if error is None else f"{error:.2g}"
-    if not error or not isfinite(error) or not isfinite(value) or value == 0:
-        return f"{value:.6g}", second
-    size, place = floor(log10(abs(value))), int(f"{error:.1e}".split("e")[1]) - 1  # of the first and the last digit
-    if place < size - 5:
-        return f"{value:.6g}", second
-    if not -4 <= size < 6 or place > 0:
-        return f"{value:.{max(0, size - place)}e}", f"{error:.1e}"
-    return f"{value:.{-place}f}", f"{error:.{-place}f}"
+    """Value and error as `core.rounded` writes them, a dash of the page for what there is not."""
+    texts = rounded(value, error)
+    return (texts[0] if value is not None else DASH), texts[1] or DASH
 
 
 def units(name: str, value: float, unit: str) -> list:
@@ -167,23 +162,36 @@ def _placed(number: int, svg: str, caption: str) -> str:
 
 def figures(data: dict) -> list:
     """[(svg, caption)] of the pictures that this run has something to show in."""
-    drawn = [draw(data) for draw in (_curve, _levels, _interface, _bodies, _loop, _histories, _measured)]
-    return [shown for shown in drawn if shown is not None]
+    found = [picture(name, data) for name in PICTURES]
+    return [(one.draw(*one.values), one.caption) for one in found if one is not None]
 
 
-def _curve(data: dict) -> tuple | None:
+class Picture(NamedTuple):
+    """A picture that a run can be shown in: a function of `pictures` or `curves`, its arguments, a caption."""
+
+    draw: Callable
+    values: tuple
+    caption: str
+
+
+def picture(name: str, data: dict) -> Picture | None:
+    """The picture of this name (a key of PICTURES), None where the run has nothing to show in it."""
+    return PICTURES[name](data)
+
+
+def _curve(data: dict) -> Picture | None:
     found = data.get("curve")
-    return None if found is None else (curves.curve(found), curves.caption(found))
+    return None if found is None else Picture(curves.curve, (found,), curves.caption(found))
 
 
-def _levels(data: dict) -> tuple | None:
+def _levels(data: dict) -> Picture | None:
     if "levels" not in data:
         return None
-    return curves.levels(data["levels"]), ("Amplitude at the end of every level, the state carried from one to the "
-                                           "next; arrows show the order of the test.")
+    return Picture(curves.levels, (data["levels"],), "Amplitude at the end of every level, the state carried from one "
+                   "to the next; arrows show the order of the test.")
 
 
-def _interface(data: dict) -> tuple | None:
+def _interface(data: dict) -> Picture | None:
     if not pressed(data):
         return None
     fields, caption = data["fields"], "Normal stress of the pressed pieces"
@@ -193,10 +201,10 @@ def _interface(data: dict) -> tuple | None:
     if pictures.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = pictures.axis_unit(data["x"], "m")
         caption += f". Shown is the part in contact, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
-    return pictures.interface(data["x"], fields), caption + "."
+    return Picture(pictures.interface, (data["x"], fields), caption + ".")
 
 
-def _bodies(data: dict) -> tuple | None:
+def _bodies(data: dict) -> Picture | None:
     if "bodies" not in data or not pressed(data):
         return None
     effects = [e["effect"] for e in data["summary"]["effects"]]
@@ -206,28 +214,28 @@ def _bodies(data: dict) -> tuple | None:
     mises = data["bodies"]["mises"]
     largest = max(float(np.max(part)) for part in mises)
     unit, scale = pictures.axis_unit([largest], "Pa")
-    return (pictures.bodies(data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
-            f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} {unit}.")
+    return Picture(pictures.bodies, (data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
+                   f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} {unit}.")
 
 
-def _loop(data: dict) -> tuple | None:
+def _loop(data: dict) -> Picture | None:
     if "loop" not in data or not np.any(data["loop"]["force"]) or np.ptp(data["loop"]["slide"]) == 0:
         return None
     own = data["loop"]
     whole = "window" not in data or part_of_cycle(data)
     span = "the whole run" if whole else f"the last {(own['time'][-1] - own['time'][0]) / own['period']:.3g} cycles"
     title = "Friction force against slide" if part_of_cycle(data) or cycles(data) is None else "Friction loop"
-    return (pictures.loop(own["slide"], own["force"], title),
-            f"Resultant friction force against the slide of the interface, over {span}.")
+    return Picture(pictures.loop, (own["slide"], own["force"], title),
+                   f"Resultant friction force against the slide of the interface, over {span}.")
 
 
-def _histories(data: dict) -> tuple | None:
+def _histories(data: dict) -> Picture | None:
     if "history" not in data:
         return None
     history, period, window, title = data["history"], data["loop"].get("period"), None, ""
     if "window" not in data:
         force = " and friction force" if np.any(history["force"]) else ""
-        return pictures.histories(history, None, None), f"Slide{force} over the whole run."
+        return Picture(pictures.histories, (history, None, None), f"Slide{force} over the whole run.")
     w = data["window"]
     late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
     window = {k: v[late] for k, v in w.items()}
@@ -242,10 +250,10 @@ def _histories(data: dict) -> tuple | None:
             if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
         unit, scale = pictures.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
-    return pictures.histories(history, window, period, title), caption
+    return Picture(pictures.histories, (history, window, period, title), caption)
 
 
-def _measured(data: dict) -> tuple | None:
+def _measured(data: dict) -> Picture | None:
     m, found = data.get("measured", {}), data["summary"]["measures"]
     if m.get("input") is None or m.get("frequency") is None:
         return None
@@ -255,8 +263,13 @@ def _measured(data: dict) -> tuple | None:
         points.append(None if one["value"] is None else
                       (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
     factor = f" (reading factor {m['gain']:g})" if m["gain"] != 1 else ""
-    return (pictures.measured(m["rows"], m["frequency"], m["input"], *points),
-            f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
+    return Picture(pictures.measured, (m["rows"], m["frequency"], m["input"], *points),
+                   f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
+
+
+# in the order of the page
+PICTURES = {"curve": _curve, "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop,
+            "history": _histories, "measured": _measured}
 
 
 def _unsettled(data: dict) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
 from ..effects import absent
@@ -41,6 +42,9 @@ class Model:
     accuracy: Accuracy
     measured: tuple | None
     absent: tuple
+
+    def __repr__(self) -> str:
+        return f"Model of {self.source.path.name}: {self.kind}; {shorten(', '.join(self.source.effects), 160)}"
 
     @property
     def side(self) -> str:

@@ -7,11 +7,10 @@ off the last cycles of a run. A new measure is a new row.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Response
+from ..core import Response, Row
 from .measures import acceleration_peak, drift, energy_balance, interface_loop, ledger_measures, slip_measures
 
 
@@ -62,58 +61,56 @@ class Seen:
         return None if load is None or self.load is None else float(value(load))
 
 
-class Row(NamedTuple):
-    """One measure. of: its function of Seen, None where a run of another kind or an engine alone has it; grain: samples
-    of a cycle that its reading may be off by."""
-
-    name: str
-    unit: str
-    floor: float
-    text: str
-    of: Callable | None = None
-    grain: float = 0.0
-
-
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak motion at the output, relative to the base",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window)),
-    Row("friction_force_peak", "N", 1e-6, "largest resultant of the friction of the interface",
+    Row("friction_force_peak", "N", 1e-6, "largest resultant friction force of the interface",
         lambda s: float(np.abs(s.window.force).max()) if s.load is not None else None),
-    Row("energy_balance", "1", 1e-8, "what the energy book misses, over the power that went in and the peak stored",
+    Row("energy_balance", "1", 1e-8,
+        "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
         lambda s: energy_balance(s.book)),
-    Row("drift_per_cycle", "m", 1e-11, "motion of the mean slide per cycle",
+    Row("drift_per_cycle", "m", 1e-11, "motion of the middle of the slide per cycle",
         lambda s: drift(s.window.time, s.window.slide, s.drive.period)),
-    Row("slip_amplitude", "m", 1e-10, "half peak-to-peak of the irreversible part of the slide",
+    Row("slip_amplitude", "m", 1e-10,
+        "half peak-to-peak of the irreversible part of the slide, weighted by the pressure",
         lambda s: s.slip.get("slip_amplitude")),
-    Row("stick_fraction", "1", 1e-3, "share of the time in which the interface does not slip",
+    Row("stick_fraction", "1", 1e-3, "share of the time in which the interface does not slip, of the last cycles",
         lambda s: s.slip.get("stick_fraction"), 4.0),
     Row("slip_start_phase", "rad", 1e-3, "phase of the base displacement at which slip starts after a stick, modulo pi",
         lambda s: s.slip.get("slip_start_phase"), 4 * np.pi),
-    Row("normal_load", "N", 0.0, "normal load of the interface, all pairs together", lambda s: s.load),
+    Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load),
     Row("loop_area", "J", 1e-10, "work of friction per cycle", lambda s: s.cycle.get("loop_area")),
-    Row("equivalent_stiffness", "N m-1", 1.0, "part of the friction in phase with the slide, over its amplitude",
+    Row("equivalent_stiffness", "N m-1", 1.0,
+        "first harmonic of the friction in phase with the slide, over the slide's",
         lambda s: s.cycle.get("equivalent_stiffness")),
-    Row("equivalent_damping", "1", 1e-8, "loop area over 2 pi K A^2, K the first mode's, A half the slide's range",
+    Row("equivalent_damping", "1", 1e-8,
+        "loop area over 2 pi K A^2, K the stiffness of the first mode, A half the range of the slide",
         lambda s: s.cycle.get("equivalent_damping")),
     Row("friction_work", "J", 1e-10, "work that went into the interface over the run",
         lambda s: s.energies.get("friction_work")),
     Row("energy_stored", "J", 1e-10, "elastic energy in the interface at the end"),
     Row("energy_dissipated", "J", 1e-10, "energy that friction turned into heat over the run",
         lambda s: s.energies.get("energy_dissipated")),
-    Row("energy_created", "J", 1e-10, "energy that a law as printed made over the run",
+    Row("energy_created", "J", 1e-10,
+        "energy that a law without passivity, the report's as printed, created over the run",
         lambda s: s.energies.get("energy_created")),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min)),
     Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max)),
     Row("open_fraction", "1", 1e-3, "share of the time without contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0),
-    Row("friction_ratio_end", "1", 1e-9, "friction over normal load at the end of the slide"),
-    Row("friction_ratio_peak", "1", 1e-9, "largest friction over normal load"),
-    Row("work_check", "1", 1e-2, "trapezoid of the run's own samples against the ledger's friction work, relative"),
+    Row("relative_displacement_amplitude_steady", "m", 1e-10,
+        "amplitude at which a motion that has not settled would settle, extrapolated"),
+    Row("peak_frequency", "Hz", 0.0, "drive frequency of the largest amplitude on a curve of steady motions"),
+    Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide"),
+    Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run"),
+    Row("work_check", "1", 1e-2,
+        "friction work by the trapezoidal rule on the run's own samples against that of its ledger, relative"),
     Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
     Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
-    Row("onset_level", "m s-2", 0.0, "level of the drive at which the interface starts to slip"),
+    Row("onset_level", "m s-2", 0.0,
+        "level of the drive at which the interface starts to slip, halved between two levels"),
     Row("jump_level", "m s-2", 0.0, "level after the largest jump of the amplitude between two levels"),
     Row("level_hysteresis", "m", 0.0, "largest difference of the amplitude at one level passed upwards and downwards"),
 )

@@ -26,6 +26,13 @@ class Plan:
     groups: dict
     verdict: tuple
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
+                          for name, count in self.unknowns.items())
+        lines = [f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
+                 f"{self.steps} steps, about {self.seconds:.1f} s and {self.bytes / 1e6:.0f} MB"]
+        return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
+
     def as_json(self) -> dict:
         """The object `patchfem plan --json` prints."""
         return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],

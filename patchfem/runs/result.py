@@ -1,10 +1,11 @@
 """What a run found, and the parts of it that every kind of run shares."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core import Measure, Outcome
+from .patch.rows import TABLE as STATIC
 from .plan import Plan
 
 FRAMES = 16  # of the interface, in the last cycle
@@ -25,6 +26,27 @@ class Result:
     seconds: dict
     warnings: list
     extra: dict
+
+    def __repr__(self) -> str:
+        counts = [f"{len(found) or 'no'} {word}{'s' * (len(found) != 1)}" for found, word in
+                  ((self.measures, "measure"), (self.warnings, "warning"))]
+        return f"Result of {self.plan.model.source.path.name}, {self.outcome}: {self.outcome.sentence}\n" \
+               f"  {' and '.join(counts)}, {self.seconds.get('total', 0.0):.2f} s"
+
+
+def worded(measures: dict, apart: str) -> dict:
+    """The measures with what each of them means; apart: what a number behind a name counts, interfaces or strips."""
+    return {name: replace(m, text=meaning(name, apart)) for name, m in measures.items()}
+
+
+def meaning(name: str, apart: str = "interface") -> str:
+    """What a measure means, by its name in a summary: slip_amplitude_2 is that of the second interface."""
+    if name in STATIC:
+        return STATIC[name].text
+    from ..response.rows import of_first, row_of  # a static patch needs none of them
+
+    first = of_first(name)
+    return row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 
 def still(patch) -> dict:

@@ -10,7 +10,7 @@ from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
-from .result import FRAMES, Result, frames_of, still, unripe, warming, without_errors
+from .result import FRAMES, Result, frames_of, still, unripe, warming, without_errors, worded
 
 __all__ = ["Plan", "Result", "plan", "run"]
 
@@ -54,7 +54,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     else:
         result = _KINDS[what.kind](what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
     seconds["total"] = perf_counter() - begin
-    return replace(result, warnings=result.warnings + _loose(result))
+    apart = "strip" if model.patch is not None else "interface"
+    return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + _loose(result))
 
 
 def _unloaded(model: Model) -> bool:

@@ -2,5 +2,5 @@
 
 In: text of a scene and --set words. Out: `Scene`, frozen tables of SI values with the line of every key.
 `tables` holds the keys, `types` their kinds, `rules/` what excludes or needs what, `text` the resolved scene.
-Read `scene` first, then `tables`.
+Read `scene` first, then `tables`. What every key means stands in README.md beside them.
 """

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from . import quantities
-from .reader import _message, _owner, _set_value
+from .reader import _message, _set_value, owner_of
 from .types import choices, keys, kind_of, model_of, parts
 
 
@@ -63,10 +63,10 @@ def _range(text: str) -> Range:
 
 def _numeric(key: str) -> tuple:
     """Model and attribute of a key that holds one number; ValueError with the nearest known key otherwise."""
-    model, name = _owner(key)
+    model, name = owner_of(key)
     if model is None:
         table, _, last = key.rpartition(".")
-        owner, at = _owner(table) if table else (None, "")
+        owner, at = owner_of(table) if table else (None, "")
         inner = model_of(owner, at) if owner is not None else None
         help = f"; {choices(last, keys(inner))}" if inner is not None else ""
         raise ValueError(f"{key}: not a key of a scene{help}")

@@ -48,7 +48,7 @@ class Draft:
 
     def lacks(self, key: str, reason: str) -> None:
         """Note a missing key, at the line of its table."""
-        model, name = _owner(key)
+        model, name = owner_of(key)
         want = _wanted(model, name) if model else ""
         self.say(key, "missing" + "".join(f"; {text}" for text in dict.fromkeys((want, reason)) if text))
 
@@ -134,7 +134,7 @@ def _item(draft: Draft, items: list[Any], wanted: str, key: str) -> str:
 
 
 def _set_value(path: str, text: str) -> Any:
-    model, name = _owner(path)
+    model, name = owner_of(path)
     plain_text = model is not None and str in (model.model_fields[name].annotation, *_types(model, name))
     try:
         found = tomllib.loads(f"value = {text}")
@@ -157,18 +157,20 @@ def _ends_in_comment(text: str) -> bool:
     return False
 
 
-def _owner(key: str) -> tuple[type[Table] | None, str]:
-    """Model and attribute a dotted key belongs to; None for a key no table knows."""
+def owner_of(key: str) -> tuple[type[Table] | None, str]:
+    """Model and attribute a dotted key belongs to, items of an array by number or name; None for a key no table has."""
     model: type[Table] | None = Tables
-    name = ""
+    name, items = "", False
     for piece in key.split("."):
-        if piece.isdigit():
+        if piece.isdigit() or items:
+            items = False
             continue
         if name:
             model = model_of(model, name)
         name = keys(model).get(piece, "") if model else ""
         if not name:
             return None, ""
+        items = model_of(model, name) is not None and get_origin(model.model_fields[name].annotation) is tuple
     return model, name
 
 
@@ -181,7 +183,7 @@ def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> An
             _unknown(draft, model, key, value, path)
             continue
         inner = model_of(model, names[key])
-        plain = _is_value(model, names[key])
+        plain = is_value(model, names[key])
         if inner is not None and not (plain and not isinstance(value, dict)):
             value = _nested(draft, model, names[key], inner, value, path)
         if value is not None:
@@ -233,7 +235,7 @@ def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], val
 
 
 def _unknown(draft: Draft, model: type[Table], key: str, value: Any, path: str) -> None:
-    tables = [name for name, at in keys(model).items() if model_of(model, at) and not _is_value(model, at)]
+    tables = [name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)]
     is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))
     known = tables if is_table and tables else list(keys(model))
     found = choices(key, known)
@@ -246,7 +248,7 @@ def _types(model: type[Table], name: str) -> tuple[Any, ...]:
     return tuple(parts(model.model_fields[name].annotation))
 
 
-def _is_value(model: type[Table], name: str) -> bool:
+def is_value(model: type[Table], name: str) -> bool:
     """Whether a key that may hold an inline table may hold a plain value as well: a material, a coating."""
     return model_of(model, name) is Material or any(get_origin(part) is Literal for part in _types(model, name))
 

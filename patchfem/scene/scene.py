@@ -11,6 +11,7 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 from ..effects import takes
@@ -56,6 +57,10 @@ class Scene:
     remarks: list[str]
     sets: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        sets = f"\n  with {shorten(', '.join(self.sets), 160)}" if self.sets else ""
+        return f"Scene of {self.path.name}: {self.kind}; {shorten(', '.join(self.named()), 160)}{sets}"
+
     def tables(self) -> tables.Tables:
         """All tables as one model, absent ones None."""
         names = tables.Tables.model_fields
@@ -93,7 +98,11 @@ def load(path: str | Path, sets: Iterable[str] = ()) -> Scene:
         line = content.count(b"\n", 0, error.start) + 1
         byte = content[error.start]
         raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
-    found = loads(text, path, sets)
+    return with_files(loads(text, path, sets))
+
+
+def with_files(found: Scene) -> Scene:
+    """The scene itself; SceneError where a file that it names is not there."""
     missing = [_no_file(found, *named) for named in _files(found) if not found.beside(named[1]).is_file()]
     if missing:
         raise SceneError(missing)

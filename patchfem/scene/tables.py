@@ -1,6 +1,6 @@
 """The tables of a scene as frozen pydantic models: one model per table, one attribute per key, floats in SI.
 
-What a key means stands in the README; here stand its kind, its limits and its default. Whether keys fit together
+What a key means stands in `scene.meanings`; here stand its kind, its limits and its default. Whether keys fit together
 is the business of `scene.rules.check`, reading a file that of `scene`.
 """
 
@@ -160,6 +160,12 @@ class Contact(Table):
     asperities: Asperities | None = None
     shear: Shear | None = None
     strips: Strips | None = None
+
+    @property
+    def shapes(self) -> dict:
+        """Name -> table of every shape given: the tables that lie `on` a piece."""
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: part for name, part in parts.items() if hasattr(part, "on")}
 
     @property
     def gives_way(self) -> str:

@@ -11,15 +11,16 @@ again on the way: of the rise that a full rest promises 28 % shows with l_k = 0.
 Run: python studies/bench/ageing.py
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
 
 from patchfem.closed_forms.friction import steady_bond_length
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
@@ -80,10 +81,8 @@ def main(holds=HOLDS, parts=(0.5, 5.0, 50.0), path: Path | None = HERE / "ageing
 
 def draw(path: Path, rows: list, parts) -> None:
     """Peaks of the stretch reading against the rest, below the closed form of the bond length."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6.4, 3.6))
-        FigureCanvasSVG(figure)
-        axis, time = figure.subplots(), 10.0 ** np.linspace(-2, 1, 121)
+    time = 10.0 ** np.linspace(-2, 1, 121)
+    with drawing(path, (6.4, 3.6)) as (_, axis):
         axis.semilogx(time, aged(time, parts[-1]), color="0.2", label="ε_d/ε₀ (2.10 at rest)")
         for part, colour in zip(parts, (GREY, ORANGE, BLUE)):
             mine = [row for row in rows if row["part"] == part]
@@ -91,7 +90,6 @@ def draw(path: Path, rows: list, parts) -> None:
                           label=f"peak, l_k = {part:g} ε₀")
         axis.set(xlabel="rest [s]", ylabel="friction over μ_s N", title="Breakaway after a rest", ylim=(0.45, 1.05))
         axis.legend()
-        figure.savefig(path, metadata={"Date": None})
 
 
 if __name__ == "__main__":

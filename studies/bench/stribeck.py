@@ -9,15 +9,16 @@ mu_k is not mu_s eps_k/eps_0 as 2.21 has it. The benches follow G to 2e-6.
 Run: python studies/bench/stribeck.py
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
 
 from patchfem.closed_forms.friction import growth_factor, steady_bond_length
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
@@ -81,10 +82,8 @@ def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = HERE / "stribeck.s
 
 def draw(path: Path, rows: list, slips) -> None:
     """One panel per slip growth: lines are closed forms, marks are benches."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.4))
-        FigureCanvasSVG(figure)
-        for axis, part in zip(figure.subplots(1, len(slips), sharey=True, squeeze=False)[0], slips):
+    with drawing(path, (9.6, 3.4), 1, len(slips), sharey=True, squeeze=False) as (_, axes):
+        for axis, part in zip(axes[0], slips):
             slip, mine = part * LENGTH, [row for row in rows if row["slip"] == part]
             fine = 10.0 ** np.linspace(-2, 2, 81)
             speeds, at = fine * np.sqrt(REST * slip), [row["share"] for row in mine]
@@ -95,8 +94,7 @@ def draw(path: Path, rows: list, slips) -> None:
                 axis.semilogx(at, [row[order][0] for row in mine], "s", color=colour, ms=4, label="as printed")
             axis.set(xlabel="speed over √(a_s l_k)", title=f"l_k = {part:g} ε₀", ylim=(0, 0.65))
         axis.legend(fontsize=7)
-        figure.axes[0].set_ylabel("friction over load")
-        figure.savefig(path, metadata={"Date": None})
+        axes[0, 0].set_ylabel("friction over load")
 
 
 if __name__ == "__main__":

@@ -8,16 +8,15 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-import drift_table
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+from drift_laws import LENGTH, PERIOD, SHARES, ladder
 from force_control import OutOfReach, drift
 
 from patchfem.closed_forms.friction import dither_drift, stretch_loop
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 from patchfem.friction.bonds.recursion import Recursion
 
 HERE = Path(__file__).parent
@@ -27,10 +26,10 @@ MARCHED = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 
 def growing(share: float, swing: float) -> float:
     """Drift per cycle [bond lengths] at .5 +- swing with growth; nan where the block slides away."""
-    engine = Recursion(drift_table.ladder.bonds(breakaway=share, **drift_table.ladder.GROWTH))
+    engine = Recursion(ladder.bonds(breakaway=share, **ladder.GROWTH))
     try:
-        return drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=drift_table.PERIOD,
-                     length=drift_table.LENGTH) / drift_table.LENGTH
+        return drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=PERIOD,
+                     length=LENGTH) / LENGTH
     except OutOfReach:
         return np.nan
 
@@ -38,11 +37,8 @@ def growing(share: float, swing: float) -> float:
 def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
     """Draw both panels; the file written."""
     swing, amplitude = np.linspace(0, 0.4, 401), 10.0 ** np.linspace(-1, 1.5, 200)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.4))
-        FigureCanvasSVG(figure)
-        left, right = figure.subplots(1, 2)
-        for colour, b in zip(COLOURS, drift_table.SHARES):
+    with drawing(path, (9.6, 3.4), 1, 2) as (_, (left, right)):
+        for colour, b in zip(COLOURS, SHARES):
             left.plot(swing, [dither_drift(0.5 - s, 0.5 + s, b) for s in swing], color=colour, label=f"b = {b:g}")
             left.plot(marched, [growing(b, s) for s in marched], "o--", ms=3, lw=0.8, color=colour)
             right.semilogx(amplitude, stretch_loop(amplitude, 1.0, 1.0, b)[0] / (4 * amplitude), color=colour,
@@ -53,7 +49,6 @@ def main(path: Path = HERE / "drift.svg", marched=MARCHED) -> Path:
         right.set(xlabel="amplitude [bond lengths]", ylabel="loop area / 4 A μs N", ylim=(0, 1))
         left.legend(title="elastic range", alignment="left")
         right.legend()
-        figure.savefig(path, metadata={"Date": None})
     return path
 
 

@@ -8,16 +8,17 @@ only the caption could be read, neither axes nor the values of p: these p span t
 Run: python studies/figures/figure_13.py
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 from scipy.special import gammaincinv
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+
 from patchfem.closed_forms.friction import weight_along
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 ORDERS = (-0.5, 0.0, 1.0, 2.0)
@@ -41,16 +42,12 @@ def main(path: Path | None = HERE / "figure_13.svg") -> list:
 
 def draw(path: Path, x) -> None:
     """The figure as SVG."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6.0, 3.4))
-        FigureCanvasSVG(figure)
-        axis = figure.subplots()
+    with drawing(path, (6.0, 3.4)) as (_, axis):
         for p, colour in zip(ORDERS, COLOURS):
             shown = x[1:] if p < 0 else x
             axis.plot(shown, weight_along(shown, p), color=colour, label=f"p = {p:g}")
         axis.set(xlabel="R/ε", ylabel="φ", xlim=(0, 8), ylim=(0, 1.2), title="Weight along the path (2.14)")
         axis.legend()
-        figure.savefig(path, metadata={"Date": None})
 
 
 if __name__ == "__main__":

@@ -8,16 +8,17 @@ could be read.
 Run: python studies/figures/figure_14.py
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 from scipy.integrate import quad
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+
 from patchfem.closed_forms.friction import weight_across
-from patchfem.export.pictures import BLUE, STYLE
+from patchfem.export.pictures import BLUE
 
 HERE = Path(__file__).parent
 
@@ -28,13 +29,10 @@ def main(path: Path | None = HERE / "figure_14.svg") -> list:
     for y, weight, share in rows:
         print(f"eta/rho = {y:3g}: W = {weight:.4f}, {100 * share:.2f} % within")
     if path is not None:
-        with rc_context(STYLE):
-            figure = Figure(figsize=(6.0, 3.4))
-            FigureCanvasSVG(figure)
-            axis, y = figure.subplots(), np.linspace(-4, 4, 401)
+        y = np.linspace(-4, 4, 401)
+        with drawing(path, (6.0, 3.4)) as (_, axis):
             axis.plot(y, weight_across(y), color=BLUE)
             axis.set(xlabel="η/ρ", ylabel="W", xlim=(-4, 4), ylim=(0, 0.45), title="Weight across the path (2.15)")
-            figure.savefig(path, metadata={"Date": None})
     return rows
 
 

@@ -1,11 +1,8 @@
-"""What does a step of each rung cost? The least of several runs, A = 12.5 bond lengths, 200 steps per cycle.
+"""What does a step of each law of the ladder cost? The least of several runs, A = 12.5 bond lengths, 200 steps a cycle.
 
-Compiled (path_kernels.py: mean force and new memory of one point, nothing around it), over the constant length's 16 ns
-with the energy of its bonds: Coulomb 0.01, tanh 0.5, elastic-plastic 0.5, Bouc-Wen by one Runge-Kutta step 1.0 (n = 2)
-and 1.5 (n = 5), breakaway 1.3, stretch 2.2, LuGre as a limit of it 3.8 (its exponents are large), Iwan 0.9 (5
-elements), 1.3 (20), 1.8 (50) and 2.9 (100), report of constant length 38 (a list of strips, one per stroke), report
-with growth 460 (a merged list at three or more instants of a step). In NumPy a step costs 0.03 to 0.06 ms in every law
-with a memory, most of it calls: 0.5 (elastic-plastic) to 1.1 (LuGre) of the constant length, the sum over bonds 4.
+Compiled, the constant bond length takes 16 ns with the energy of its bonds. Over it Coulomb takes 0.01, the
+elastic-plastic law 0.5, the stretch 2.2, Iwan 0.9 (5 elements) to 2.9 (100), the report of constant length 38 and with
+growth 460. In NumPy every law with a memory takes 0.03 to 0.06 ms, most of it calls. README.md has the whole table.
 
 Run: python studies/friction_ladder/costs.py
 """
@@ -17,10 +14,10 @@ from time import perf_counter
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-import ladder
+import ladder_cycles as ladder
 import path_kernels as loops
 import today
-from ladder import HERTZ, LENGTH
+from ladder_cycles import HERTZ, LENGTH
 
 from patchfem.dynamics.march.models import list_model, load_kernels
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff

@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+import costs
 import ladder
+from drawing import drawing
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 AMPLITUDES = 10.0 ** np.linspace(-1, 1.75, 12)
@@ -40,16 +40,10 @@ PRICE = {("off", "report p = 1"): ("report, constant", "report", (-34, -11)),
 
 def main(path: Path = HERE / "ladder.svg", amplitudes=AMPLITUDES, times=None) -> Path:
     """Draw the panels; times: seconds per step of costs.compiled(), measured anew by default; the file written."""
-    if times is None:
-        import costs
-
-        times = costs.compiled()
+    times = costs.compiled() if times is None else times
     rows = {(row.growth, row.rung, row.amplitude): row for a in (*amplitudes, 3.0)
             for row in ladder.constant(a, 200 if a < 1 else 400) + ladder.growing(a, 200 if a < 1 else 400)}
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.9))
-        FigureCanvasSVG(figure)
-        panels = figure.subplots(1, 3, sharey=True)
+    with drawing(path, (9.6, 3.9), 1, 3, {"bbox_inches": "tight"}, sharey=True) as (_, panels):
         for axis, growth, curves, title in ((panels[0], "off", OFF, "constant bond length"),
                                             (panels[1], "on", ON, "growing bond length")):
             for rung, (text, colour, line) in curves.items():
@@ -65,7 +59,6 @@ def main(path: Path = HERE / "ladder.svg", amplitudes=AMPLITUDES, times=None) ->
         panels[0].set(ylabel="rms force error [share of μs N]", ylim=(2e-4, 2))
         for axis in panels[:2]:
             axis.legend(fontsize=6.5, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
-        figure.savefig(path, metadata={"Date": None}, bbox_inches="tight")
     return path
 
 

@@ -19,97 +19,27 @@ Run: python studies/integrators/failure.py
 """
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from problems import SDOF, SDOF_DRIVE, SDOF_LIMIT, TWO, TWO_LIMIT, exact
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+from failure_cases import CASES, SLIDES, STEPS, refined, solve
+from problems import TWO, exact
 
-from patchfem.core import Segment
-from patchfem.dynamics.comparison import duhamel, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.structure.drives import Piecewise
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
-SLIDES = 8.079711463905416  # exact instant at which mass 2 moves first
-END, MOVED = 40.0, 0.05
-def elastic(length: float, printed: bool = False) -> Smooth:
-    """The elastic-plastic law of the two modes."""
-    return Smooth(ElasticPlastic(TWO_LIMIT, length).element(1.0), printed)
-
-
-PLAIN, BRANCH = Coulomb(TWO_LIMIT, TWO_LIMIT), Coulomb(TWO_LIMIT, TWO_LIMIT, 0.01)
-CASES = (  # name, law, step, what must not change, by how much, relaxation
-    ("Fig 17, 18: displacement 1e-2", PLAIN, 0.05, "displacement", 1e-2, 0.1),
-    ("displacement 1e-3", PLAIN, 0.05, "displacement", 1e-3, 0.5),
-    ("displacement 1e-6", PLAIN, 0.05, "displacement", 1e-6, 0.1),
-    ("Fig 19, 20: velocity 1e-4", PLAIN, 0.05, "velocity", 1e-4, 0.1),
-    ("velocity 1e-6", PLAIN, 0.02, "velocity", 1e-6, 0.5),
-    ("force 1e-3", PLAIN, 0.02, "force", 1e-3, 0.5),
-    ("static branch, force 1e-6", BRANCH, 0.02, "force", 1e-6, 0.5),
-    ("Fig 21, 22: elastic 0.01, velocity 1e-6", elastic(0.01), 0.01, "velocity", 1e-6, 0.5),
-    ("elastic 0.01, force 1e-6", elastic(0.01), 0.01, "force", 1e-6, 0.5),
-    ("3.12 as printed, eps 0.03", elastic(0.03, True), 0.01, "velocity", 1e-6, 0.5),
-)
 DRAWN = {"Fig 17, 18: displacement 1e-2": "displacement", "Fig 19, 20: velocity 1e-4": "velocity",
          "static branch, force 1e-6": "force, static branch", "Fig 21, 22: elastic 0.01, velocity 1e-6": "elastic"}
-STEPS = (50, 100, 200, 500, 1000, 2000, 5000, 10000)
-CYCLES = 200
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Row:
-    """One way to integrate Fig 16. early: largest |x2| before it can move; moves: time, |force| when |x2| passes 0.05;
-    jumps: share of steps on which the force changes by more than 1; worst, mean: force of the law at the accepted state
-    less the force used; failed: share of steps without convergence; error: of x2 at t = 20 (exact -0.305217)."""
-
-    name: str
-    early: float
-    moves: float
-    force: float
-    jumps: float
-    worst: float
-    mean: float
-    failed: float
-    error: float
-    run: object
-
-
-def solve(name, law, step, criterion, tolerance, relax) -> Row:
-    """Run one case and judge it."""
-    drive = Piecewise((Segment(0.0, 0.0, 1.0, 1.14),), 1000 * step, False)
-    found = duhamel.run(TWO, drive, (law,), END, 1000, criterion, tolerance, relax)
-    x, force, t = found.slide(TWO)[0], found.force[0], found.time
-    first, early = int(np.argmax(np.abs(x) > MOVED)), np.abs(x[t < SLIDES]).max()
-    miss = np.abs(found.residual[0, 1:])
-    return Row(name, float(early), float(t[first]), float(abs(force[first])),
-               float(np.mean(np.abs(np.diff(force)) > 1)), float(miss.max()), float(miss.mean()),
-               found.failures / (t.size - 1), float(np.interp(20, t, x) - exact("two", [20.0]).slide[0]), found)
-
-
-def refined(speed: float, by_force: bool, steps=STEPS) -> list:
-    """Relative errors of the peak of the stick-slip block by Newmark with a stick speed, one per steps per cycle."""
-    times = np.linspace(CYCLES - 1, CYCLES, 2001) * SDOF_DRIVE.period
-    peak = np.abs(exact("sdof", times).slide).max()
-    law = (Coulomb(SDOF_LIMIT, SDOF_LIMIT),)
-    runs = (newmark.run(SDOF, SDOF_DRIVE, law, CYCLES * SDOF_DRIVE.period, n, speed, by_force) for n in steps)
-    return [float(np.abs(found.z[-n:]).max() / peak - 1) for n, found in zip(steps, runs)]
 
 
 def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path:
     """x2 and force of four ways beside the exact ones, and the error of Newmark against the step."""
     truth = exact("two", np.linspace(0, 20, 2001))
-    with rc_context(STYLE):
-        figure = Figure(figsize=(11.5, 4.6))
-        FigureCanvasSVG(figure)
-        axes = figure.subplots(2, 5)
+    with drawing(path, (11.5, 4.6), 2, 5) as (_, axes):
         for column, (name, title) in enumerate(DRAWN.items()):
             found = next(r for r in rows if r.name == name).run
             upper, lower = axes[0, column], axes[1, column]
@@ -134,7 +64,6 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
             axis.legend(title="v", fontsize=7, title_fontsize=7)
         axes[0, 4].set_ylabel("|error of the peak|")
         axes[1, 4].set(xlabel="steps per cycle", ylabel="|error of the peak|")
-        figure.savefig(path, metadata={"Date": None})
     return path
 
 

@@ -7,15 +7,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import fixtures
 import tilted
+from drawing import drawing
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 from patchfem.runs.patch.press import pressed
 
 HERE = Path(__file__).parent
@@ -34,10 +33,7 @@ def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
 
 def main(path: Path = HERE / "misalignment.svg", tilts=TILTS) -> Path:
     """Draw both panels; the file written."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 3.6))
-        FigureCanvasSVG(figure)
-        left, right = figure.subplots(1, 2, sharey=True)
+    with drawing(path, (9.6, 3.6), 1, 2, sharey=True) as (_, (left, right)):
         for axis, title, curves in (
                 (left, "smooth, holder", [(s, "bare", text) for s, text in FIXTURES.items()]),
                 (right, "rigid, skin", [(None, skin, text) for skin, text in SKINS.items()])):
@@ -49,7 +45,6 @@ def main(path: Path = HERE / "misalignment.svg", tilts=TILTS) -> Path:
             above = axis.secondary_xaxis("top", functions=(lambda m: 12.7 * m, lambda um: um / 12.7))
             above.set_xlabel("height over the patch [um]")
         left.set_ylabel("rubbed part of the patch [%]")
-        figure.savefig(path, metadata={"Date": None})
     return path
 
 

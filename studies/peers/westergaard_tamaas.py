@@ -15,65 +15,20 @@ Run: python studies/peers/westergaard_tamaas.py
 """
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
-from common import Peer, run, timed
-from strip import wavy_pair, wavy_press
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from peer import Peer, run
+from westergaard_wave import HIGH, MATERIAL, MEAN, WAVE, Row, errors_of, finite_elements, ours, places
 
-from patchfem import closed_forms as exact
-from patchfem.contact.halfspace import press_periodic, wave_numbers
-
-WAVE, HIGH, SHARE = 80e-6, 1.5e-6, 0.5
-MATERIAL = (250e9, 0.24)  # of one body; the other is rigid
-MODULUS = exact.combined_modulus(*MATERIAL, np.inf, 0.0)
-MEAN = SHARE * exact.westergaard_full_pressure(WAVE, HIGH, MODULUS)
 POINTS = (256, 1024, 4096)  # of one wave
 TOLERANCES = {"patchfem": (1e-10, 1e-11), "Tamaas": (1e-6, 1e-8, 1e-10)}  # of each program's own residual
 CELLS = (16, 32, 64)  # per half wave, finite elements
 NEAR = 1.01  # a solve counts as exact as its grid when its L2 error is within this of the least of both programs
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Row:
-    """One solve: relative errors of p(0) and of p(x) in the mean square; CPU seconds from the gap to the pressure."""
-
-    program: str
-    points: int
-    tolerance: float
-    seconds: float
-    iterations: int
-    top: float
-    mean_square: float
-
-
-def errors_of(x, p, mean=MEAN, modulus=MODULUS) -> tuple:
-    """(relative error of p(0), relative mean-square error) of pressures p (m,) [Pa] at x (m,) [m]."""
-    truth = exact.westergaard_pressure(x, mean, WAVE, HIGH, modulus)
-    crest = int(np.argmin(np.abs(x)))
-    return float(p[crest] / truth[crest] - 1), float(np.linalg.norm(p - truth) / np.linalg.norm(truth))
-
-
-def places(points: int) -> np.ndarray:
-    """Points of one wave, its crest in the middle [m]."""
-    return (np.arange(points) - points // 2) * WAVE / points
-
-
-def half_space(points: int, tolerance: float):
-    """patchfem's periodic half planes."""
-    waves = np.concatenate([[0.0], 2 / (MODULUS * wave_numbers(points, WAVE)[1:])])
-    gap = 2 * HIGH * np.sin(np.pi * places(points) / WAVE)**2
-    return press_periodic(waves, gap, WAVE, MEAN * WAVE, tolerance=tolerance)
-
-
-def ours(points: int, tolerance: float) -> Row:
-    """One timed solve of patchfem."""
-    state, seconds = timed(lambda: half_space(points, tolerance))
-    return Row("patchfem", points, tolerance, seconds, state.iterations, *errors_of(places(points), state.pressure))
 
 
 def theirs(peer: Peer, points: int, tolerance: float, count: bool) -> Row:
@@ -82,14 +37,6 @@ def theirs(peer: Peer, points: int, tolerance: float, count: bool) -> Row:
                      count=count)
     return Row("Tamaas", points, tolerance, found["seconds"], found["iterations"],
                *errors_of(places(points), np.array(found["pressure"])))
-
-
-def finite_elements(cells: int, share: float = SHARE) -> tuple:
-    """(p(0) error, mean-square error) of two elastic pieces between lines of symmetry, `cells` per half wave."""
-    modulus = exact.combined_modulus(*MATERIAL)
-    state = wavy_press(wavy_pair(cells, WAVE, MATERIAL), share, HIGH, modulus)
-    mean = share * exact.westergaard_full_pressure(WAVE, HIGH, modulus)
-    return errors_of(np.linspace(0, WAVE / 2, cells + 1), state.sigma_n, mean, modulus)
 
 
 def _median(rows: list) -> Row:
@@ -107,7 +54,7 @@ def fastest(rows: list, program: str, points: int) -> Row:
 
 def main(points=POINTS, repeats: int = 9, cells=CELLS) -> list:
     """Medians of all rows, printed with the ratios of time; Missing where Tamaas is absent."""
-    with threadpool_limits(1), Peer("Tamaas", "tamaas_child.py", "PATCHFEM_TAMAAS_PYTHON", sys.executable,
+    with threadpool_limits(1), Peer("Tamaas", "peers/tamaas_child.py", "PATCHFEM_TAMAAS_PYTHON", sys.executable,
                                     "pip install tamaas") as peer:
         print(f"Tamaas {peer.version}")
         warm_up = ours(64, 1e-10), theirs(peer, 64, 1e-8, False)

@@ -15,20 +15,18 @@ lengths), 200 steps a cycle, as long as bonds live. Error: largest of the run ag
 Run: python studies/quadrature/error_cost.py
 """
 
-from math import ceil
+import sys
 from pathlib import Path
-from time import process_time
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
-from patchfem.dynamics.march.models import list_model, load_kernels
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
-from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import cutoff
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+from list_runs import along, bonds, slide
+
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 AMPLITUDES = (0.1, 1.0, 3.0, 10.0, 50.0)
@@ -36,7 +34,6 @@ TAILS = (1e-2, 1e-3, 1e-4, 1e-6)
 WIDTHS = (0.2, 0.1, 0.05, 0.02, 0.01)
 STEPS = (50, 100, 200, 400)
 FINEST = 1600
-ROOM = 200_000
 
 
 class Row(NamedTuple):
@@ -49,32 +46,6 @@ class Row(NamedTuple):
     error: float
     micro: float
     strips: int
-
-
-def bonds(amplitude: float) -> Bonds:
-    """The printed law of order 1 with growing bonds whose healing at a reversal is the same at every amplitude."""
-    return Bonds(1.0, 1.0, 1.0, "report", 0.5, 0.3 * amplitude, 0.05, 1e-2 * amplitude / 3, 0.0)
-
-
-def slide(amplitude: float, steps: int) -> tuple:
-    """(path, step) until bonds of the first stroke are gone: 20 bond lengths, two cycles at least."""
-    cycles = max(2, ceil(20 / (4 * amplitude)))
-    return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps), 2 * np.pi / steps
-
-
-def along(law, path, dt, tail, merge, repeats=1) -> tuple:
-    """(forces at the samples, microseconds per step, longest list) of one engine."""
-    model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
-    model.fields["bondlist"] = np.zeros((10, ROOM)) if not merge else model.fields["bondlist"]
-    hub, best = load_kernels(), np.inf
-    for _ in range(repeats):
-        contact, work = model.build(hub)
-        burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-        begin = process_time()
-        bad = hub.follow_path(path, dt, model.kind, contact, work, 1e-11, burnt, forces)
-        best = min(best, process_time() - begin)
-        assert bad == 0
-    return forces[:, 0], 1e6 * best / (path.size - 1), int(contact.tally[10])
 
 
 def main(amplitudes=AMPLITUDES, repeats=2) -> list:
@@ -110,10 +81,8 @@ def table(rows) -> str:
 def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
     """Error against time per step, one panel per amplitude."""
     amplitudes = sorted({r.amplitude for r in rows})
-    with rc_context(STYLE):
-        figure = Figure(figsize=(2.4 * len(amplitudes), 2.7))
-        FigureCanvasSVG(figure)
-        axes = np.atleast_1d(figure.subplots(1, len(amplitudes), sharex=True, sharey=True))
+    with drawing(path, (2.4 * len(amplitudes), 2.7), 1, len(amplitudes), sharex=True, sharey=True) as (_, axes):
+        axes = np.atleast_1d(axes)
         for ax, amplitude in zip(axes, amplitudes):
             for engine, color, mark in (("truncated", ORANGE, "o"), ("merged", BLUE, "s"),
                                         ("steps", GREY, "^")):
@@ -125,7 +94,6 @@ def draw(rows, path: Path = HERE / "error_cost.svg") -> Path:
             ax.set(title=f"A = {amplitude:g} ε₀", xlabel="µs per step")
         axes[0].set_ylabel("error [share of μ_s N]")
         axes[-1].legend(frameon=False, fontsize=6, loc="lower right")
-        figure.savefig(path, metadata={"Date": None})
     return path
 
 

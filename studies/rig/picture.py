@@ -3,15 +3,16 @@
 Run: python studies/rig/picture.py
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
 
 from patchfem.core import G_N
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+from patchfem.export.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs.measured import read_table
 from patchfem.runs import run as runner
 from patchfem.scene import scene
@@ -24,10 +25,7 @@ def main(path: Path = HERE / "rig.svg") -> Path:
     found = runner.run(runner.plan(scene.load(HERE / "rig.toml")), estimate=False)
     x, fields, window = found.patch.x * 1e3, found.fields, found.window
     rows = [r for r in read_table(HERE / "table1.csv") if abs(r.frequency - 143) < 0.5 and r.acceleration]
-    with rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 2.7))
-        FigureCanvasSVG(figure)
-        a, b, c, d = figure.subplots(1, 4)
+    with drawing(path, (9.6, 2.7), 1, 4) as (_, (a, b, c, d)):
         a.fill_between(x, fields["normal_stress"][0] / 1e6, color=BLUE, alpha=0.3, lw=0)
         a.set(title="σn(x) [MPa]", xlabel="x [mm]", xlim=(-6.4, -3.2))
         for k in range(1, len(fields["shear_stress"])):
@@ -41,7 +39,6 @@ def main(path: Path = HERE / "rig.svg") -> Path:
         d.plot([5], [peak], "D", color=BLUE, ms=5, label="computed")
         d.set(title="acceleration [g], 143 Hz", xlabel="input [g]", ylim=(0, 14))
         d.legend(frameon=False, fontsize=7)
-        figure.savefig(path, metadata={"Date": None})
     assert np.isfinite(peak)
     return path
 

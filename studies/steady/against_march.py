@@ -14,47 +14,21 @@ scenes get the exact engine.
 Run: python studies/steady/against_march.py
 """
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+import steady_pictures
+from rig_texts import TEXTS
+
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent
-BLOCK = """
-[normal]
-load = "26 lbf"
-[friction]
-law = "LAW"
-static = 0.30
-MORE
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 600
-"""
-LENGTH = 'bond_length = "1 um"'
-YAW = '[drive]', '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n[drive]'
-TEXTS = {"Coulomb": BLOCK.replace("LAW", "coulomb").replace("MORE", ""),
-         "elastic-plastic": BLOCK.replace("LAW", "elastic-plastic").replace("MORE", LENGTH),
-         "bonds": BLOCK.replace("LAW", "nonlocal").replace("MORE", LENGTH)}
-TEXTS["Coulomb, two modes"] = TEXTS["Coulomb"].replace(*YAW)
-PATCH = (HERE.parent / "integrators" / "patch.toml").read_text()
-TEXTS["patch of 41 elements"] = PATCH
 NAMES = tuple(TEXTS)
 FREQUENCIES = np.linspace(115.5, 174.0, 40)  # Hz, 1.5 apart, 144 among them
 MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
@@ -100,33 +74,6 @@ def row(contact: str, frequency: float, steps: int = STEPS, cycles: float = CYCL
     return Row(contact, frequency, _kept(steady), _kept(march), run, steady.extra["regime"], worst)
 
 
-def picture(table: dict, path: Path = HERE / "against_march.svg") -> Path:
-    """Amplitude over frequency, both ways, and their difference below."""
-    names = list(table)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(2.6 * len(names), 4.6))
-        FigureCanvasSVG(figure)
-        axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
-        for (top, low), name in zip(axes.T, names):
-            rows = table[name]
-            f = [r.frequency for r in rows]
-            top.semilogy(f, [1e6 * r.steady[MEASURES[0]] for r in rows], "-", color=BLUE, label="steady")
-            top.semilogy(f, [1e6 * r.march[MEASURES[0]] for r in rows], "o", color=ORANGE, ms=3, label="march")
-            low.semilogy(f, [max(r.miss(MEASURES[0]), 1e-16) for r in rows], "o-", color=ORANGE, ms=3, lw=0.7,
-                         label="march")
-            if rows[0].run is not None:
-                low.semilogy(f, [max(r.miss(MEASURES[0], "run"), 1e-16) for r in rows], "s-", color=GREY, ms=3, lw=0.7,
-                             label="long exact run")
-            top.set_title(name, fontsize=9)
-            low.set(xlabel="frequency [Hz]")
-        axes[0, 0].set_ylabel("amplitude [um]")
-        axes[1, 0].set_ylabel("difference / amplitude")
-        axes[0, -1].legend(fontsize=7)
-        axes[1, 0].legend(fontsize=7)
-        figure.savefig(path, metadata={"Date": None})
-    return path
-
-
 def compute(names=NAMES, frequencies=FREQUENCIES, **how) -> dict:
     """{contact: [Row]}."""
     return {name: [row(name, float(f), **how) for f in frequencies] for name in names}
@@ -147,7 +94,7 @@ def main(names=NAMES, frequencies=FREQUENCIES, path: Path | None = HERE / "again
                       f"{rows[k].frequency:g} Hz ({rows[k].regime}, multiplier {rows[k].multiplier:.3f}, "
                       f"{1e6 * rows[k].steady[MEASURES[0]]:.1f} um)")
     if path is not None:
-        picture(table, path)
+        steady_pictures.against_march(table, MEASURES[0], path)
     return table
 
 

@@ -17,15 +17,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
-from against_march import PATCH, TEXTS
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+import steady_pictures
+from rig_texts import ONE_MODE, TEXTS
 
 from patchfem.dynamics.harmonic import balance as harmonic_balance
-from patchfem.export.pictures import BLUE, GREY, ORANGE, STYLE
 from patchfem.model.model import build
 from patchfem.runs import run as runner
 from patchfem.runs.patch.ladder import solve_all
@@ -34,7 +32,6 @@ from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
 
 HERE = Path(__file__).parent
-ONE_MODE = PATCH[:PATCH.rindex("[[structure.mode]]")] + PATCH[PATCH.index("[drive]"):]
 CASES = {"elastic-plastic": (TEXTS["elastic-plastic"], 1e-6), "bonds": (TEXTS["bonds"], 1e-6),
          "patch of 41 elements": (ONE_MODE, 3e-7)}  # and the size [m] that amplitudes are counted in
 SHARES = np.geomspace(0.1, 100, 16)
@@ -82,24 +79,6 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     return Row(name, amplitude, (omega / (2 * np.pi), damping), *((b.frequency, b.damping) for b in free))
 
 
-def picture(rows: list, path: Path = HERE / "backbone.svg") -> Path:
-    """Frequency and damping over amplitude; lines: nine harmonics, marks: the bench."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(8.5, 3.4))
-        FigureCanvasSVG(figure)
-        axes = figure.subplots(1, 2)
-        for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
-            for axis, line, mark in zip(axes, r.many, r.bench):
-                axis.loglog(1e6 * r.amplitude, line, "-", color=colour, label=r.case)
-                axis.loglog(1e6 * r.amplitude, mark, "o", color=colour, ms=3.5)
-        for axis, name in zip(axes, ("frequency [Hz]", "damping ratio")):
-            axis.set(xlabel="amplitude [um]", ylabel=name)
-        axes[0].axhline(143, color="#bbbbbb", lw=0.8, zorder=0)
-        axes[1].legend(fontsize=8, title="lines: free balance, marks: bench", title_fontsize=7)
-        figure.savefig(path, metadata={"Date": None})
-    return path
-
-
 def main(names=tuple(CASES), path: Path | None = HERE / "backbone.svg", **how) -> list:
     """[Row], printed and drawn."""
     rows = [case(name, **how) for name in names]
@@ -111,7 +90,7 @@ def main(names=tuple(CASES), path: Path | None = HERE / "backbone.svg", **how) -
         for which in ("single", "many"):
             print(f"  {which:7} frequency off by {r.miss(which)[0]:.1e}, damping by {r.miss(which)[1]:.1e}")
     if path is not None:
-        picture(rows, path)
+        steady_pictures.backbone(rows, path)
     return rows
 
 

@@ -1,6 +1,6 @@
 """The model of a scene: frozen, made once, all that a run takes; parts of it exchanged without a scene."""
 
-from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+from dataclasses import FrozenInstanceError, astuple, fields, is_dataclass, replace
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def seen(result) -> tuple:
     response = result.response
     histories = [] if response is None else [np.asarray(getattr(response, name)).tobytes()
                                              for name in ("time", "slide", "force", "slip")]
-    measured = {name: repr(measure) for name, measure in result.measures.items()}
+    measured = {name: repr(astuple(measure)) for name, measure in result.measures.items()}
     stated = result.plan.as_json() | {"seconds": None}
     return result.outcome, measured, result.warnings, histories, stated
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from study_module import study
 
+from patchfem.dynamics.march.models import jenkins_model
+
 
 @pytest.fixture(scope="module")
 def targets():
@@ -22,14 +24,15 @@ def test_always_many_times_faster_than_others(targets):
     assert targets.cycle_of_peer("DOP853") > 300 * targets.cycle_of_events()[0]
 
 
-def test_exact_the_numpy_march_is_the_compiled_one(targets):
-    modes = targets.basis(10)
-    _, slides = targets.plain(modes, targets.soft(200))
-    assert slides == pytest.approx(targets.marched(modes, targets.bonded(200)), abs=1e-10)
-    _, slides = targets.plain(modes, targets.sharp(30))
-    mine = targets.marched(modes, targets.jenkins_model(*targets.elements(30)))
+def test_exact_the_numpy_march_is_the_compiled_one():
+    march, plain = study("targets/dynamics_march.py"), study("targets/dynamics_plain.py")
+    modes = march.basis(10)
+    _, slides = plain.plain(modes, plain.soft(200))
+    assert slides == pytest.approx(march.marched(modes, march.bonded(200)), abs=1e-10)
+    _, slides = plain.plain(modes, plain.sharp(30))
+    mine = march.marched(modes, jenkins_model(*march.elements(30)))
     assert np.abs(slides - mine).max() < 1e-3 * np.abs(mine).max() and np.abs(mine).max() > 0.15
-    assert np.isfinite(targets.marched(modes, targets.bonded(200, 16))).all()
+    assert np.isfinite(march.marched(modes, march.bonded(200, 16))).all()
 
 
 def test_always_the_table_says_what_is_missed(targets, capsys):

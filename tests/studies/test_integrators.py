@@ -65,6 +65,16 @@ def engines(work):
 
 
 @pytest.fixture(scope="module")
+def problem(work):
+    return sys.modules["engine_problems"].problem
+
+
+@pytest.fixture(scope="module")
+def rows(work):
+    return sys.modules["precision_rows"]
+
+
+@pytest.fixture(scope="module")
 def table(work):
     return json.loads(work.TABLE.read_text())
 
@@ -74,21 +84,21 @@ def row(table, where, name, knob):
 
 
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
-def test_exact_dop853_from_event_to_event(engines, where):
-    one = engines.problem(where)
+def test_exact_dop853_from_event_to_event(engines, problem, where):
+    one = problem(where)
     assert one.error(engines.dop853(one, 1e-10)) < 5e-9
 
 
 @pytest.mark.parametrize("name, where", [("exact", "decay"), ("exact, one mode", "decay"),
                                          ("exact, one mode", "block")])
-def test_exact_event_engines_of_one_and_of_any_modes(engines, name, where):
+def test_exact_event_engines_of_one_and_of_any_modes(engines, problem, name, where):
     """Free decay has a closed form; stick-slip at resonance by two engines that share no code."""
     run, knobs, places = engines.OURS[name]
-    one = engines.problem(where)
+    one = problem(where)
     assert where in places and one.error(run(one, knobs[0])) < 1e-12
 
 
-def test_refuses_an_event_engine_that_does_not_end(engines):
+def test_refuses_an_event_engine_that_does_not_end(engines, problem):
     class Lost:
         def enter(self, *_):
             pass
@@ -97,25 +107,25 @@ def test_refuses_an_event_engine_that_does_not_end(engines):
             return 3, 0
 
     with pytest.raises(engines.NotConverged, match="code 3"):
-        engines.one_mode(engines.problem("block"), 0, Lost())
+        engines.one_mode(problem("block"), 0, Lost())
 
 
-def test_exact_without_a_longest_step_dop853_passes_over_releases(engines):
+def test_exact_without_a_longest_step_dop853_passes_over_releases(engines, problem):
     """No warning, 4 events instead of 240."""
-    one = engines.problem("block")
+    one = problem("block")
     slide, events = engines.counted(one, 1e-8, 1e9)
     assert events == 4 and one.error(slide) > 0.5
     assert engines.counted(one, 1e-8, 1 / 8)[1] == 240
 
 
-def test_exact_errors_of_the_saved_table(engines, table):
+def test_exact_errors_of_the_saved_table(engines, problem, table):
     """Errors do not depend on the machine: the cheap rows again."""
     for where in ("decay", "block", "two"):
         for name, knobs in (("march", (200, 800)), ("newmark, and force", (200, 800)), ("euler, tanh", (1000,)),
                             ("duhamel, static branch", (200, 800))):
             run, _, places = engines.OURS[name]
             for knob in knobs if where in places else ():
-                one, saved = engines.problem(where), row(table, where, name, knob)["error"]
+                one, saved = problem(where), row(table, where, name, knob)["error"]
                 assert one.error(run(one, knob)) == pytest.approx(saved, rel=0.02, abs=1e-11)
 
 
@@ -162,12 +172,12 @@ def test_exact_the_picture_of_the_saved_table(work, table, tmp_path):
 
 
 def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, capsys, tmp_path):
-    for _, _, _, _, variable, _ in engines.PEERS.values():
+    for _, _, _, _, variable, _ in work.PEERS.values():
         monkeypatch.setenv(variable, "/nowhere/python")
     few = {"newmark, and force": (engines.newmark_cured, (100,), ("block",))}
     found = work.main(("block",), few, repeats=1, path=tmp_path / "t.json")
     assert [r["engine"] for r in found["rows"]] == ["newmark, and force"]
-    assert set(found["absent"]) == set(engines.PEERS)
+    assert set(found["absent"]) == set(work.PEERS)
     said = capsys.readouterr()
     assert "/nowhere/python" in said.err and "PATCHFEM_SUNDIALS_PYTHON" in said.err
     assert "skipped: Siconos, theta 1/2 is not installed" in said.out
@@ -175,22 +185,22 @@ def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, ca
 
 @pytest.mark.parametrize("name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)])
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
-def test_exact_peers_find_the_same_motion(engines, work, name, knob, error, where):
-    ask, _, _, script, variable, remedy = engines.PEERS[name]
+def test_exact_peers_find_the_same_motion(problem, work, rows, name, knob, error, where):
+    ask, _, _, script, variable, remedy = work.PEERS[name]
     try:
-        peer = work.Peer(name, f"../integrators/{script}", variable, sys.executable, remedy)
+        peer = rows.Peer(name, script, variable, sys.executable, remedy)
     except Missing as absent:
         pytest.skip(str(absent))
     with peer:
-        one = engines.problem(where)
+        one = problem(where)
         slide, seconds = ask(peer, one, knob)
     assert one.error(slide) < error and seconds > 0
 
 
 @pytest.mark.slow
-def test_exact_the_patch_by_two_programs(engines):
+def test_exact_the_patch_by_two_programs(engines, problem):
     """Elastic-plastic elements by the march and by DOP853 between reversals; with longer steps it misses some."""
-    one = engines.problem("patch")
+    one = problem("patch")
     assert one.error(engines.dop853(one, 1e-10)) < 1e-6
     assert one.error(engines.march(one, 3200)) < 1e-4
     slide, events = engines.counted(one, 1e-8, 1 / 8)

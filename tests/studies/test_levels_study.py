@@ -28,10 +28,11 @@ def test_exact_onset_of_the_elastic_plastic_law_is_the_same(levels):
 
 
 def test_always_where_slip_is_seen_and_where_it_jumps(levels):
+    rows = study("levels/level_rows.py")
     grid, slip = np.array([1.0, 2.0, 3.0, 4.0]), levels.FLOOR * levels.MIL * np.array([0.0, 0.1, 10.0, 40.0])
-    assert levels._seen(grid, slip, 4) == pytest.approx(2.5)
-    assert np.isnan(levels._seen(grid, 0 * slip, 4))
-    assert levels._jump(grid, slip, slice(0, 4)) == (3.0, 4.0, pytest.approx(4.0))
+    assert rows.seen_from(grid, slip, 4) == pytest.approx(2.5)
+    assert np.isnan(rows.seen_from(grid, 0 * slip, 4))
+    assert rows.largest_step(grid, slip, slice(0, 4)) == (3.0, 4.0, pytest.approx(4.0))
 
 
 @pytest.mark.slow

@@ -39,7 +39,8 @@ def test_exact_time_at_equal_error_of_a_power_law(hertz):
     assert hertz.ratio_text(30.0, 10.0, "<") == "> 3"  # ours needs less than 10: theirs takes more than 3 times that
 
 
-def test_exact_errors_of_the_closed_forms_themselves_vanish(hertz, wavy):
+def test_exact_errors_of_the_closed_forms_themselves_vanish():
+    hertz, wavy = study("peers/hertz_pair.py"), study("peers/westergaard_wave.py")
     x = hertz.grid_of(16).x
     hertzian = exact.hertz_pressure(x, hertz.LOAD, hertz.RADIUS, hertz.MODULUS)
     assert np.abs(hertz.errors_of(x, hertzian)).max() <= 1e-12
@@ -59,7 +60,7 @@ def test_exact_mirrored_and_twice_condensed_pairs_are_one(hertz):
 def test_exact_getfem_finds_the_same_pressures(hertz):
     """With the corner rule both programs solve one discrete problem by different means: all three steps agree."""
     try:
-        peer = hertz.Peer("GetFEM", "getfem_child.py", GETFEM, "/usr/bin/python3", "")
+        peer = hertz.Peer("GetFEM", "peers/getfem_child.py", GETFEM, "/usr/bin/python3", "")
     except Missing as absent:
         pytest.skip(str(absent))
     with peer:
@@ -71,7 +72,7 @@ def test_exact_getfem_finds_the_same_pressures(hertz):
 
 def test_exact_tamaas_finds_the_same_wave(wavy):
     try:
-        peer = wavy.Peer("Tamaas", "tamaas_child.py", TAMAAS, sys.executable, "")
+        peer = wavy.Peer("Tamaas", "peers/tamaas_child.py", TAMAAS, sys.executable, "")
     except Missing as absent:
         pytest.skip(str(absent))
     with peer:

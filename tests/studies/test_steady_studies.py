@@ -56,14 +56,14 @@ def pushed():
     return study("steady/multipliers.py")
 
 
-def test_exact_multipliers_of_a_linear_map(pushed):
+def test_exact_multipliers_of_a_linear_map():
     """Four modes of known decay and turn, found from pushed motions of the map itself."""
     a = np.diag([0.9, -0.5, 0.3, 0.2]) + np.diag([0.4, 0.1, 0.2], 1)
 
     def states(push):
         return np.array([(np.linalg.matrix_power(a, k) @ push.ravel()).reshape(2, 2) for k in range(1, 8)]) + 3.0
 
-    assert pushed.fitted(states, 2, 1e-3, 1.0).real == pytest.approx([0.9, -0.5, 0.3, 0.2], abs=1e-9)
+    assert study("steady/pushes.py").fitted(states, 2, 1e-3, 1.0).real == pytest.approx([0.9, -0.5, 0.3, 0.2], abs=1e-9)
 
 
 def test_exact_pushed_runs_forget_as_the_multipliers_say(pushed, capsys):
@@ -103,7 +103,8 @@ def test_exact_a_sweep_jumps_beyond_the_fold(fold):
 
 
 def test_exact_jumps_are_drawn_back_to_no_rate(fold):
-    made = [fold.Sweep(rate, True, None, None, 100 + 3 * rate**(2 / 3), 0.0) for rate in (0.1, 0.4, 1.6)]
+    sweep = study("steady/fold_sweeps.py").Sweep
+    made = [sweep(rate, True, None, None, 100 + 3 * rate**(2 / 3), 0.0) for rate in (0.1, 0.4, 1.6)]
     assert fold.at_rest(made) == pytest.approx(100, abs=1e-9)
 
 
@@ -136,5 +137,5 @@ def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
     assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)  # nothing slips
     assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
-    text = backbone.picture(rows, tmp_path / "x.svg").read_text()
+    text = study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text

@@ -11,6 +11,9 @@ from patchfem.friction.bonds.bond_list import law_numbers, share_table
 from patchfem.friction.bonds.quadrature import cutoff
 from patchfem.friction.laws.stretch import growth_numbers
 
+for kernel in (bond_kernels.list_mean, bond_kernels.list_force, bond_kernels.list_step):
+    kernel.enable_caching()  # called from Python here alone: compiled once for all workers and runs
+
 
 class Listed(NamedTuple):
     """Step means, forces after the steps, forces foreseen for their ends, energies after them, and the tally."""

@@ -8,7 +8,8 @@ import numpy as np
 from ...core import Measure
 from ...mesh.tensor import TensorGrid
 from .press import Patch, pressed, solve
-from .values import UNITS, edge_cells, values
+from .rows import TABLE
+from .values import edge_cells, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
 GROWING, SLOWEST, DOUBTFUL, SECOND, LUCKY = 1.3, 1.5, 2.5, 4.0, 6.0  # ratios of successive changes that are believed
@@ -68,13 +69,13 @@ def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -
     mine = values(fine)
     floors = _floors(fine)
     if coarse is None:
-        return {name: Measure(value, UNITS[name], None, floors.get(name, 0.0)) for name, value in mine.items()}
+        return {name: Measure(value, TABLE[name].unit, None, floors[name]) for name, value in mine.items()}
     nested = coarsest is not None and _halved(fine, coarse) and _halved(coarse, coarsest)
     snap, least, out = _snap(fine, mine), _least(fine, mine), {}
     for name, (last, before) in _changes(fine, coarse, coarsest).items():
         error = 3 * remainder(last, before, nested) + snap.get(name, 0.0)
         error = max(error, least.get(name, 0.0), 1e-12 * abs(mine[name])) if mine["normal_load"] > 0 else 0.0
-        out[name] = Measure(mine[name], UNITS[name], float(error), floors.get(name, 0.0))
+        out[name] = Measure(mine[name], TABLE[name].unit, float(error), floors[name])
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
     return out
@@ -135,10 +136,9 @@ def _cell(patch: Patch) -> float:
 
 
 def _floors(fine: Patch) -> dict:
-    length = fine.pieces.interface.length
-    return {"contact_fraction": max(_cell(fine), np.diff(fine.x).min()) / length, "contact_half_width": 1e-12,
-            "pressure_centre": 1e-12, "pressure_centre_lateral": 1e-12, "roll_moment": 1e-10, "rotation": 1e-12,
-            "moment": 1e-10, "approach": 1e-13}
+    """name -> floor of its error: that of its row, one cell of the mesh for the share in contact."""
+    cell = max(_cell(fine), np.diff(fine.x).min()) / fine.pieces.interface.length
+    return {name: row.floor for name, row in TABLE.items()} | {"contact_fraction": cell}
 
 
 def _least(patch: Patch, mine: dict) -> dict:

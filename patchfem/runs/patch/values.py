@@ -6,11 +6,6 @@ from ...core import Outcome
 from ...slip.shear_modes import normal_stiffness, rotational_stiffness, tangential_stiffness
 from .press import Patch
 
-UNITS = {"normal_load": "N", "contact_fraction": "1", "pressure_peak": "Pa", "moment": "N m", "rotation": "rad",
-         "approach": "m", "contact_half_width": "m", "pressure_centre": "m", "loaded_fraction": "1",
-         "normal_stiffness": "N m-1", "tangential_stiffness": "N m-1", "rotational_stiffness": "N m rad-1",
-         "pressure_centre_lateral": "m", "roll_moment": "N m"}
-
 
 def half_width(x, sigma) -> float:
     """Half the contact length [m], soft edges found between nodes.

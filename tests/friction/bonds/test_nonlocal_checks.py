@@ -353,10 +353,10 @@ def test_exact_c1_steady_stretch_of_a_bench_scene(speed, want):
 
 @pytest.mark.parametrize("speed, order, want", [("5 mm/s", 0, 0.423841), ("50 mm/s", 1, 0.428834)])
 def test_exact_c1_steady_printed_law_of_a_bench_scene(speed, order, want):
-    """60 um in 1200 steps of 50 nm, a quarter of the growth path at 50 mm/s: 1e-4."""
+    """40 um in 800 steps of 50 nm, a quarter of the growth path at 50 mm/s: 1e-4."""
     got = bench('reading = "report"\ninitial_bonds = 0\nkinetic = 0.42\nrest_growth = "10 m/s^2"\n'
                 f'slip_growth = "0.2 um"\norder = {order}',
-                f'kind = "constant"\nspeed = "{speed}"\ndistance = "60 um"', 1200)
+                f'kind = "constant"\nspeed = "{speed}"\ndistance = "40 um"', 800)
     assert got["friction_ratio_end"] == pytest.approx(want, abs=1e-4)
 
 

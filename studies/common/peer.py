@@ -1,7 +1,8 @@
-"""Shared by the comparisons: the peer as a child process, CPU seconds, the time at equal error.
+"""Another program as a child process, CPU seconds, and the time at equal error: shared by the comparisons.
 
-A peer runs under its own interpreter, which an environment variable names, and answers JSON lines; the study and the
-peer take turns, so that a busy machine slows both alike. CPU seconds of one thread each, imports not counted.
+A peer is another program. It runs under its own interpreter, which an environment variable names, and answers JSON
+lines. The study and the peer take turns, so that a busy machine slows both alike. CPU seconds are those of one thread,
+without imports.
 """
 
 import json
@@ -19,7 +20,7 @@ ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", 
 
 
 class Peer:
-    """A child that answers one JSON line per request; `version` of the library inside it.
+    """A child that answers one JSON line per request. script: its file below studies/; version: of its library.
 
     Missing where its interpreter or the library is absent, NotConverged where the peer reports a failure.
     """
@@ -29,7 +30,7 @@ class Peer:
         python = os.environ.get(variable, default)
         self.remedy = f"{remedy}, then name its interpreter in {variable} (now {python})"
         try:
-            self.child = subprocess.Popen([python, str(Path(__file__).parent / script)], text=True,
+            self.child = subprocess.Popen([python, str(Path(__file__).parents[1] / script)], text=True,
                                           stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ | ONE_THREAD)
         except OSError as error:
             raise Missing(f"{name} cannot be run ({error}): {self.remedy}") from None

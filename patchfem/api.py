@@ -1,0 +1,211 @@
+"""The verbs for Python: `load` and `build` a scene, `plan` and `run` it, look at the `Result`.
+
+    import patchfem as pf
+    result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
+    result.measures["loop_area"].value
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .core import Measure, Missing, NotConverged, Outcome, PatchfemError, rounded
+from .model.model import Model
+from .model.model import build as build_model
+from .runs import result as found
+from .runs.plan import Plan
+from .runs.plan import plan as plan_model
+from .runs.run import run as run_plan
+from .scene.scene import Scene, SceneError, loads, with_files
+from .scene.scene import load as load_file
+from .scene.sets import assignments
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from xarray import Dataset
+
+__all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
+           "SceneError", "build", "load", "plan", "run"]
+TEXT = "<text>"  # the name of a scene that came without a file
+
+
+def load(scene: str | Path | Scene, /, **sets: Any) -> Scene:
+    """Read a scene from a file or a text; SceneError with every mistake at once.
+
+    A str that holds a newline or a bracket is the text of a scene, any other and a Path name a file. sets: keys with
+    their values, as ``**{"contact.load": "26 lbf"}``; a text stands as in the scene, a number is in SI, lists are
+    taken too. A Scene is read again with the sets added to its own.
+    """
+    added = assignments(sets)
+    if isinstance(scene, Scene):
+        return scene if not added else with_files(loads(scene.text, scene.path, (*scene.sets, *added)))
+    if isinstance(scene, str) and ("\n" in scene or "[" in scene):
+        return with_files(loads(scene, TEXT, added))
+    return load_file(scene, added)
+
+
+def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
+    """Everything that a scene means, made once; nothing is solved. `scene` and sets as `load` takes them.
+
+    PatchfemError for sets beside a Model, which is already made.
+    """
+    if isinstance(scene, Model):
+        _without(sets, "Model")
+        return scene
+    return build_model(load(scene, **sets))
+
+
+def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
+    """What a scene would run, its sizes, cost, stiffness chain and groups; no physics is computed."""
+    return plan_model(build(scene, **sets))
+
+
+def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], None] | None = None,
+        progress: Callable[[float], None] | None = None, **sets: Any) -> Result:
+    """Run a scene and estimate the errors of its measures; `scene` and sets as `load` takes them.
+
+    say: called with one line where something takes long (compiling); on stderr unless given. progress: called with the
+    share of the main pass that is done. SceneError for mistakes in the scene, PatchfemError where it cannot run,
+    NotConverged and Missing among them.
+    """
+    if isinstance(scene, Plan):
+        _without(sets, "Plan")
+    what = scene if isinstance(scene, Plan) else plan(scene, **sets)
+    done = run_plan(what, _on_stderr if say is None else say, progress)
+    return Result(**{one.name: getattr(done, one.name) for one in fields(done)} | {"measures": Measures(done.measures)})
+
+
+def _on_stderr(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _without(sets: dict, kind: str) -> None:
+    if sets:
+        raise PatchfemError(f"a {kind} is made once: {', '.join(sets)} cannot be set in it; set it in the scene")
+
+
+class Measures(Mapping):
+    """The measures of a run by name, read-only; also as attributes. It shows itself as a table."""
+
+    def __init__(self, measures: dict[str, Measure]):
+        self._measures = dict(measures)
+
+    def __getitem__(self, name: str) -> Measure:
+        if name in self._measures:
+            return self._measures[name]
+        near = get_close_matches(str(name), self._measures, 1, 0.6)
+        raise KeyError(f"no measure {name!r} in this run; " + (f"did you mean {near[0]!r}?" if near else
+                       f"it has {', '.join(self._measures)}"))
+
+    def __getattr__(self, name: str) -> Measure:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(*error.args) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._measures)
+
+    def __len__(self) -> int:
+        return len(self._measures)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._measures]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._measures)
+
+    def __repr__(self) -> str:
+        rows = [(name, *rounded(one.value, one.error), one.unit) for name, one in self._measures.items()]
+        first, second, third = (max((len(row[place]) for row in rows), default=0) for place in range(3))
+        return "\n".join(f"{name:<{first}}  {value:>{second}} {'±' if error else ' '} {error:<{third}}  {unit}"
+                         for name, value, error, unit in rows)
+
+
+class Plots:
+    """The pictures of a run, each a matplotlib Figure: ``result.plot.loop().savefig("loop.png")``.
+
+    PatchfemError where the run has nothing to show, with what it lacks.
+    """
+
+    def __init__(self, result: Result):
+        self._result = result
+
+    def pressure(self) -> Figure:
+        """Normal stress along the interface, and the shear stress where some acts."""
+        return self._drawn(("pressure",), "the scene has no [contact]" if self._result.patch is None else
+                           "the pieces do not touch")
+
+    def loop(self) -> Figure:
+        """Friction force against the slide of the interface."""
+        return self._drawn(("loop",), self._still() or "no friction acted, or nothing slid")
+
+    def history(self) -> Figure:
+        """Displacement over the whole run, beside it the last cycles."""
+        return self._drawn(("history",), self._still())
+
+    def levels(self) -> Figure:
+        """Amplitude level by level, or along the curve of steady motions over level or frequency."""
+        return self._drawn(("levels", "curve"), self._still() or 'the drive has no levels; take drive.waveform = '
+                           '"levels", or a sweep with accuracy.method = "harmonic"')
+
+    def _still(self) -> str:
+        if self._result.response is not None:
+            return ""
+        return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]" \
+            if self._result.plan.kind == "patch" else "no motion was computed"
+
+    def _drawn(self, names: tuple, lack: str) -> Figure:
+        from .export.folder import report_data
+        from .export.report import picture
+
+        data = report_data(self._result)
+        for name in names:
+            one = picture(name, data)
+            if one is not None:
+                return one.draw.figure(*one.values)
+        raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
+
+
+class Result(found.Result):
+    """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, the kept histories in `response`.
+
+    `outcome.sentence` says how it ended; `measures[name]` has `value`, `error`, `unit` and `text`, in SI.
+    """
+
+    measures: Measures
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on what the model leaves out."""
+        return list(self.extra.get("notes", ()))
+
+    @property
+    def plot(self) -> Plots:
+        """The pictures of the run: pressure(), loop(), history(), levels()."""
+        return Plots(self)
+
+    def to_xarray(self) -> Dataset:
+        """Histories and fields with units and the scene they came from: the Dataset that result.nc holds."""
+        from .export.folder import dataset
+
+        return dataset(self)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the results folder that `patchfem run -o` writes, and give its path; an older one is replaced.
+
+        PatchfemError for a folder that holds other files.
+        """
+        from .export.folder import write
+        from .export.results import Folder
+
+        with Folder(Path(folder)) as claimed:
+            write(self, claimed.path)
+        return Path(folder)

@@ -1,0 +1,150 @@
+"""The reference of what a scene may say and a run may answer, generated from the records that the program itself reads.
+
+`python -m patchfem.export.reference` writes patchfem/scene/README.md anew.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal, get_args, get_origin
+
+from ..effects import EFFECTS
+from ..response.rows import ROWS as MOTION
+from ..runs.patch.rows import ROWS as STATIC
+from ..scene.materials import MATERIALS
+from ..scene.meanings import CONDITIONS, meaning
+from ..scene.quantities import EXAMPLES, KINDS
+from ..scene.reader import is_value
+from ..scene.rules.draft import ASPERITIES, LAWS, SLIDES
+from ..scene.rules.drive import WAVEFORMS
+from ..scene.rules.limits import NOT_YET_BUILT
+from ..scene.tables import Coating, Material, Tables
+from ..scene.types import keys, kind_of, model_of, parts
+
+FILE = Path(__file__).parents[1] / "scene" / "README.md"
+NEEDS = {"friction.law": LAWS, "slide.kind": SLIDES, "contact.asperities.law": ASPERITIES, "drive.waveform": WAVEFORMS}
+SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+HEAD = """\
+# What a scene may say, and what a run answers
+
+Generated from the program's own records by `python -m patchfem.export.reference`; a test holds the two together.
+A quantity is a text of one number and one unit, `"12.7 mm"`; the units of each kind stand below. A table named in a
+scene acts, one left out does not exist. A key that only some values of a selector need names them under "required".
+"""
+MEASURED = """\
+Values are in SI. The error is an estimated half-width; it is to stay below tolerance × |value| + floor, else a warning
+says so. Measures of a motion are those of the last cycles, the last ten or the last tenth of a shorter run. A number
+behind a name counts the interfaces (strips, where strips slide apart): `slip_amplitude_2` is that of the second.
+"""
+
+
+def text() -> str:
+    """The whole page."""
+    units = [(kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`') for kind, units in KINDS.items()]
+    stuff = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
+             for name, m in MATERIALS.items()]
+    still, moving = ([(f"`{one.name}`", one.unit, f"{one.floor:g}", one.text) for one in rows]
+                     for rows in (STATIC, MOTION))
+    head = ("measure", "unit", "floor", "meaning")
+    sections = [HEAD, "## Tables and keys", *_keys(), "## Effects", _effects(),
+                "## Units", _table(("kind", "units, the first in SI", "example"), units),
+                "## Materials", _table(("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"), stuff),
+                "## Measures", MEASURED, "### Of a pressed patch", _table(head, still),
+                "### Of a motion", _table(head, moving)]
+    return "\n\n".join(section.strip("\n") for section in sections) + "\n"
+
+
+def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
+    """(header, model) of every table of a scene in order, ("", Tables) first; the header of an array is [[...]]."""
+    yield (at, model)
+    for key, name in keys(model).items():
+        if _is_table(model, name):
+            path = f"{at.strip('[]')}.{key}".strip(".")
+            many = get_origin(model.model_fields[name].annotation) is tuple
+            yield from tables(model_of(model, name), f"[[{path}]]" if many else f"[{path}]")
+
+
+def _is_table(model: type, name: str) -> bool:
+    return model_of(model, name) is not None and not is_value(model, name)
+
+
+def _keys() -> list:
+    heads, out = {}, []
+    for header, model in tables():
+        heads.setdefault(model, []).append(header)
+    for model, named in heads.items():
+        parent = model.__mro__[1]
+        own = [key for key, name in keys(model).items() if name in model.__annotations__ and not _is_table(model, name)]
+        about = " ".join((model.__doc__ or "").split())
+        if parent in heads:
+            about += f" It carries the keys of {heads[parent][0]} as well."
+        if any(header.strip("[]") in NOT_YET_BUILT for header in named):
+            about += " Not yet built."
+        out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
+        if own:
+            out.append(_table(("key", "kind", "default", "required", "meaning"),
+                              [_row(model, key, named[0].strip("[]")) for key in own]))
+    return out
+
+
+def _row(model: type, key: str, at: str) -> tuple:
+    name = keys(model)[key]
+    field, path = model.model_fields[name], f"{at}.{key}".strip(".")
+    default = "" if field.is_required() or field.default in (None, "") else field.default
+    if isinstance(default, int | float):
+        default = " ".join([f"{default:g}", *list(KINDS.get(kind_of(model, name), ()))[:1]])
+    elif default:
+        default = f"`{default}`"
+    required = "yes" if field.is_required() else _needed(path)
+    said = meaning(model, key) + ("; not yet built" if path in NOT_YET_BUILT else "")
+    return f"`{key}`", _kind(model, name), default, required, said
+
+
+def _needed(path: str) -> str:
+    """What makes a key necessary: "law `tanh`", the values of a selector, or a condition in words."""
+    table, _, key = path.rpartition(".")
+    said = [CONDITIONS[path]] if path in CONDITIONS else []
+    for selector, used in NEEDS.items():
+        values = [f"`{value}`" for value, (needs, _) in used.items() if key in needs.split()]
+        if values and selector.rpartition(".")[0] == table:
+            said.append(f"{selector.rpartition('.')[2]} {', '.join(values)}")
+    return "; ".join(said)
+
+
+def _kind(model: type, name: str) -> str:
+    annotation = model.model_fields[name].annotation
+    types = (annotation, *parts(annotation))
+    words = [f"`{value}`" for part in types if get_origin(part) is Literal for value in get_args(part)]
+    if kind := kind_of(model, name):
+        words.append(kind)
+    elif Material in types:
+        words = ["material"]
+    elif Coating in types:
+        words.append("table")
+    elif float in types or int in types or not words:
+        words.append("number" if float in types else "whole number" if int in types else "text")
+    arrays = [get_args(part) for part in types if get_origin(part) is tuple]
+    many = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
+    marks = [inner for mark in (*model.model_fields[name].metadata, *types)
+             for inner in (mark, *getattr(mark, "metadata", ()))]
+    limits = [f"{sign} {getattr(mark, word):g}" for mark in marks for word, sign in SIGNS.items()
+              if isinstance(getattr(mark, word, None), int | float)]
+    return ", ".join([many + ", ".join(dict.fromkeys(words)), *dict.fromkeys(limits)])
+
+
+def _effects() -> str:
+    rows = []
+    for name, effect in EFFECTS.items():
+        selector, _, value = name.partition("=")
+        used = [words.replace(" ", ", ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
+        rows += [(f"`{name}`", *used, effect.equations)] if not name.startswith("structure.interface.") else []
+    return _table(("effect", "needs", "may have", "equations"), rows)
+
+
+def _table(head: tuple, rows: list) -> str:
+    lines = [head, ("---",) * len(head), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    FILE.write_text(text(), encoding="utf-8")
+    print(FILE)

@@ -1,0 +1,21 @@
+"""What a pressed patch is measured by: unit, least floor and meaning of every static measure."""
+
+from ...core import Row
+
+ROWS = (
+    Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together"),
+    Row("contact_fraction", "1", 0.0, "share of the interface under pressure; its floor is one cell of the mesh"),
+    Row("pressure_peak", "Pa", 0.0, "largest normal stress on the interface"),
+    Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch, positive where it lies at +x"),
+    Row("rotation", "rad", 1e-12, "rotation of the upper piece about the middle of the patch, positive opens at +x"),
+    Row("approach", "m", 1e-13, "closing of the holders at x = 0 since the unloaded flat pieces first touch"),
+    Row("contact_half_width", "m", 1e-12, "half the length in contact, its edges found between the nodes"),
+    Row("pressure_centre", "m", 1e-12, "place of the resultant of the pressure along x, from the middle of the patch"),
+    Row("loaded_fraction", "1", 0.0, "mean pressure over the whole interface divided by the largest one"),
+    Row("normal_stiffness", "N m-1", 0.0, "change of the load with the approach at held rotation, whole width"),
+    Row("tangential_stiffness", "N m-1", 0.0, "change of the friction force with the slide while all of it sticks"),
+    Row("rotational_stiffness", "N m rad-1", 0.0, "change of the moment with the rotation at held approach"),
+    Row("pressure_centre_lateral", "m", 1e-12, "place of the resultant of the pressure over the width, of strips"),
+    Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, of strips that roll"),
+)
+TABLE = {row.name: row for row in ROWS}

@@ -1,0 +1,92 @@
+"""The laws of the drift study as objects: bond laws of every order and elastic range, Iwan's elements, closed forms."""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import quad
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "friction_ladder"))
+import ladder_cycles as ladder
+import today
+
+from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.protocol import Step
+
+LENGTH, PERIOD, CREEP = ladder.LENGTH, 1 / ladder.HERTZ, 1e-3
+SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway
+CASES = {"force .5+-.1": ((0.6, 0.4), (1.0, 1.0)), "force .5+-.3": ((0.8, 0.2), (1.0, 1.0)),
+         "force .3+-.3": ((0.6, 0.0), (1.0, 1.0)), "load +-10 %": ((0.5, 0.5), (0.9, 1.1)),
+         "load +-20 %": ((0.5, 0.5), (0.8, 1.2)), "both": ((0.6, 0.4), (0.9, 1.1))}
+
+
+class Iwan:
+    """Parallel elastic-plastic elements as one law, with the virgin curve of Dahl."""
+
+    def __init__(self, count: int, length: float):
+        k, s = today.iwan_elements(count)
+        self.parts = [ElasticPlastic(float(a * b), float(b) * length) for a, b in zip(k, s)]
+
+    def start(self, sigma):
+        return [part.start(sigma) for part in self.parts]
+
+    def step(self, state, dq, s0, s1, dt) -> Step:
+        return self._sum([part.step(one, dq, s0, s1, dt) for part, one in zip(self.parts, state)])
+
+    def press(self, state, s0, s1) -> Step:
+        return self._sum([part.press(one, s0, s1) for part, one in zip(self.parts, state)])
+
+    def traction(self, state):
+        return sum(part.traction(one) for part, one in zip(self.parts, state))
+
+    def _sum(self, steps) -> Step:
+        mean, spent, state = zip(*steps)
+        return Step(sum(mean), sum(spent), list(state))
+
+
+class Row(NamedTuple):
+    """Drift per cycle in bond lengths: over the second and over the last cycle; None where the block slides
+    away."""
+
+    law: str
+    case: str
+    second: float | None
+    last: float | None
+
+
+def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
+    """name -> law object of the bond laws; order 0 starts without bonds, as full-grown ones would be a Coulomb jump."""
+    more, tail = (ladder.GROWTH, ", growing") if growth else ({}, "")
+    out = {}
+    for p in orders:
+        for b in shares:
+            law = ladder.bonds(order=p, breakaway=b, initial=float(p > 0), **more)
+            out[f"stretch p = {p:g}, b = {b:g}{tail}"] = Recursion(law) if p == 1 else Quadrature(law, 1e-9)
+    for p in (0.0, 1.0):
+        law = ladder.bonds(order=p, reading="report", initial=p, **more)
+        out[f"report p = {p:g}{tail}"] = Quadrature(law, 1e-9)
+    return out
+
+
+def small() -> dict:
+    """Laws without bonds that answer a force."""
+    return {"elastic-plastic": ElasticPlastic(1.0, LENGTH), "Iwan, 10 elements": Iwan(10, LENGTH)}
+
+
+def closed(case: str) -> list:
+    """Rows of the laws whose answer needs no march: Coulomb holds below its limit; tanh creeps at v_0 atanh(F/(mu N))
+    along straight ramps of force and load; Bouc-Wen (n = 2, gamma = beta, constant load) goes up by the integral of
+    1/(1 - z^2) and comes back on a line."""
+    (high, low), (first, second) = CASES[case]
+    held = max(high / first, low / second) < 1
+    rows = [Row("Coulomb", case, *(0.0 if held else None,) * 2)]
+    mean = quad(lambda s: np.arctanh((low + s * (high - low)) / (second + s * (first - second))), 0, 1)[0]
+    creep = CREEP * mean * PERIOD / LENGTH
+    rows.append(Row(f"tanh, v_0 = {1e3 * CREEP:g} mm/s", case, creep, creep))
+    if first == second:
+        walk = np.arctanh(high) - np.arctanh(low) - (high - low)
+        rows.append(Row("Bouc-Wen n = 2", case, walk, walk))
+    return rows

@@ -1,0 +1,125 @@
+"""A steady cycle of every law of the ladder along a sine slide, and the error of one against another.
+
+Slides are in bond lengths, forces in shares of mu_s N.
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+import today
+
+from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
+from patchfem.friction.bonds.bond_kernels import list_mean, list_step
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.quadrature import cutoff
+
+loop_kernels = load_kernels()
+
+HERTZ, LENGTH, RATIO = 143.0, 2e-6, 0.7
+GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
+AMPLITUDES = (0.1, 0.3, 1.0, 3.0, 12.5, 50.0)  # bond lengths
+STEPS = 4800  # per cycle
+AT_ONCE = 1e4  # factor on both rates of 2.10 that leaves only its steady state
+
+
+class Cycle(NamedTuple):
+    """A steady cycle: increments dq (n,) in bond lengths, path-mean force (n,) in mu_s N."""
+
+    dq: np.ndarray
+    force: np.ndarray
+
+    @property
+    def area(self) -> float:
+        return float(self.force @ self.dq)
+
+    def over(self, every: int) -> "Cycle":
+        """The same cycle seen in longer steps."""
+        dq = self.dq.reshape(-1, every).sum(axis=1)
+        return Cycle(dq, (self.force * self.dq).reshape(-1, every).sum(axis=1) / dq)
+
+
+def harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.ndarray:
+    """Slide (k,) [bond lengths] of whole cycles, the last of them after at least `path` bond lengths."""
+    cycles = 1 + int(np.ceil(path / (4 * amplitude)))
+    return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
+
+
+def followed(model, amplitude: float, steps: int = STEPS) -> Cycle:
+    """Last of the cycles of a model of the hub whose lengths are in metres and whose limit is in mu_s N."""
+    path = LENGTH * harmonic(amplitude, steps)
+    contact, work = model.build(loop_kernels)
+    forces, burnt = np.zeros((path.size, 3)), np.zeros((path.size, 2))
+    if loop_kernels.follow_path(path, 1 / (HERTZ * steps), model.kind, contact, work, 1e-11, burnt, forces):
+        raise ArithmeticError("a step did not converge")
+    return Cycle(np.diff(path)[-steps:] / LENGTH, forces[-steps - 1:-1, 1])
+
+
+def bonds(share: float = 1.0, **more) -> Bonds:
+    """The law with mu_s = 1 and a share of the bond length."""
+    return Bonds(share, share * LENGTH, **more)
+
+
+def points(law: Bonds):
+    return points_model(law, [1.0], [1.0])
+
+
+def at_once() -> Bonds:
+    """The law whose bond length is always the steady one of the speed: LuGre, z' = v - |v| z/eps_eq(v)."""
+    fast = GROWTH | {"rest_growth": AT_ONCE * GROWTH["rest_growth"], "slip_growth": GROWTH["slip_growth"] / AT_ONCE}
+    return bonds(**fast)
+
+
+def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
+    """The law as printed, every bond of its own length, by the compiled list merged to 0.01 bond lengths (1e-4 of
+    the limit); the means of the steps are asked for in the last cycle only."""
+    law = bonds(order=order, reading="report", **growth)
+    c, _ = list_model(law, 1.0, cutoff(order, 1e-5), 0.01).build(loop_kernels)
+    path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
+    for i, dq in enumerate(np.diff(path)):
+        args = (dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, dq / dt)
+        if i >= path.size - 1 - steps:
+            force.append(list_mean(*args, dt))
+        if not list_step(*args, dq / dt, dt):
+            raise ArithmeticError("the bond list is full")
+    return Cycle(np.diff(path)[-steps:] / LENGTH, np.array(force))
+
+
+def error(found: Cycle, wanted: Cycle) -> tuple:
+    """(area error over 4 A, rms of the force difference over the steps of a cycle) of `found`."""
+    if found.dq.size != wanted.dq.size:
+        few = min(found.dq.size, wanted.dq.size)
+        found, wanted = (cycle.over(cycle.dq.size // few) for cycle in (found, wanted))
+    return (float((found.area - wanted.area) / np.abs(wanted.dq).sum()),
+            float(np.sqrt(np.mean((found.force - wanted.force)**2))))
+
+
+def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
+    return Cycle(like.dq, limit * np.sign(like.dq))
+
+
+def elastic_plastic(amplitude: float, share: float = 1.0) -> Cycle:
+    """One Jenkins element of stiffness mu_s N/eps_0 and the limit share mu_s N."""
+    return followed(jenkins_model([1 / LENGTH], [share * LENGTH]), amplitude)
+
+
+def iwan(amplitude: float, count: int, scale: float = 1.0) -> Cycle:
+    stiffness, limit = today.iwan_elements(count, scale)
+    return followed(jenkins_model(stiffness / LENGTH, limit * LENGTH), amplitude)
+
+
+def bouc_wen(amplitude: float, power: float) -> Cycle:
+    """gamma = beta = 1/2; the mean of a step is that of its ends."""
+    steps = 200 if amplitude <= 1 else STEPS
+    path = harmonic(amplitude, steps)[-2 * steps - 1:] if amplitude > 1 else harmonic(amplitude, steps)
+    z = today.bouc_wen(path, power)[-steps - 1:]
+    return Cycle(np.diff(path)[-steps:], (z[1:] + z[:-1]) / 2)
+
+
+def rate(like: Cycle) -> Cycle:
+    """tanh(v/v_0) with the v_0 that is nearest to `like` at this amplitude and frequency."""
+    share = like.dq / np.abs(like.dq).max()
+    return Cycle(like.dq, np.tanh(share / today.best_rate(share, like.force)))

@@ -1,0 +1,92 @@
+"""The Hertz pair of `hertz_getfem`: its mesh, its errors against the closed form, and patchfem's timed answer."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from peer import timed
+
+from patchfem import closed_forms as exact
+from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.unilateral import press
+from patchfem.core import Compliance, Interface, frozen_array
+from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
+from patchfem.mesh.tensor import TensorGrid, graded_rows
+
+HALF = 0.1e-3  # half width a of the contact [m]
+LOAD = 9107.0  # [N/m]
+MATERIAL = (121e9, 0.32)
+MODULUS = exact.combined_modulus(*MATERIAL)
+RADIUS = np.pi * MODULUS * HALF**2 / (4 * LOAD)
+PEAK = exact.hertz_peak(LOAD, RADIUS, MODULUS)
+LENGTH, HEIGHT = 40e-3, 20e-3  # 200 half widths to the nearest far face: the half planes of Hertz to 1e-5
+GROWTH = 1.15
+STEPS = ((1.0, 0.0), (1.3, 0.0), (1.3, 0.1 * HALF / RADIUS))  # (load factor, tilt [rad]): the first cold, then warm
+FORMS = {"mirror": 1, "pair": 2}  # bodies that are assembled
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Row:
+    """One program on one mesh. cold: CPU s of assembly, condensation or factors, contact; warm: of a further step;
+    errors: of p(0), of the half width from p^2 inside 0.8 a, of the pressure inside 0.9 a in the mean square over p0;
+    pressure: (steps, m) [Pa] of the steps."""
+
+    program: str
+    form: str
+    cells: int
+    dofs: int
+    cold: float
+    warm: float
+    errors: tuple
+    pressure: np.ndarray
+
+
+def _line(fine: float, even: float, total: float) -> np.ndarray:
+    """Points from 0 to `total`: cells of `fine` up to `even`, growing from there."""
+    return np.concatenate([np.arange(round(even / fine) + 1) * fine,
+                           even + np.cumsum(graded_rows(fine * GROWTH, total - even, GROWTH))])
+
+
+def grid_of(cells: int) -> TensorGrid:
+    """Piece with HALF/cells along 1.25 a and down to a; even rows to the depth a cost little and cure the floor of
+    5e-4 in p(0) that rows growing from the face on leave."""
+    fine = HALF / cells
+    right = _line(fine, 1.25 * HALF, LENGTH / 2)
+    return TensorGrid(np.concatenate([-right[:0:-1], right]), _line(fine, HALF, HEIGHT), 0)
+
+
+def errors_of(x, p) -> tuple:
+    """Relative errors (p(0), half width, mean square inside 0.9 a over p0) of nodal pressures (m,) [Pa]."""
+    near, inside = np.abs(x) < 0.8 * HALF, np.abs(x) < 0.9 * HALF
+    slope, top = np.polyfit((x[near] / HALF)**2, (p[near] / PEAK)**2, 1)
+    miss = p[inside] - exact.hertz_pressure(x[inside], LOAD, RADIUS, MODULUS)
+    return p[x.size // 2] / PEAK - 1, np.sqrt(-top / slope) - 1, float(np.sqrt(np.mean(miss**2)) / PEAK)
+
+
+def condensed(grid: TensorGrid, bodies: int) -> Compliance:
+    """The pair from its meshes on: one piece doubled, or both pieces assembled and condensed."""
+    layers = Layers(MATERIAL, MATERIAL, "strain")
+    parts = [interface_compliance(assemble(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
+    low, high = parts[0], parts[-1]
+    return Compliance(Interface(grid.x, frozen_array(grid.tributary()), 1.0), low[0] + high[0], low[1] + high[1])
+
+
+def ours(cells: int, form: str) -> Row:
+    """patchfem on one mesh, nothing kept from before."""
+    grid = grid_of(cells)
+    shape = crown(grid.x, RADIUS)
+    pair, making = timed(lambda: condensed(grid, FORMS[form]))
+    state, solving = timed(lambda: press(pair, shape, LOAD))
+    found, warm = [state], []
+    for factor, angle in STEPS[1:]:
+        gap, start = shape + tilt(grid.x, angle), found[-1].sigma_n > 0
+        state, seconds = timed(lambda gap=gap, factor=factor, start=start: press(
+            pair, gap, factor * LOAD, rotation=0.0, start=start), 5)
+        found.append(state)
+        warm.append(seconds)
+    p = np.array([one.sigma_n for one in found])
+    dofs = FORMS[form] * 2 * grid.x.size * (grid.depth.size - 1)
+    return Row("patchfem", form, cells, dofs, making + solving, float(np.mean(warm)), errors_of(grid.x, p[0]), p)

@@ -1,0 +1,86 @@
+"""The stiffened rig past its folds: the curve of its steady motions, and marches whose frequency sweeps past them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from patchfem.runs import run as runner
+from patchfem.scene import scene
+
+HERE = Path(__file__).parent
+LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
+STEPS = 400  # per cycle
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Curve:
+    """Steady motions along the arc: frequency [Hz], amplitude [m], stable, largest multiplier (k,); folds [Hz]: where
+    the upper branch ends, where the lower does."""
+
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    stable: np.ndarray
+    multiplier: np.ndarray
+    folds: tuple
+
+    def branch(self, upper: bool) -> tuple:
+        """(frequency, amplitude) of the stable upper or lower branch, frequencies rising."""
+        turns = np.flatnonzero(np.diff(self.frequency) < 0)
+        cut = slice(0, turns[0] + 1) if upper else slice(turns[-1] + 1, None)
+        return self.frequency[cut], self.amplitude[cut]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sweep:
+    """A marched sweep: rate [Hz/s], up or down, frequency [Hz] and amplitude [m] at every turn of the slide, where it
+    jumps [Hz], and its largest distance from the branch it follows over the amplitude, before it has come within 0.3 Hz
+    of the jump."""
+
+    rate: float
+    up: bool
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    jump: float
+    miss: float
+
+
+def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> Curve:
+    """The scene by its own method."""
+    sets = [f"drive.from={low} Hz", f"drive.to={high} Hz", f"accuracy.tolerance={tolerance}"]
+    found = runner.run(runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).extra["curve"]
+    return Curve(found["frequency"], found["amplitude"], found["regime"] == "stable", found["multiplier"],
+                 tuple(sorted(found["folds"], reverse=True)))
+
+
+def sweep(steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float = LOW, high: float = HIGH) -> Sweep:
+    """March up or down from rest at the first frequency; the state is carried through."""
+    first, last = (low, high) if up else (high, low)
+    sets = [f"drive.from={first} Hz", f"drive.to={last} Hz", f"drive.rate={rate} Hz/s",
+            f"drive.duration={(high - low) / rate} s", "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"]
+    seen = runner.run(runner.plan(scene.load(HERE / "stiffened.toml", sets)), estimate=False).response
+    turn = np.abs(seen.output) > 0
+    turn[1:-1] &= (np.abs(seen.output[1:-1]) >= np.abs(seen.output[:-2])) & \
+        (np.abs(seen.output[1:-1]) >= np.abs(seen.output[2:]))
+    frequency = first + (last - first) * seen.time[turn] / seen.time[-1]
+    amplitude = np.abs(seen.output[turn])
+    f, a = steady.branch(True)
+    upper, lower = np.interp(steady.folds, f, a)[0], steady.branch(False)
+    middle = (upper + lower[1][0]) / 2
+    past, started = amplitude < middle if up else amplitude > middle, np.abs(frequency - first) > 1.0
+    past &= started
+    jump = float(frequency[np.argmax(past)]) if past.any() else np.nan
+    f, a = steady.branch(up)
+    until = jump if np.isfinite(jump) else last
+    before = frequency < until if up else frequency > until
+    follows = before & (np.abs(frequency - first) > 0.5) & (np.abs(frequency - until) > 0.3)
+    truth = np.interp(frequency[follows], f, a)
+    return Sweep(rate, up, frequency, amplitude, jump,
+                 float(np.abs(amplitude[follows] / truth - 1).max(initial=0.0)))
+
+
+def at_rest(sweeps: list) -> float:
+    """Where the two slowest sweeps one way would jump at no rate at all [Hz]: the delay past a fold goes as the rate to
+    the power 2/3 (Haberman 1979)."""
+    fast, slow = sorted(sweeps, key=lambda s: -s.rate)[-2:]
+    return slow.jump - (fast.jump - slow.jump) / ((fast.rate / slow.rate)**(2 / 3) - 1)

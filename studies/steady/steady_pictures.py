@@ -1,0 +1,74 @@
+"""The pictures of the studies of steady motions, each from the rows of its study."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+
+from patchfem.export.pictures import BLUE, GREY, ORANGE
+
+
+def against_march(table: dict, measure: str, path: Path) -> Path:
+    """Amplitude over frequency, found directly and by the march, and their difference below."""
+    names = list(table)
+    with drawing(path, (2.6 * len(names), 4.6), 2, len(names), sharex=True, sharey="row", squeeze=False) as (_, axes):
+        for (top, low), name in zip(axes.T, names):
+            rows = table[name]
+            f = [r.frequency for r in rows]
+            top.semilogy(f, [1e6 * r.steady[measure] for r in rows], "-", color=BLUE, label="steady")
+            top.semilogy(f, [1e6 * r.march[measure] for r in rows], "o", color=ORANGE, ms=3, label="march")
+            low.semilogy(f, [max(r.miss(measure), 1e-16) for r in rows], "o-", color=ORANGE, ms=3, lw=0.7,
+                         label="march")
+            if rows[0].run is not None:
+                low.semilogy(f, [max(r.miss(measure, "run"), 1e-16) for r in rows], "s-", color=GREY, ms=3, lw=0.7,
+                             label="long exact run")
+            top.set_title(name, fontsize=9)
+            low.set(xlabel="frequency [Hz]")
+        axes[0, 0].set_ylabel("amplitude [um]")
+        axes[1, 0].set_ylabel("difference / amplitude")
+        axes[0, -1].legend(fontsize=7)
+        axes[1, 0].legend(fontsize=7)
+    return path
+
+
+def backbone(rows: list, path: Path) -> Path:
+    """Frequency and damping over amplitude; lines: nine harmonics, marks: the bench."""
+    with drawing(path, (8.5, 3.4), 1, 2) as (_, axes):
+        for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
+            for axis, line, mark in zip(axes, r.many, r.bench):
+                axis.loglog(1e6 * r.amplitude, line, "-", color=colour, label=r.case)
+                axis.loglog(1e6 * r.amplitude, mark, "o", color=colour, ms=3.5)
+        for axis, name in zip(axes, ("frequency [Hz]", "damping ratio")):
+            axis.set(xlabel="amplitude [um]", ylabel=name)
+        axes[0].axhline(143, color="#bbbbbb", lw=0.8, zorder=0)
+        axes[1].legend(fontsize=8, title="lines: free balance, marks: bench", title_fontsize=7)
+    return path
+
+
+def fold(steady, sweeps: list, path: Path, ends: tuple) -> Path:
+    """The curve of steady motions with the slowest sweeps over it, and the frequencies of their jumps over the rate.
+
+    ends: lowest and highest frequency shown [Hz].
+    """
+    slow = min(s.rate for s in sweeps)
+    with drawing(path, (9.5, 3.8), 1, 2, {"dpi": 200}, width_ratios=(2, 1)) as (_, (left, right)):
+        for s in sweeps:
+            colour, name = (ORANGE, "up") if s.up else (GREY, "down")
+            if s.rate == slow:
+                left.plot(s.frequency[::5], 1e3 * s.amplitude[::5], ".", color=colour, ms=1.5, rasterized=True)
+                left.plot([], [], ".", color=colour, label=f"marched {name}, {s.rate:g} Hz/s")
+        for part, style in ((steady.stable, "-"), (~steady.stable, "--")):
+            near = part | np.roll(part, 1) | np.roll(part, -1) if style == "--" else part
+            left.plot(np.where(near, steady.frequency, np.nan), 1e3 * np.where(near, steady.amplitude, np.nan), style,
+                      color=BLUE, lw=1.2, label="steady" if style == "-" else "steady, unstable")
+        left.set(xlim=ends, xlabel="frequency [Hz]", ylabel="amplitude [mm]")
+        left.legend(fontsize=8)
+        for up, colour, at in ((True, ORANGE, steady.folds[0]), (False, GREY, steady.folds[1])):
+            mine = [s for s in sweeps if s.up == up]
+            right.plot([s.rate**(2 / 3) for s in mine], [s.jump for s in mine], "o-", color=colour, ms=4)
+            right.plot([0], [at], "x", color=BLUE)
+        right.set(xlabel="rate$^{2/3}$ [(Hz/s)$^{2/3}$]", ylabel="jump [Hz] (x: folds)")
+    return path
