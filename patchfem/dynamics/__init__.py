@@ -3,4 +3,8 @@
 In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. `events/` is exact for Coulomb and linear
 rigs, `march/` steps any law, `harmonic/` finds steady motions, `comparison/` has the report's own methods (Duhamel,
 Newmark, Euler). Read `propagator` first: exact modal steps that all of them share.
+
+The friction force of a patch over a step comes from `contacts/`, called by the loops of `march/`: for rigid pieces
+`element_kernels.solve` (the sum over points stands in the law, `friction.laws.stretch_kernels.mean`), for elastic ones
+`shear_kernels`, for lists of bonds `list_kernels.pulled`; `runs/rig/interface` chooses among them.
 """

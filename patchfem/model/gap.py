@@ -67,7 +67,7 @@ def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
 
 def shape_side(contact: Contact) -> str:
     """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
-    sides = {part.on for part in (contact.tilt, contact.crown, contact.step, contact.profile) if part is not None}
+    sides = {part.on for part in contact.shapes.values()}
     if len(sides) > 1:
         raise PatchfemError("contact: the shapes lie on different pieces (key `on`); not yet built: put all on one")
     return sides.pop() if sides else "upper"

@@ -91,6 +91,15 @@ MEANINGS = {
         "kinetic": "coefficient of kinetic friction mu_k, at most static; static unless given",
         "reference_speed": "speed v_0 over which the friction of the law tanh saturates",
         "bond_length": "length eps_0 over which a bond forms and breaks, at rest",
+        "stiffness": "slope at first loading of the laws iwan, bouc-wen and lugre, of the whole contact; shared over a "
+                     "patch as the normal force",
+        "chi": "exponent of the spread of slip lengths of iwan; the loss at small slip grows as the force to chi + 3",
+        "beta": "share of the stiffness of iwan that slips all at once, over that of its spread",
+        "exponent": "sharpness n of the knee of bouc-wen",
+        "shape": "share s of bouc-wen: with 0.5 it unloads along the first slope, with 1 and exponent 1 it is eq. 2.17",
+        "stribeck_speed": "speed v_s over which the friction of lugre falls from static to kinetic",
+        "micro_damping": "damping s_1 of the bristles of lugre against their rate",
+        "viscous": "damping s_2 of lugre against the slide",
         "reading": "eq. 2.17 with the stretch of a bond kept apart from its damage, which never creates energy, or as "
                    "the report prints it",
         "order": "power p with which a bond grows stronger along its path; > -1, and >= 0 for the reading stretch",

@@ -162,6 +162,12 @@ class Contact(Table):
     strips: Strips | None = None
 
     @property
+    def shapes(self) -> dict:
+        """Name -> table of every shape given: the tables that lie `on` a piece."""
+        parts = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: part for name, part in parts.items() if hasattr(part, "on")}
+
+    @property
     def gives_way(self) -> str:
         """What lets the patch slip part by part under one slide of the holders, as written; empty where nothing."""
         if self.shear is not None:
@@ -200,6 +206,14 @@ class Friction(Table):
     kinetic: NotNegative | None = None
     reference_speed: Speed | None = None
     bond_length: Length | None = None
+    stiffness: quantity("stiffness", gt=0) | None = None
+    chi: number(gt=-1, le=0) | None = None
+    beta: NotNegative | None = None
+    exponent: Positive = 1.0
+    stribeck_speed: Speed | None = None
+    micro_damping: quantity("damping", ge=0) = 0.0
+    viscous: quantity("damping", ge=0) = 0.0
+    shape: number(gt=0, le=1) = 0.5
     reading: Literal["stretch", "report"] = "stretch"
     order: Number = 1.0
     rest_growth: Acceleration | None = None

@@ -130,9 +130,8 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
         draft.say("contact.strips", f"{beside}: leave one of them out; not yet built")
     if contact.asperities is not None and contact.asperities.law not in ("linear", None):
         draft.say("contact.asperities.law", f"'{contact.asperities.law}' {beside}: use 'linear'; not yet built")
-    for name in ("tilt", "crown", "step", "profile"):
-        shape = getattr(contact, name)
-        if shape is not None and shape.on == "lower":
+    for name, shape in contact.shapes.items():
+        if shape.on == "lower":
             draft.say(f"contact.{name}.on", f"'lower' {beside}: put the shapes on the upper piece; not yet built")
 
 
@@ -167,9 +166,7 @@ def _still(law: Friction) -> bool:
 
 
 def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
-    shapes = (("tilt", contact.tilt), ("crown", contact.crown), ("step", contact.step),
-              ("profile", contact.profile))
-    sides = {f"contact.{name}.on": shape.on for name, shape in shapes if shape is not None and shape.on is not None}
+    sides = {f"contact.{name}.on": shape.on for name, shape in contact.shapes.items() if shape.on is not None}
     lower = [key for key, side in sides.items() if side == "lower"]
     if len(set(sides.values())) > 1:
         key = next((key for key in reversed(sides) if draft.given(key)), next(iter(sides)))

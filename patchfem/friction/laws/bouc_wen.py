@@ -1,0 +1,99 @@
+"""The Bouc-Wen law (Wen, J. Eng. Mech. Div. ASCE 102, 249, 1976) with its limit mu N and its first slope as numbers.
+
+    F = mu N z,    z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)),    eps = mu N/stiffness
+
+n is the sharpness of the knee, s the share of the two terms: on unloading the slope over the first one is 1 - (1 - 2 s)
+|z|^n, so it rests on the elastic line for s = 1/2. n = 1, s = 1 is eq. 2.17 in the stretch reading. With the energy of
+the spring, F^2/(2 stiffness), no step creates energy where s >= 1/2; below that unloading gives back more than it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..protocol import Element, Step
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
+
+
+@dataclass(frozen=True, slots=True)
+class BoucWen:
+    """mu, eps [m], n and s. All points of a contact share z, as all share the slide."""
+
+    static: float
+    length: float
+    exponent: float = 1.0
+    shape: float = 0.5
+
+    def element(self, load: float) -> Element:
+        """The law of a contact under a constant load [N]."""
+        numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
+        return Element("friction.laws.bouc_wen_kernels", numbers, np.zeros(1), self.static * load, self.length,
+                       form="flow")
+
+    def start(self, sigma):
+        """State: (z, pressure (m,) [Pa])."""
+        return 0.0, sigma
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] under a pressure (m,) [Pa] that stays."""
+        way, before = float(np.sign(dq)), self.stored(state)
+        end, area = self.along(way * state[0], abs(dq) / self.length)
+        after = way * end if dq else state[0], s1
+        work = self.static * s1 * self.length * area
+        mean = np.divide(work, abs(dq)) * way if dq else self.traction(state)
+        return Step(mean, work - (self.stored(after) - before), after)
+
+    def along(self, y: float, x: float) -> tuple:
+        """(y, integral of y) after a slide x > 0 in lengths, y = z sgn v: dy/dx = 1 - |y|^n, or 1 - (1 - 2 s) |y|^n
+        below zero, by the inverse function: x as an integral over y, which Newton's method turns around."""
+        area = 0.0
+        if y < 0:
+            give = 1 - 2 * self.shape
+            way = self._integral(lambda u: 1 / (1 - give * u**self.exponent), 0.0, -y)
+            if way >= x:
+                u = -y
+                for _ in range(60):
+                    miss = self._integral(lambda v: 1 / (1 - give * v**self.exponent), u, -y) - x
+                    u = min(max(u + miss * (1 - give * u**self.exponent), 0.0), -y)
+                    if abs(miss) <= 1e-15 * x:
+                        break
+                return -u, -self._integral(lambda v: v / (1 - give * v**self.exponent), u, -y)
+            area, x, y = -self._integral(lambda u: u / (1 - give * u**self.exponent), 0.0, -y), x - way, 0.0
+        w = begin = -np.log1p(-min(y, 1 - 1e-16))
+        for _ in range(60):
+            miss = self._integral(lambda v: 1 / self._pace(v), begin, w) - x
+            w -= miss * self._pace(w)
+            if abs(miss) <= 1e-15 * max(x, 1.0):
+                break
+        return -np.expm1(-w), area + self._integral(lambda v: -np.expm1(-v) / self._pace(v), begin, w)
+
+    def _pace(self, w):
+        """dw/dx of w = -ln(1 - y): (1 - y^n)/(1 - y), between 1 and n."""
+        y = -np.expm1(-w)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pace = -np.expm1(self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))) * np.exp(w)
+        return np.where(w > 30.0, self.exponent, pace)
+
+    @staticmethod
+    def _integral(of, a: float, b: float) -> float:
+        """Gauss rule on pieces of 1/4, in the fourth root of the place, where powers are smooth down to zero."""
+        a, b = a**0.25, b**0.25
+        edges = np.linspace(a, b, 1 + max(1, int(np.ceil(16 * abs(b - a)))))
+        half = np.diff(edges)[:, None] / 2
+        root = edges[:-1, None] + half * (1 + NODES)
+        return float(np.sum(half * WEIGHTS * 4 * root**3 * of(root**4)))
+
+    def traction(self, state):
+        """Traction (m,) [Pa]."""
+        return self.static * state[1] * state[0]
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]."""
+        return self.static * state[1] * self.length * state[0]**2 / 2
+
+
+def from_keys(friction, load: float) -> BoucWen:
+    """The law of a [friction] table under a load [N] of the whole contact."""
+    length = friction.static * (load or 1.0) / friction.stiffness
+    return BoucWen(friction.static, length, friction.exponent, friction.shape)

@@ -1,0 +1,173 @@
+"""Compiled Bouc-Wen law. Twin: `bouc_wen.BoucWen`.
+
+num: limit [N], eps [m], n, s; mem: z. Along the slide x = |dq|/eps, y = z sgn(dq) follows dy/dx = 1 - |y|^n, below zero
+1 - (1 - 2 s) |y|^n. Above zero the knee is taken out by w = -ln(1 - y), dw/dx = (1 - y^n)/(1 - y) between 1 and n. Both
+are turned around by Newton's method on x as an integral over y or w, by a Gauss rule on short pieces.
+"""
+
+from math import exp, expm1, log, log1p
+
+import numpy as np
+from numba import njit
+
+from ..flags_kernels import LEAN, middle
+
+__all__ = ["commit", "flow", "mean", "middle", "pull", "state"]
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+PIECE = 0.25  # longest piece of a Gauss rule, in -y or w
+BENT = 0.05  # of the piece next to zero
+FLAT = 36.0  # w from which y is 1 to the last digit
+
+
+@njit(error_model="numpy", **LEAN)
+def pace(w, n):
+    """dw/dx above zero, (1 - y^n)/(1 - y): of whole n the sum 1 + y + ... + y^(n - 1)."""
+    if n % 1 == 0 and n <= 8:
+        y, out = -expm1(-w), 1.0
+        for _ in range(int(n) - 1):
+            out = 1 + y * out
+        return out
+    if w < 1e-300:
+        return 1.0
+    if w > FLAT:
+        return n
+    power = n * log(-expm1(-w)) if w < 0.7 else n * log1p(-exp(-w))
+    return -expm1(power) * exp(w)
+
+
+@njit(error_model="numpy", **LEAN)
+def density(u, n, give, rising):
+    """(dx/du, |y|) at u = w above zero, at u = -y below."""
+    return (1 / pace(u, n), -expm1(-u)) if rising else (1 / (1 - give * u**n), u)
+
+
+@njit(error_model="numpy", **LEAN)
+def piece(low, size, n, give, rising, bent):
+    """(x, integral of |y|) over a piece of u; bent: it begins at zero, where a power of u is not smooth, and is taken
+    in the root of u."""
+    x, area = 0.0, 0.0
+    for k in range(NODES.size):
+        t = 0.5 * (1 + NODES[k])
+        part, u = 0.5 * size * WEIGHTS[k], low + size * t
+        if bent:
+            part, u = part * 2 * t, size * t * t
+        rate, y = density(u, n, give, rising)
+        x += part * rate
+        area += part * rate * y
+    return x, area
+
+
+@njit(error_model="numpy", **LEAN)
+def between(low, high, n, give, rising):
+    """(x, integral of |y|) between two values of u."""
+    x, area, rest = 0.0, 0.0, low
+    if rising and high > FLAT:
+        flat = high - max(low, FLAT)
+        x, area, high = flat / n, flat / n, min(high, FLAT)
+    if high > 2 * low and low < BENT and n % 1 != 0:  # from zero, and less what lies below
+        end = min(high, BENT)
+        x1, a1 = piece(0.0, end, n, give, rising, True)
+        x0, a0 = piece(0.0, low, n, give, rising, True) if low > 0 else (0.0, 0.0)
+        x, area, rest = x + x1 - x0, area + a1 - a0, end
+    while rest < high:
+        most = PIECE if n % 1 == 0 else min(PIECE, max(rest, BENT))
+        size = min(most, high - rest)
+        x1, a1 = piece(rest, size, n, give, rising, False)
+        x, area = x + x1, area + a1
+        rest = rest + size if size == most else high
+    return x, area
+
+
+@njit(error_model="numpy", **LEAN)
+def scaled(area, way, x):
+    """The integral over a slide x of what was integrated over `way`, which misses it by the last digit of its end."""
+    return area * (x / way) if way > 0 else 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def unloaded(y, x, n, give):
+    """(y, slide left over, integral of y) of an unloading from y < 0 over x, to zero at most."""
+    whole, area = between(0.0, -y, n, give, False)
+    if whole <= x:
+        return 0.0, x - whole, -area
+    u = max(-y - x * (1 - give * (-y)**n), 0.0)
+    for _ in range(40):
+        miss = between(u, -y, n, give, False)[0] - x
+        u = min(max(u + miss * (1 - give * u**n), 0.0), -y)
+        if abs(miss) <= 1e-8 * x:  # the step that is left out is its square
+            break
+    way, area = between(u, -y, n, give, False)
+    return -u, 0.0, -scaled(area, way, x)
+
+
+@njit(error_model="numpy", **LEAN)
+def along(y, x, n, s):
+    """(y, integral of y) after a slide x >= 0."""
+    area = 0.0
+    if y < 0:
+        y, x, area = unloaded(y, x, n, 1 - 2 * s)
+        if x <= 0:
+            return y, area
+    begin = -log1p(-y) if y < 1 - 1e-15 else FLAT
+    w = begin + x * pace(begin, n)
+    for _ in range(40):
+        miss = between(begin, w, n, 0.0, True)[0] - x
+        w = max(w - miss * pace(w, n), begin)
+        if abs(miss) <= 1e-8 * x:
+            break
+    way, rest = between(begin, w, n, 0.0, True)
+    return -expm1(-w), area + (scaled(rest, way, x) if way > 0 else x * y)
+
+
+@njit(error_model="numpy", **LEAN)
+def slope(y, n, s):
+    """dy/dx."""
+    return 1 - max(y, 0.0)**n if y >= 0 else 1 - (1 - 2 * s) * (-y)**n
+
+
+@njit(error_model="numpy", **LEAN)
+def mean(num, mem, e, q, dq, eps, dt):
+    """Path-mean force [N] and slope [N/m]."""
+    limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
+    way = 1.0 if dq > 0 else -1.0
+    x, rise = abs(dq) / length, slope(way * z, n, s)
+    if x < 1e-7:  # no 1/x of a step that small
+        return limit * (z + 0.5 * way * x * rise), 0.5 * limit / length * rise
+    end, area = along(way * z, x, n, s)
+    return way * limit * area / x, limit / length * (end - area / x) / x
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(num, mem, e, dq, force, v0, v1, dt, eps):
+    """Move z; returns the energy dissipated [J]."""
+    limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
+    way = 1.0 if dq > 0 else -1.0
+    end, area = along(way * z, abs(dq) / length, n, s)
+    mem[e, 0] = way * end
+    return limit * length * (area - 0.5 * (end * end - z * z))
+
+
+@njit(error_model="numpy", **LEAN)
+def state(num, mem, e, q, v):
+    """(force [N], stored energy [J], irreversible slip [m])."""
+    z = mem[e, 0]
+    return num[e, 1] * z, 0.5 * num[e, 1] * num[e, 2] * z * z, q - num[e, 2] * z
+
+
+@njit(error_model="numpy", **LEAN)
+def flow(num, e, z, dq, dt):
+    """(stretch eps z [m] after a slide dq, its slopes over that before, dq and dt)."""
+    length, n, s = num[e, 2], num[e, 3], num[e, 4]
+    way = 1.0 if dq > 0 else -1.0
+    begin = way * z / length
+    end = along(begin, abs(dq) / length, n, s)[0]
+    rise, first = slope(end, n, s), slope(begin, n, s)
+    kept = rise / first if first > 1e-8 else exp(-n * abs(dq) / length)
+    return way * length * end, kept, rise, 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def pull(num, e, z, v):
+    """(force [N] at a stretch z [m], its slopes over z and the speed)."""
+    return num[e, 1] / num[e, 2] * z, num[e, 1] / num[e, 2], 0.0

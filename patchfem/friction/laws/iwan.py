@@ -1,0 +1,84 @@
+"""Segalman's four-parameter Iwan model (J. Appl. Mech. 72, 752, 2005): sliders side by side under one slide.
+
+Sliders of unit stiffness that yield at a stretch phi are spread with the density
+
+    rho(phi) = R phi^chi (0 <= phi < phi_max) + S delta(phi - phi_max)
+
+so that the slip force F_S = int phi rho, the stiffness K_T = int rho, the exponent chi of the micro-slip and beta = S
+phi_max^-(chi + 1) (chi + 1)/R, the share of the last slider, determine all four. A small cycle of amplitude u loses
+4 R u^(chi + 3)/((chi + 2)(chi + 3)).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..protocol import Element, Step
+from .elastic_plastic import parallel
+
+CELLS = 768  # of the power law, each one element with its stiffness and force: forces to 1e-6 of the slip force
+SMALL = 1e-5  # of phi_max: the smallest slider that has a cell of its own
+LOW = 0.25  # share of the cells that are spread evenly over the decades, for small cycles
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Iwan:
+    """Elements of a contact per newton of normal load: stiffness (t,) [1/m], yield_slide (t,) [m]. All points of a
+    contact share their stretch, as all share the slide."""
+
+    stiffness: np.ndarray
+    yield_slide: np.ndarray
+
+    def element(self, load: float) -> Element:
+        """The law of a contact under a constant load [N]."""
+        return parallel(self.stiffness * load, self.yield_slide)
+
+    def start(self, sigma):
+        """State: (stretch (t,) [m] of the elements, pressure (m,) [Pa])."""
+        return np.zeros(self.yield_slide.size), sigma
+
+    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] under a pressure (m,) [Pa] that stays."""
+        stretch, before = state[0], self.stored(state)
+        end = np.clip(stretch + dq, -self.yield_slide, self.yield_slide)
+        part = np.divide(end - stretch, dq, out=np.ones_like(end), where=dq != 0)
+        mean = s1 * float(self.stiffness @ (part * (stretch + end) / 2 + (1 - part) * end))
+        after = end, s1
+        return Step(mean, mean * dq - (self.stored(after) - before), after)
+
+    def traction(self, state):
+        """Traction (m,) [Pa]."""
+        return state[1] * float(self.stiffness @ state[0])
+
+    def stored(self, state):
+        """Elastic energy per area (m,) [J/m2]."""
+        return state[1] * float(self.stiffness @ state[0]**2) / 2
+
+
+def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
+    """phi_max [m] of a slip force [N] and a stiffness [N/m]: the slide at which everything slips."""
+    return force * (1 + beta) / (stiffness * (beta + (chi + 1) / (chi + 2)))
+
+
+def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
+    """(stiffness (t,) [N/m], yield slide (t,) [m]) of the sliders: cells of the power law, then the last slider.
+
+    Each cell keeps the stiffness and the slip force of its part of the density, so those of all are exact, as is the
+    force of a first loading at every border of a cell. The cells are as narrow as the root of the density asks for, the
+    best for a given number of straight pieces.
+    """
+    top, low = largest(force, stiffness, chi, beta), np.log(SMALL)
+    power = stiffness / (1 + beta)  # of the power law alone
+    x = np.concatenate([[0.0], np.exp(np.linspace(low, 0.0, 20 * CELLS + 1))])
+    share = (1 - LOW) * x**(1 + chi / 2) + LOW * np.clip(1 - np.log(np.maximum(x, SMALL)) / low, 0.0, 1.0)
+    edges = np.interp(np.linspace(0.0, 1.0, CELLS + 1), share, x)
+    k = power * np.diff(edges**(chi + 1))
+    moment = power * top * (chi + 1) / (chi + 2) * np.diff(edges**(chi + 2))
+    last = [stiffness - power] if beta > 0 else []
+    return np.append(k, last), np.append(moment / k, [top] if last else [])
+
+
+def from_keys(friction, load: float) -> Iwan:
+    """The law of a [friction] table under a load [N] of the whole contact."""
+    k, most = sliders(friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta)
+    return Iwan(k, most)

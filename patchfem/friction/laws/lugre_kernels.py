@@ -1,0 +1,93 @@
+"""Compiled LuGre law. Twin: `lugre.LuGre`.
+
+num: stiffness [N/m], kinetic and static force [N], v_s [m/s], micro-damping and viscous [N s/m]; mem: z [m]. At the
+constant speed of a step z relaxes towards +-g/stiffness over that length of path.
+"""
+
+from math import exp
+
+from numba import njit
+
+from ..bonds.point_kernels import shape
+from ..flags_kernels import LEAN, middle
+
+__all__ = ["commit", "flow", "mean", "middle", "pull", "state"]
+
+
+TRACE = 1e-9
+
+
+@njit(error_model="numpy", **LEAN)
+def reach(num, e, speed):
+    """(length g/stiffness [m] over which z relaxes, its slope over the speed [s]) at a speed >= 0 [m/s]; where no
+    friction is left at speed, a trace of the length at rest."""
+    ratio = speed / num[e, 4]
+    more = (num[e, 3] - num[e, 2]) * exp(-ratio * ratio)
+    return max(num[e, 2] + more, TRACE * num[e, 3]) / num[e, 1], -2 * ratio / num[e, 4] * more / num[e, 1]
+
+
+@njit(error_model="numpy", **LEAN)
+def relaxed(num, e, z, dq, dt):
+    """(z after a slide dq in dt, its path mean, slopes of both over dq, slopes of the first over z and dt); a jump in
+    no time has the kinetic length."""
+    way, path = (1.0 if dq > 0 else -1.0), abs(dq)
+    length, bend = max(num[e, 2], TRACE * num[e, 3]) / num[e, 1], 0.0
+    if dt > 0:
+        length, bend = reach(num, e, path / dt)
+        bend /= dt
+    x = path / length
+    f1, f2, kept = shape(x)
+    end, rest = way * length, z - way * length
+    by_path = (1 - x * bend) / length  # of x
+    after, mean = end + rest * kept, end + rest * f1
+    slope_after = way * bend * (1 - kept) - rest * kept * by_path
+    slope_mean = way * bend * (1 - f1) + rest * (f2 - f1) * by_path
+    by_time = 0.0
+    if dt > 0:
+        later = -bend * path / dt  # of the length over the time
+        by_time = way * later * (1 - kept) + rest * kept * x / length * later
+    return after, mean, way * slope_after, way * slope_mean, kept, by_time
+
+
+@njit(error_model="numpy", **LEAN)
+def mean(num, mem, e, q, dq, eps, dt):
+    """Path-mean force [N] and slope [N/m]."""
+    after, middle, by_after, by_middle, _, _ = relaxed(num, e, mem[e, 0], dq, dt)
+    force, slope = num[e, 1] * middle, num[e, 1] * by_middle
+    if dt > 0:
+        force += (num[e, 5] * (after - mem[e, 0]) + num[e, 6] * dq) / dt
+        slope += (num[e, 5] * by_after + num[e, 6]) / dt
+    return force, slope
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(num, mem, e, dq, force, v0, v1, dt, eps):
+    """Move z; returns the energy dissipated [J]."""
+    z = mem[e, 0]
+    mem[e, 0] = relaxed(num, e, z, dq, dt)[0]
+    return force * dq - 0.5 * num[e, 1] * (mem[e, 0] * mem[e, 0] - z * z)
+
+
+@njit(error_model="numpy", **LEAN)
+def pull(num, e, z, v):
+    """(force [N] at a stretch z [m] and a speed v [m/s], its slopes over both)."""
+    way, speed = (1.0 if v > 0 else -1.0), abs(v)
+    length, bend = reach(num, e, speed)
+    rate = v - speed * z / length
+    force = num[e, 1] * z + num[e, 5] * rate + num[e, 6] * v
+    by_speed = 1 - way * z * (1 - speed * bend / length) / length
+    return force, num[e, 1] - num[e, 5] * speed / length, num[e, 5] * by_speed + num[e, 6]
+
+
+@njit(error_model="numpy", **LEAN)
+def state(num, mem, e, q, v):
+    """(force [N], stored energy [J], irreversible slip [m]) at a speed [m/s]."""
+    z = mem[e, 0]
+    return pull(num, e, z, v)[0], 0.5 * num[e, 1] * z * z, q - z
+
+
+@njit(error_model="numpy", **LEAN)
+def flow(num, e, z, dq, dt):
+    """(z [m] after a slide dq in dt, its slopes over z, dq and dt)."""
+    after, _, by_slide, _, kept, by_time = relaxed(num, e, z, dq, dt)
+    return after, kept, by_slide, by_time

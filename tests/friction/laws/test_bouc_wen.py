@@ -1,0 +1,119 @@
+"""The Bouc-Wen law: limit, slope and closed loops, and one law in every run."""
+
+import numpy as np
+import pytest
+from law_runs import LOAD, bench_along, fitted, masses, rig, shrinking
+from scene_texts import COATED, DRIVE, MODE, mistakes, only
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from patchfem.friction.laws.bouc_wen import BoucWen
+from patchfem.scene.scene import loads
+
+LAW = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\n'
+LIMIT, EPS = 0.31 * LOAD, 0.31 * LOAD / 1.3e7
+
+
+def law_of(exponent, shape):
+    return LAW + f"exponent = {exponent}\nshape = {shape}\n"
+
+
+def integrated(slide, exponent, shape):
+    """z along straight legs of the slide, from the equation."""
+    z = [0.0]
+    for dq in np.diff(slide):
+        def rate(_, y, v=dq):
+            return v / EPS * (1 - np.abs(y)**exponent * (shape * np.sign(v * y) + 1 - shape))
+        z.append(solve_ivp(rate, (0, 1), z[-1:], method="DOP853", rtol=1e-12, atol=1e-14).y[0, -1])
+    return np.array(z)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.7, 2.0, 6.0])
+def test_exact_limit_and_first_slope(exponent):
+    law, time = law_of(exponent, 0.7), np.arange(101) / 1e3
+    assert bench_along(law, time, 1e-7 * EPS * time * 1e3).force[-1] == pytest.approx(1.3e7 * 1e-5 * EPS, rel=3e-5)
+    assert bench_along(law, time, 0.5 * EPS * time * 1e3).force[-1] == pytest.approx(LIMIT, rel=1e-12)
+    assert np.abs(bench_along(law, *shrinking()).force).max() <= LIMIT * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_exact_closed_loops(exponent):
+    """s = 1/2 unloads on the elastic line and loads as 1 - e^-x or tanh x: the symmetric loop in closed form."""
+    amplitude, time = 3e-6, np.arange(12001) / 1e5
+    found = bench_along(law_of(exponent, 0.5), time, amplitude * np.sin(2 * np.pi * 100 * time))
+    rise = (lambda x: -np.expm1(-x)) if exponent == 1 else np.tanh
+    top = brentq(lambda z: rise(2 * amplitude / EPS - z) - z, 0.0, 1.0, xtol=1e-15)
+    x = 2 * amplitude / EPS - top
+    half = LIMIT * EPS * (-top**2 / 2 + (x - top if exponent == 1 else np.log(np.cosh(x))))
+    assert found.force[-751] == pytest.approx(LIMIT * top, rel=1e-9)
+    assert found.ledger[0, -1] - found.ledger[0, -1001] == pytest.approx(2 * half, rel=1e-9)
+
+
+@pytest.mark.parametrize("exponent, shape", [(1.0, 0.5), (2.0, 0.8), (1.5, 0.2), (4.0, 1.0)])
+def test_exact_a_bench_loop_is_the_equation(exponent, shape):
+    time, slide = shrinking(60)
+    found, z = bench_along(law_of(exponent, shape), time, slide), integrated(slide, exponent, shape)
+    assert np.abs(found.force - LIMIT * z).max() <= 1e-6 * LIMIT
+    work, stored, dissipated, created = found.ledger
+    assert stored == pytest.approx(LIMIT * EPS * z**2 / 2, abs=1e-9 * LIMIT * EPS)
+    assert work[-1] == pytest.approx(stored[-1] + dissipated[-1] - created[-1], rel=1e-12)
+    assert created[-1] == 0 if shape >= 0.5 else created[-1] > 1e-3 * dissipated[-1]
+
+
+def test_exact_one_and_one_is_the_stretch_reading():
+    time, slide = shrinking()
+    bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{EPS!r} m"\n'
+    a, b = bench_along(law_of(1.0, 1.0), time, slide), bench_along(bonds, time, slide)
+    assert a.force == pytest.approx(b.force, abs=1e-10 * LIMIT)
+    assert a.ledger[0] == pytest.approx(b.ledger[0], abs=1e-10 * a.ledger[0, -1])
+
+
+@pytest.mark.parametrize("exponent, shape", [(1.0, 0.5), (3.3, 0.9)])
+def test_exact_the_compiled_bench_is_the_plain_law(exponent, shape):
+    time, slide = shrinking(60)
+    found, law, one = bench_along(law_of(exponent, shape), time, slide), BoucWen(0.31, EPS, exponent, shape), \
+        np.full(1, LOAD)
+    state = law.start(one)
+    for k, dq in enumerate(np.diff(slide)):
+        step = law.step(state, dq, one, one, 1.0)
+        state = step.state
+        assert found.force[k + 1] == pytest.approx(law.traction(state)[0], abs=1e-9)
+        assert found.ledger[1, k + 1] == pytest.approx(law.stored(state)[0], abs=1e-14)
+        assert found.ledger[2, k + 1] - found.ledger[2, k] == pytest.approx(step.dissipated[0], abs=1e-14)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.5])
+def test_exact_a_march_settles_on_the_harmonic_balance(exponent):
+    marched, steady = rig(law_of(exponent, 0.5)), rig(law_of(exponent, 0.5), "accuracy.method=harmonic")
+    assert marched.outcome.value == "steady"
+    for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area", "slip_amplitude"):
+        a, b = marched.measures[name], steady.measures[name]
+        assert abs(a.value - b.value) <= a.error + b.error + 1e-3 * abs(b.value), name
+    assert marched.measures["energy_balance"].value < 1e-9
+    assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
+
+
+def test_exact_two_alike_interfaces_move_alike():
+    law = law_of(2.0, 0.7)
+    both = masses(law, 2)
+    slides, alone = both.response.extra["slides"], masses(law, 1).response.slide
+    assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
+    assert slides[:, 0] == pytest.approx(alone, abs=1e-7 * np.abs(alone).max())
+
+
+def test_exact_a_fit_finds_the_numbers_of_a_loop(tmp_path):
+    time, slide = shrinking(60)
+    force = LIMIT * integrated(slide, 1.8, 0.7)
+    found = fitted(tmp_path, law_of(1.0, 0.5).replace("0.31", "0.4"), (time, slide, force),
+                   "friction.static=0.1..0.7,friction.exponent=1..4,friction.shape=0.3..1")
+    assert found.found.values == pytest.approx([0.31, 1.8, 0.7], rel=1e-5)
+
+
+def test_refuses_what_the_law_cannot_do():
+    scene = '[normal]\nload = "100 N"\n[friction]\n' + law_of(2.0, 0.5) + MODE + DRIVE
+    assert "friction.stiffness: missing" in only(scene.replace('stiffness = "1.3e7 N/m"\n', ""))
+    assert "friction.exponent" in only(scene, "friction.exponent=0")
+    assert "friction.shape" in only(scene, "friction.shape=0") and "friction.shape" in only(scene, "friction.shape=1.1")
+    assert "'bouc-wen' beside [contact.shear]" in only(COATED + "[contact.shear]\n[friction]\n" + LAW + MODE + DRIVE)
+    assert "'bouc-wen' beside normal.amplitude" in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
+    assert loads(scene).friction.exponent == 2.0 and loads(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1

@@ -1,0 +1,75 @@
+"""One law of friction in every run that carries it: bench, rig, two masses, steady motion, fit."""
+
+import csv
+
+import numpy as np
+from scene_texts import DRIVE, MODE
+
+from patchfem.campaigns.fit import fit_loop
+from patchfem.model.model import build
+from patchfem.runs.bench import bench
+from patchfem.runs.run import run
+from patchfem.scene.scene import load, loads
+
+LOAD = 100.0  # N on every contact
+POINT = '[normal]\nload = "100 N"\n'
+SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
+MASSES = """\
+[structure]
+masses = ["0.884 kg", "0.884 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "713 N/mm"
+[[structure.spring]]
+between = [2, 0]
+stiffness = "713 N/mm"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "{damper} N s/m"
+[[structure.damper]]
+between = [2, 0]
+coefficient = "{damper} N s/m"
+"""
+
+
+def table(law: str) -> str:
+    """[friction] of the keys `law`."""
+    return "[friction]\n" + law
+
+
+def bench_along(law: str, time, slide, *sets):
+    """The BenchRun of a law along samples slide (k,) [m] at equal times (k,) [s]."""
+    return bench.run(build(loads(POINT + table(law) + SINE, sets=sets)), None, 4, path=(time, slide, 0, 0.0))
+
+
+def rig(law: str, *sets, cycles: int = 60, steps: int = 0):
+    """The Result of one mode under a base sine at its resonance."""
+    more = f"[accuracy]\nsteps_per_cycle = {steps}\n" if steps else ""
+    mode = MODE.replace("damping = 0.003", "damping = 0.02")
+    return run(loads(POINT + table(law) + mode + DRIVE.replace("cycles = 30", f"cycles = {cycles}") + more, sets=sets))
+
+
+def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
+    """The Result of two like masses beside each other, one or both of them on an interface of the law."""
+    faces = "".join(f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
+                    for k in range(1, interfaces + 1))
+    drive = DRIVE.replace("cycles = 30", f"cycles = {cycles}")
+    text = MASSES.format(damper=32) + faces + drive + f"[accuracy]\nsteps_per_cycle = {steps}\n"
+    return run(loads(text, sets=sets), estimate=False)
+
+
+def fitted(folder, law: str, loop: tuple, free: str):
+    """What `fit` finds of a law from the loop (time [s], slide [m], force [N])."""
+    path = folder / "scene.toml"
+    path.write_text(POINT + table(law) + SINE, "utf-8")
+    with open(folder / "loop.csv", "w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow(["time [s]", "displacement [m]", "force [N]"])
+        out.writerows([repr(float(value)) for value in row] for row in zip(*loop))
+    return fit_loop(load(path), folder / "loop.csv", [free])
+
+
+def shrinking(count: int = 400, cycles: int = 3, amplitude: float = 10e-6):
+    """(time, slide) of a sine of 100 Hz that swings less and less, and so leaves minor loops open."""
+    time = np.arange(count * cycles + 1) / count / 100
+    return time, amplitude * (1 - 0.6 * time / time[-1]) * np.sin(2 * np.pi * 100 * time)
