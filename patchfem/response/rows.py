@@ -118,7 +118,7 @@ TABLE = {row.name: row for row in ROWS}
 
 
 def measures_of(seen: Seen) -> dict:
-    """name -> value of every row that the run has: the engine's own value before the one read off the samples."""
+    """Value by name of every row that the run has; the engine's own value comes before the one read off the samples."""
     out = {}
     for row in ROWS:
         value = seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
@@ -128,7 +128,7 @@ def measures_of(seen: Seen) -> dict:
 
 
 def of_first(name: str) -> str:
-    """The name of a measure without the number of its interface: slip_amplitude_2 is slip_amplitude."""
+    """Name of a measure without the number of its interface: slip_amplitude_2 becomes slip_amplitude."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
 
