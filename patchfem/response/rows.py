@@ -110,9 +110,10 @@ ROWS = (
     Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
     Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
     Row("onset_level", "m s-2", 0.0,
-        "level of the drive at which the interface starts to slip, halved between two levels"),
+        "level of the drive at which the interface starts to slip, found by halving between two levels"),
     Row("jump_level", "m s-2", 0.0, "level after the largest jump of the amplitude between two levels"),
-    Row("level_hysteresis", "m", 0.0, "largest difference of the amplitude at one level passed upwards and downwards"),
+    Row("level_hysteresis", "m", 0.0,
+        "hysteresis: largest difference of the amplitude between rising and falling levels, at one level"),
 )
 TABLE = {row.name: row for row in ROWS}
 
