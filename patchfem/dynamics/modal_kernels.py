@@ -13,9 +13,11 @@ from ..friction.flags_kernels import FAST, LEAN
 
 
 class Plant(NamedTuple):
-    """What the modes are to a loop: omega, damp = 2 zeta omega, slide, base, output (n,), damping (n, n) where it
-    couples, else (0, 0); their steps, arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first
-    interface; mass [kg]; room (3, n)."""
+    """The modes as the compiled loops see them.
+
+    omega, damp = 2 zeta omega, slide, base, output: (n,); damping: (n, n) where it couples, else (0, 0); their steps,
+    arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first interface; mass [kg]; room: (3, n).
+    """
 
     omega: np.ndarray
     damp: np.ndarray
@@ -54,9 +56,11 @@ def push_back(force, row, mass, accel):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def move(state, free, push, loss, dense, dense_loss, table, at, accel, spare, ledger):
-    """Advance the modes in place by one step and book it: work of the drive ledger[0], viscous loss ledger[1], work in
-    magnitude ledger[2] [J]. spare (2, n): room. The arrays of a step are passed one by one: a tuple of them would be
-    counted anew in every step."""
+    """Advance the modes in place by one step and book its energies.
+
+    ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: work in magnitude [J]. spare: (2, n) room. The
+    arrays of a step are passed one by one, because a tuple of them would be counted anew in every step.
+    """
     n = state.shape[1]
     work, lost = table[at, 8 * n], table[at, 8 * n + 1]
     for i in range(n):
@@ -79,7 +83,8 @@ def move(state, free, push, loss, dense, dense_loss, table, at, accel, spare, le
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def _move_coupled(state, dense, loss, table, at, accel, spare):
-    """`move` where damping couples the coordinates; returns the quadratic part of the viscous loss [J]."""
+    """Advance the modes as `move` does where damping couples the coordinates; quadratic part of the viscous loss
+    [J]."""
     n = state.shape[1]
     lost = 0.0
     for i in range(3 * n):
@@ -116,7 +121,10 @@ def stored(state, omega, mass):
 
 @njit(error_model="numpy", **LEAN)
 def accelerations(state, omega, damp, damping, base, drive, accel, out):
-    """Modal accelerations (n,) [m s-2] at an instant, relative to the base; drive [m s-2], accel (n,): of forces."""
+    """Modal accelerations (n,) [m s-2] at an instant, relative to the base.
+
+    drive [m s-2]; accel: (n,) those of the forces.
+    """
     n = omega.size
     for i in range(n):
         out[0, i] = accel[i] - base[i] * drive - omega[i] ** 2 * state[0, i]
@@ -129,7 +137,7 @@ def accelerations(state, omega, damp, damping, base, drive, accel, out):
 
 @njit(error_model="numpy", **LEAN)
 def safe_point(low, high, guess):
-    """`guess` if it lies inside (low, high), their middle otherwise."""
+    """The point `guess` if it lies inside (low, high), else their middle."""
     if low < guess < high and np.isfinite(guess):
         return guess
     return 0.5 * (low + high)
@@ -137,12 +145,12 @@ def safe_point(low, high, guess):
 
 @njit(error_model="numpy", **LEAN)
 def narrowed(low, high, here, miss, gain, late):
-    """(low, high, next place) of a search for the root of a function that grows, by Newton's steps in a bracket.
+    """Narrow the search for the root of a rising function by Newton's steps in a bracket: (low, high, next place).
 
-    miss: its value at `here`, gain: its slope or what stands for one; low, high: infinite where nothing is known yet.
-    The bracket closes on `here`; a step that leaves it is replaced by its middle. late: evaluations beyond those that a
-    search should take; from 1 on every other step is the middle, as kinks can throw steps to and fro, and the steps
-    grow where there is no bracket.
+    miss: the function at `here`, gain: its slope or what stands for one; low, high: infinite where nothing is known
+    yet. The bracket closes on `here`; a step that leaves it is replaced by its middle. late: evaluations beyond those
+    that a search should take. From 1 on every other step is the middle, as kinks can throw steps to and fro, and the
+    steps grow where there is no bracket.
     """
     if miss > 0:
         high = here
@@ -160,7 +168,11 @@ def narrowed(low, high, here, miss, gain, late):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def sample(row, state, slide, output):
-    """(slide, its speed, output) of the modes, written with them into the first 2 n + 2 entries of a row."""
+    """Write slide, slide speed and output of the modes into a row after the modes themselves, its first 2 n + 2
+    entries.
+
+    Returns (slide, its speed, output).
+    """
     n = slide.size
     q, v, out = 0.0, 0.0, 0.0
     for k in range(n):
@@ -174,8 +186,10 @@ def sample(row, state, slide, output):
 
 @njit(error_model="numpy", **LEAN)
 def note(row, force, energy, slip, out, travel, total, ledger):
-    """Write force, slip and the interface's energy into a row, the peak of all energy into the ledger. Returns 0, or 1
-    beyond the travel and 3 for a motion that is not finite."""
+    """Write force, slip and the interface's energy into a row, and the peak of all energy into the ledger.
+
+    Returns 0, or 1 beyond the travel and 3 for a motion that is not finite.
+    """
     n = row.size - 4
     row[n], row[n + 1], row[n + 2], row[n + 3] = force, slip, force, energy
     ledger[4] = max(ledger[4], total)

@@ -1,6 +1,6 @@
 """Exact one-step propagation of damped modes under any drive and interface forces that are constant over the step.
 
-Everything comes from the exponentials of the modes (of all of them at once where damping couples them), so resonance
+Everything comes from the exponentials of the modes, of all of them at once where damping couples them. So resonance
 without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where 3.7 and
 3.9 print i w). What the drive adds in a step and the energies of the step are sums over Gauss points of the step, exact
 to round-off for a drive that is smooth inside it.
@@ -40,9 +40,12 @@ class Propagator:
     parts: dict
 
     def tables(self, drive, first: int, count: int) -> np.ndarray:
-        """Rows (count, 8 n + 3 + p) of the steps from number `first`: what the drive adds to z and z' (n, n), linear
-        forms in (z, z', acceleration) of the work of the drive (3 n) and of the viscous loss (3 n) [J], the rest of
-        both [J], the drive at the end of the step [m s-2], what the drive moves every port (p) [m]."""
+        """Rows (count, 8 n + 3 + p) of the steps from number `first` on.
+
+        In turn: what the drive adds to z and z' (n, n); linear forms in (z, z', acceleration) of the work of the drive
+        (3 n) and of the viscous loss (3 n) [J]; the rest of both [J]; the drive at the end of the step [m s-2]; what
+        the drive moves every port (p) [m].
+        """
         start = (first + np.arange(count)) * self.dt
         a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)
         p = self.parts
@@ -93,7 +96,7 @@ def _flow(modes: ModalBasis, times) -> tuple:
 
 
 def _single(omega, zeta, t) -> tuple:
-    """zz, zv, vz, vv of single coordinates (n,) after times t (k, 1), in closed form for any damping."""
+    """Blocks zz, zv, vz, vv of single coordinates (n,) after times t (k, 1), in closed form for any damping."""
     decay, root = zeta * omega, omega * np.sqrt(np.abs(zeta**2 - 1))
     x = root * t
     small = x < 1e-3
@@ -113,7 +116,7 @@ def _single(omega, zeta, t) -> tuple:
 
 
 def _exponentials(a, times) -> np.ndarray:
-    """exp(a t) (k, m, m) for times (k,): Taylor's sum of a scaled matrix, squared back."""
+    """Exponentials exp(a t) (k, m, m) for times (k,): Taylor's sum of a scaled matrix, squared back."""
     top = np.abs(a).sum(axis=1).max() * float(times.max())
     halvings = max(0, int(np.ceil(np.log2(max(top, 1e-300) / 0.25))))
     x = a * (times[:, None, None] / 2.0**halvings)
@@ -126,8 +129,10 @@ def _exponentials(a, times) -> np.ndarray:
 
 
 def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
-    """(z, z') after dt per constant modal acceleration: (n,) each, (n, n) where damping couples. The first is the
-    integral of zv: of a short step no difference of large numbers."""
+    """Motion (z, z') after dt per constant modal acceleration: (n,) each, (n, n) where damping couples.
+
+    The first is the integral of zv: of a short step no difference of large numbers.
+    """
     return np.tensordot(weight, _flow(modes, nodes)[1], 1), _flow(modes, np.array([dt]))[1][0]
 
 
@@ -173,7 +178,7 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
 
 
 def _lagrange(nodes, at) -> np.ndarray:
-    """Lagrange polynomials of the nodes (m,) at places (k,): (k, m)."""
+    """Lagrange polynomials (k, m) of the nodes (m,) at places (k,)."""
     gap = nodes[:, None] - nodes
     np.fill_diagonal(gap, 1.0)
     scale = 1 / np.prod(gap / np.ptp(nodes), axis=1)

@@ -1,4 +1,4 @@
-"""What the comparison methods share: the grid of steps, the start, the result and its ledger of energy."""
+"""Shared by the comparison methods: the grid of steps, the start, the result and its ledger of energy."""
 
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -58,7 +58,10 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Grid:
-    """Arrays of a run before it is run: time, drive (k,); z, v (k, n); force, residual (i, k); iterations (k,)."""
+    """Arrays of a run before it is run.
+
+    time, drive: (k,); z, v: (k, n); force, residual: (i, k); iterations: (k,).
+    """
 
     h: float
     time: np.ndarray

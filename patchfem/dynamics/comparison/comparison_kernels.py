@@ -16,8 +16,10 @@ COULOMB, HEAD = 0, 4  # first number of a row of set-valued friction; numbers of
 
 @njit(error_model="numpy", **LEAN)
 def law_force(laws, c, speed, travel, before, hold):
-    """Force [N] of interface c at a slide speed [m/s]; travel [m] since the force was `before` [N], `hold` [N] is what
-    keeps the speed as it is."""
+    """Force [N] of interface c at a slide speed [m/s].
+
+    travel [m] since the force was `before` [N]; hold [N]: the force that keeps the speed as it is.
+    """
     if laws[c, 0] == COULOMB:
         if abs(speed) < laws[c, 3]:
             return min(max(hold, -laws[c, 1]), laws[c, 1])
@@ -65,7 +67,7 @@ def holding(c, along, faces, force, mass):
 
 @njit(error_model="numpy", **LEAN)
 def dot(row, x):
-    """Sum of row * x."""
+    """Scalar product of two rows."""
     out = 0.0
     for i in range(row.size):
         out += row[i] * x[i]
@@ -74,7 +76,7 @@ def dot(row, x):
 
 @njit(error_model="numpy", **LEAN)
 def step_of(row, z, v, first, last):
-    """One row of a map."""
+    """Value of one row of a map."""
     return row[0] * z + row[1] * v + row[2] * first + row[3] * last
 
 
@@ -134,8 +136,11 @@ def duhamel_loop(maps, coupling, solve, omega, dampers, faces, base, mass, drive
 
 @njit(error_model="numpy", **LEAN)
 def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
-    """Force [N] that a law gives at the end of a step in which every newton takes `back_speed` [m/s] off the slide
-    speed and `back_travel` [m] off the travel that they would be without it."""
+    """Force [N] of a law at the end of a step in which it acts back on the slide.
+
+    Every newton takes `back_speed` [m/s] off the slide speed and `back_travel` [m] off the travel that they would be
+    without it.
+    """
     limit = laws[c, 1]
     if laws[c, 3] != 0 and abs(before) >= limit:
         return before
@@ -191,8 +196,10 @@ def settle(laws, stuck, direction, speed, travel, soft_speed, soft_travel, befor
 
 @njit(error_model="numpy", **LEAN)
 def arrest(stuck, faces, mass, crossed, v, accel, force):
-    """Take the slide speed and the slide acceleration of all stuck interfaces away, by sweeps; `force` [N] keeps what
-    the second one needs. crossed (i, i): faces_c . faces_d."""
+    """Stop all stuck interfaces: take their slide speed and slide acceleration away, by sweeps.
+
+    force [N] keeps what the second one needs. crossed: (i, i) faces_c . faces_d.
+    """
     for _ in range(500):
         change = 0.0
         for c in range(force.size):

@@ -16,10 +16,7 @@ CRITERIA = ("displacement", "velocity", "force")
 
 
 def kernels(modes: ModalBasis, h: float) -> np.ndarray:
-    """(n, 2, 4) maps of (z, z', f at the start, f at the end) to (z, z') after h [s] under f [m s-2] linear in time.
-
-    The damping on the diagonal of D is inside, exact for rigid, undamped and overdamped modes alike.
-    """
+    """Maps (n, 2, 4) of (z, z', f at the start, f at the end) to (z, z') after h [s] under f [m s-2] linear in time."""
     out = np.empty((modes.omega.size, 2, 4))
     for i, (w, d) in enumerate(zip(modes.omega, np.diag(modes.dampers))):
         a = np.zeros((4, 4))
@@ -30,7 +27,7 @@ def kernels(modes: ModalBasis, h: float) -> np.ndarray:
 
 
 def admitted(modes: ModalBasis, h: float, convergence: str, tolerance: float, relax: float) -> np.ndarray:
-    """(i,) [N]: wrong by how much the friction of an accepted step can be."""
+    """Error of the friction (i,) [N] that an accepted step can have."""
     if convergence == "force":
         return np.full(len(modes.interfaces), tolerance)
     at = CRITERIA.index(convergence)

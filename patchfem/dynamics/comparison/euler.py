@@ -27,7 +27,7 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
 
 
 def damping_left(modes: ModalBasis, h: float) -> np.ndarray:
-    """(n,) damping ratios that a step of h [s] leaves: the modes' own less omega h/2; nan for a rigid mode."""
+    """Damping ratios (n,) that a step of h [s] leaves: the modes' own less omega h/2; nan for a rigid mode."""
     w = modes.omega
     own = np.divide(np.diag(modes.dampers), 2 * w, out=np.full(w.size, np.nan), where=w > 0)
     return own - w * h / 2

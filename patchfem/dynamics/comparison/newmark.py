@@ -37,8 +37,11 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
 
 
 def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:
-    """Force [N] over the kinetic friction that gives a released interface the stick speed within a step of h [s]: with
-    less it is caught again, so it acts as static friction that grows as the step falls."""
+    """Force [N] by which the stick speed raises the static friction of a released interface in steps of h [s].
+
+    It is the force over the kinetic friction that gives the interface the stick speed within a step. With less the
+    interface is caught again, so it acts as static friction that grows as the step falls.
+    """
     return 2 * modes.mass * stick_speed / (h * float(np.sum(np.asarray(face)**2)))
 
 

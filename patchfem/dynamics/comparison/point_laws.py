@@ -13,8 +13,11 @@ HEAD = 4  # numbers of a row before those of its law
 
 @dataclass(frozen=True, slots=True)
 class Coulomb:
-    """kinetic sgn(v) [N]. stick_speed [m/s]: below it the force is what holds the interface, up to `static` [N]; 0: no
-    such branch, the force is +-kinetic (0 at rest) and nothing ever sticks."""
+    """Coulomb friction kinetic sgn(v) [N], with a stick speed.
+
+    stick_speed [m/s]: below it the force is what holds the interface, up to `static` [N]. 0: there is no such branch,
+    the force is +-kinetic (0 at rest) and nothing ever sticks.
+    """
 
     static: float
     kinetic: float
@@ -71,7 +74,7 @@ class Smooth:
 
 
 def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
-    """(i, HEAD + k) numbers of the laws; PatchfemError where they do not fit the interfaces or cannot be."""
+    """Numbers of the laws, (i, HEAD + k); PatchfemError where they do not fit the interfaces or cannot be."""
     if len(laws) != interfaces:
         raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give each interface its own")
     found, number = [law.row(stick_speed) for law in laws], number_of(kernels_of(laws))
@@ -102,7 +105,7 @@ def loops(laws):
 
 
 def sticking_warnings(laws, stick_speed: float | None = None) -> list:
-    """What the laws by themselves get wrong, as sentences."""
+    """Warnings of what the laws by themselves get wrong."""
     out = []
     for law in laws:
         if isinstance(law, Coulomb):

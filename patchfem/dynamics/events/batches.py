@@ -14,8 +14,11 @@ GRID = np.linspace(0.0, 1.0, 9)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Batch:
-    """k pieces in order. time, span, unit, theta, cycle, first (k,); coefs (k, TERMS, n); drive (k, 3): constant,
-    amplitude, omega; signs, held, forces (k, f) of the faces that rub; push (k, n); react (k, f, n)."""
+    """Pieces of a run in order, k of them.
+
+    time, span, unit, theta, cycle, first: (k,); coefs: (k, TERMS, n); drive: (k, 3) constant, amplitude, omega; signs,
+    held, forces: (k, f) of the faces that rub; push: (k, n); react: (k, f, n).
+    """
 
     time: np.ndarray
     span: np.ndarray
@@ -35,11 +38,11 @@ class Batch:
         return len(self.time)
 
     def cut(self, which) -> "Batch":
-        """Some of the pieces."""
+        """A Batch of some of the pieces."""
         return Batch(*(getattr(self, name)[which] for name in Batch.__slots__))
 
     def ending(self, span: float) -> "Batch":
-        """The last piece only `span` [s] long."""
+        """The Batch with its last piece only `span` [s] long."""
         spans = self.span.copy()
         spans[-1] = span
         return Batch(*(spans if name == "span" else getattr(self, name) for name in Batch.__slots__))
@@ -57,7 +60,7 @@ class Batch:
 
 
 def gather(pieces) -> Batch:
-    """A Batch of pieces."""
+    """Collect pieces into a Batch."""
     scalar = [np.array([getattr(p, name) for p in pieces])
               for name in ("time", "span", "unit", "theta", "cycle", "first")]
     rest = [np.array([getattr(p, name) for p in pieces], float)
@@ -66,12 +69,12 @@ def gather(pieces) -> Batch:
 
 
 def join(batches) -> Batch:
-    """Batches one after the other."""
+    """Join Batches one after the other."""
     return Batch(*(np.concatenate([getattr(b, name) for b in batches]) for name in Batch.__slots__))
 
 
 def powers(u):
-    """u^k (..., TERMS)."""
+    """Powers u^k (..., TERMS) of u (...,)."""
     out = np.empty((*np.shape(u), TERMS))
     out[..., 0] = 1.0
     for k in range(1, TERMS):
@@ -162,7 +165,7 @@ def stored(batch: Batch, modes: ModalBasis, share: float) -> np.ndarray:
 
 
 def turning_points(series, share) -> tuple:
-    """(piece, u): roots of the derivative of series (k, TERMS) for u inside (0, share (k,)), by samples and Newton."""
+    """Turning points (piece, u) of series (k, TERMS) for u inside (0, share (k,)), by samples and Newton's method."""
     slope = derivative(series[..., None])[..., 0]
     bend = derivative(slope[..., None])[..., 0]
     u = share[:, None] * GRID
@@ -180,7 +183,7 @@ def turning_points(series, share) -> tuple:
 
 
 def values_at(series, piece, u):
-    """series (k, TERMS) at u (j,) of the pieces (j,)."""
+    """Values of series (k, TERMS) at u (j,) of the pieces (j,)."""
     return np.einsum("jp,jp->j", powers(u), series[piece])
 
 

@@ -12,7 +12,7 @@ TURN = 2 * pi
 
 
 class Clock:
-    """Cycle and offset in it [s]; the drive's segments and the end as borders on them."""
+    """Clock of an exact run: cycle and offset in it [s], with the drive's segments and the end as borders."""
 
     def __init__(self, drive, cycles: float):
         if not drive.segments:
@@ -26,7 +26,7 @@ class Clock:
         self.begin(0)
 
     def place(self, time: float) -> tuple:
-        """(cycle, offset) of a time [s]."""
+        """Cycle and offset of a time [s]."""
         share = time / self.period
         near = round(share)
         if abs(share - near) <= 4e-15 * max(1.0, abs(share)):
@@ -35,7 +35,7 @@ class Clock:
         return cycle, max(time - cycle * self.period, 0.0)
 
     def begin(self, number: int) -> None:
-        """Enter a segment."""
+        """Enter the segment of this number."""
         self.number = number
         (self.from_cycle, self.from_offset), part = self.segments[number]
         self.omega = part.omega if part.amplitude != 0 else 0.0

@@ -150,12 +150,12 @@ class Engine:
         self._enter(tuple(guess), resting)
 
     def _fill(self):
-        """(v, pull, sine, cosine) here."""
+        """Current vector (v, pull, sine, cosine) of the motion."""
         return self.system.rows @ np.concatenate((self.z, self.v, (self.clock.constant, *self._sine()),
                                                   self.choice.given))
 
     def _piece(self, first: bool) -> tuple:
-        """(Piece, event): event is (face, sign of its slip after it as first guess) or None."""
+        """Next Piece and the event at its end: (face, sign of its slip after it as first guess) or None."""
         clock, flow, n = self.clock, self.flow, self.n
         span, event = min(self.unit, clock.left), None
         if flow.frozen:
@@ -188,7 +188,8 @@ class Engine:
         return piece, event
 
     def _release(self) -> tuple:
-        """(time to it, face, sign) of the next release while nothing can move: the phase at which a sine passes."""
+        """Next release while nothing can move: (time to it, face, sign), from the phase at which a sine passes the
+        limit."""
         clock, system, best = self.clock, self.system, (inf, 0, 0)
         if clock.amplitude == 0:
             return best
@@ -207,7 +208,7 @@ class Engine:
         return best
 
     def _root(self, c: int, sign: int, coefs, span: float) -> tuple:
-        """(time in the piece, sign guessed after it) of the first event of a face; (inf, 0) if there is none."""
+        """First event of a face in a piece: (time in the piece, sign guessed after it); (inf, 0) if there is none."""
         shrink = ONE if span == self.unit else (span / self.unit)**ORDER
         if sign:
             found = self._first(coefs * (sign * shrink), self.orders.get((c, sign), 0), 0.0)

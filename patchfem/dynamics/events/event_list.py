@@ -36,7 +36,7 @@ class EventLog:
 
 
 class Recorder:
-    """Events as they come."""
+    """The events of a run noted as they come."""
 
     def __init__(self):
         self.rows, self.count = deque(maxlen=ROOM), 0
@@ -47,14 +47,14 @@ class Recorder:
         self.rows.append((time, phase, interface, what, slide))
 
     def log(self) -> EventLog:
-        """Everything noted."""
+        """The events noted so far, as an EventLog."""
         time, phase, interface, what, slide = zip(*self.rows) if self.rows else ((),) * 5
         return EventLog(frozen_array(time), frozen_array(phase), frozen_array(interface, np.int64),
                         frozen_array(what, np.int64), frozen_array(slide), self.count)
 
 
 def kind_of(before: int, after: int) -> int | None:
-    """What a change of the sign of slip is called, None where there is none."""
+    """Kind of event that a change of the sign of slip is, None where it is none."""
     if before == after:
         return None
     if after == 0:

@@ -18,8 +18,11 @@ __all__ = ["Engine", "Phase", "Signal", "combine", "run"]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Phase:
-    """From one event to the next, `span` [s] long: slip (directions (i,) +1, -1) or stick (0) from `time` [s] and drive
-    phase `theta`. modal: a Signal of every coordinate; forces: a Signal of every interface's friction [N]."""
+    """Motion from one event to the next, `span` [s] long from `time` [s] and drive phase `theta`.
+
+    directions: (i,) of slip +1, -1, or stick 0; modal: a Signal of every coordinate; forces: a Signal of every
+    interface's friction [N].
+    """
 
     time: float
     theta: float
@@ -30,12 +33,12 @@ class Phase:
 
     @property
     def direction(self) -> int:
-        """Of the first interface."""
+        """Direction of slip of the first interface."""
         return self.directions[0]
 
     @property
     def force(self) -> Signal:
-        """Of the first interface."""
+        """Friction Signal of the first interface."""
         return self.forces[0]
 
 

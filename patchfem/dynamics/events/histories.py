@@ -70,7 +70,7 @@ def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: i
 
 
 class _Book:
-    """What is kept while a run goes on."""
+    """Samples, sums and extremes that are kept while a run goes on."""
 
     def __init__(self, modes, drive, cycles, window, travel):
         self.modes, self.drive, self.window, self.travel, self.live = modes, drive, window, travel, ()
@@ -141,7 +141,8 @@ class _Book:
         np.add.at(self.phasors, np.minimum(number // 64, self.cycles - 1), y * np.exp(-2j * np.pi * number / 64) / 32)
 
     def _corners(self, batch, piece, u) -> None:
-        """States before the window: where events stand, and turning points unless every one of them is an event."""
+        """States kept before the window: where events stand, and turning points unless every one of them is an
+        event."""
         owner, tau = np.flatnonzero(batch.first), np.zeros(np.count_nonzero(batch.first))
         if len(self.live) == 0 or len(self.modes.omega) > 1:
             owner = np.concatenate([owner, piece])

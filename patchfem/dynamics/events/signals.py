@@ -1,4 +1,4 @@
-"""Motion between events as series: polynomials on [0, 1], their Bernstein form and the first root it isolates.
+"""Motion between events as series: polynomials on [0, 1], their Bernstein form and the first root that it isolates.
 
 A piece of motion lasts at most 2/rate, so 27 terms of the exponential of the system are exact to round-off, whatever
 its rates are: rigid, resonant without damping, overdamped, equal or defective. All coefficients of the Bernstein form

@@ -41,7 +41,10 @@ class Steady:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Map:
-    """One period: end state x = (z, v) (2n,), its derivative (2n, 2n), pieces, stops (i,), alone as in Steady."""
+    """Map of the state over one period.
+
+    state: x = (z, v) (2n,) at its end; its derivative (2n, 2n); pieces; stops (i,); alone as in Steady.
+    """
 
     end: np.ndarray
     slope: np.ndarray
@@ -93,7 +96,7 @@ def _piece_map(piece, system):
 
 
 def _ending(piece, system) -> tuple:
-    """(v, a, pull) at a piece's end."""
+    """State (v, a, pull) at a piece's end."""
     n, u = system.n, piece.span / piece.unit
     v = np.zeros(n) if piece.flow.frozen else (ORDER[1:] * u**ORDER[:-1]) @ piece.coefs[1:] / piece.unit
     z = u**ORDER @ piece.coefs

@@ -56,7 +56,7 @@ class StickSet:
         self.flat = np.concatenate([self.motion.reshape(-1, 2 * n + 2), self.hull.reshape(-1, 2 * n + 2)])
 
     def _series(self, system, omega: float, unit: float) -> tuple:
-        """(motion, pull): maps (TERMS + 2, n, 2n + 2) and (TERMS, n, 2n + 2)."""
+        """Series of the motion (TERMS + 2, n, 2n + 2) and of the pull (TERMS, n, 2n + 2)."""
         n = system.n
         pull = np.zeros((TERMS, n, 2 * n + 2))
         move = np.zeros((TERMS + 2, n, 2 * n + 2))
@@ -109,8 +109,11 @@ class System:
 
 
 class Entry:
-    """What a choice is made from: vector (2n + 2,) = (v, pull without friction, sine, cosine), size (2n + 2,) the
-    magnitudes it was added from, which set its round-off."""
+    """Input of a choice: the motion just after an event.
+
+    vector: (2n + 2,) = (v, pull without friction, sine, cosine); size: (2n + 2,) the magnitudes it was added from,
+    which set its round-off.
+    """
 
     __slots__ = ("size", "vector")
 
@@ -120,15 +123,17 @@ class Entry:
         self.vector, self.size = system.rows[:, :end] @ state, system.sizes[:, :end] @ np.abs(state)
 
     def under(self, system, given) -> tuple:
-        """The same with the friction `given` (i,) [N] of the slipping faces."""
+        """The Entry with the friction `given` (i,) [N] of the slipping faces."""
         column = system.given
         return self.vector + system.rows[:, column] @ given, self.size + system.sizes[:, column] @ np.abs(given)
 
 
 class Choice:
-    """What the faces do after an event: signs of slip (0: stuck), held (slipping by name only: at its limit, but held
-    by others), given (i,) friction [N] of those that do not stick, orders up to which a watched signal is zero at the
-    start."""
+    """State of the faces after an event.
+
+    signs of slip, 0 where stuck; held: slipping by name only, at its limit but held by others; given: (i,) friction [N]
+    of those that do not stick; orders up to which a watched signal is zero at the start.
+    """
 
     __slots__ = ("given", "held", "orders", "signs")
 
@@ -137,9 +142,9 @@ class Choice:
 
 
 def settle(system: System, entry: Entry, signs, resting, omega: float, unit: float) -> Choice:
-    """State of the faces just after an event.
+    """Find the state of the faces just after an event.
 
-    The faces `resting` have v = 0; signs: the first guess, for the others their slip. A choice holds when every stuck
+    The faces `resting` have v = 0. signs: the first guess, for the others their slip. A choice holds when every stuck
     face is below its limit, or at it and going back, and every slipping face starts to move its own way, told by the
     first derivative that is not zero. NotConverged where no choice does.
     """
@@ -191,8 +196,10 @@ def _judge(system, entry, signs, resting, omega, unit, noise) -> Choice | None:
 
 
 def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int, noise: float, last: int = 8) -> tuple:
-    """(order, value) of the first coefficient of constant + sign * watched signal, from `order` on, that is above its
-    round-off; (last, 0) where there is none."""
+    """Order and value of the first coefficient of constant + sign * watched signal that is above its round-off.
+
+    The search goes from `order` on; (last, 0) where there is none.
+    """
     while order < last:
         value, size = sign * float(flow.watch[c, order] @ full), float(flow.size[c, order] @ weight)
         if order == 0:
@@ -204,9 +211,11 @@ def _leading(flow, c: int, full, weight, constant: float, sign: int, order: int,
 
 
 def _by_squares(system, entry, signs, resting):
-    """Choices for many faces at rest: forces that minimise the square of the accelerations, then their own, within the
-    static limits; or within the kinetic ones, where the law always has a solution; at last, for not too many faces,
-    every choice."""
+    """Choices for many faces at rest, from forces that minimise the square of the accelerations.
+
+    Then their own choice, within the static limits; or within the kinetic ones, where the law always has a solution; at
+    last, for not too many faces, every choice.
+    """
     rest = list(resting)
     static = system.static[rest]
     for limit in (static, np.maximum(system.kinetic[rest], 1e-9 * static)):

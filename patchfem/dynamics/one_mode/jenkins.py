@@ -13,7 +13,10 @@ from .slip_kernels import first_leap, leap, motion, oscillator, stop
 
 
 class Jenkins:
-    """w, decay [1/s], stiffness of the spring over the mass [1/s2], limit and drive b sin(om t) over the mass."""
+    """A mode with an elastic-plastic spring under a sine.
+
+    w, decay [1/s]; stiffness of the spring over the mass [1/s2]; limit and drive b sin(om t) over the mass.
+    """
 
     def __init__(self, w: float, decay: float, stiffness: float, limit: float, b: float, om: float):
         self.w, self.decay, self.kt, self.limit, self.b, self.om = w, decay, stiffness, limit, b, om
@@ -86,8 +89,11 @@ class Jenkins:
         return np.array([z, v, pull]), tangent
 
     def steady(self, patience: int = 4000):
-        """(amplitude, multipliers (3,) of a period, residual over the amplitude) of the symmetric periodic motion that
-        is reached from rest; amplitude 0 where it never slips."""
+        """Symmetric periodic motion that is reached from rest: (amplitude, multipliers (3,) of a period, residual over
+        it).
+
+        The amplitude is 0 where the spring never slips.
+        """
         theta, state = 0.0, np.zeros(3)
         guess = sliding_guess(self.b, self.limit, self.free)
         if guess[3]:

@@ -1,9 +1,7 @@
-"""Periodic motion of one mode with one Coulomb interface under a sine: the map over a drive period or half of it, with
-its tangent through every event, and Newton's method on it. Plain Python that `steady_kernels` compiles.
+"""Periodic motion of one mode with one Coulomb interface under a sine, by Newton's method on its map over a period.
 
-The tangent jumps at events: the speed a mode has lost in a stick cannot be seen afterwards, and where the acceleration
-jumps a shift of the event's time becomes a shift of the speed (Leine, Nijmeijer 2004, Dynamics and Bifurcations of
-Non-Smooth Mechanical Systems, ch. 7).
+The map over a drive period or half of it carries its tangent through every event. Plain Python that `steady_kernels`
+compiles.
 """
 
 from math import atan2, inf, nan, pi, sqrt

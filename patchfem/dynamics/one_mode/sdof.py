@@ -1,5 +1,6 @@
-"""One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in
-segments. Short blocks run as plain Python (no compiled code is loaded), long ones compiled.
+"""One mode with one Coulomb interface in closed form: the fast way of `histories.simulate`, for any drive in segments.
+
+Short blocks run as plain Python, so no compiled code is loaded; long ones run compiled.
 """
 
 from itertools import pairwise
@@ -19,8 +20,11 @@ CORNERS = 400_000  # corners kept from before the window
 
 
 def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: float) -> OneMode:
-    """The mode, friction [N] and drive over the mass. PatchfemError where they are not one mode with one interface, the
-    drive has no closed form, or kinetic friction exceeds static."""
+    """The mode, its friction [N] and its drive, over the mass.
+
+    PatchfemError where they are not one mode with one interface, the drive has no closed form, or kinetic friction
+    exceeds static.
+    """
     if modes.omega.size != 1 or modes.interfaces.shape[0] != 1:
         raise PatchfemError("structure: the fast event engine is of one mode and one interface; use the general one")
     if not drive.segments:
@@ -51,11 +55,8 @@ def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: 
 def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, window: int = 10,
              travel: float = inf, progress=None, start: Start | None = None, compiled: bool = False) -> EventRun:
     """Run `cycles` drive periods with friction forces [N] from rest or `start`; keeps the last `window` cycles whole.
-    The ledger's `stored` is what has been added since the start.
 
-    compiled: by `event_kernels`, which must have been loaded through `patchfem.compiled`. The outcome is set only where
-    the output passes `travel` [m]; the run ends there. PatchfemError as `scene_of`; NotConverged where an event could
-    not be located or events pile up.
+    The ledger's `stored` is what has been added since the start.
     """
     block = scene_of(modes, drive, static, kinetic, cycles * drive.period)
     engine = sdof_kernels
@@ -72,8 +73,10 @@ def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: fl
 
 def events(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, start: Start | None = None,
            compiled: bool = False, most: int = 100_000) -> np.ndarray:
-    """The first `most` events of a run: (k, 5) time [s], drive phase [rad], z [m], z' [m/s] and what begins there,
-    +-1 a slip, 0 a stick; the first row is the start. Errors as `simulate`."""
+    """The first `most` events of a run, (k, 5): time [s], drive phase [rad], z [m], z' [m/s] and what begins there.
+
+    +-1 is a slip, 0 a stick; the first row is the start. Errors as `simulate`.
+    """
     block = scene_of(modes, drive, static, kinetic, cycles * drive.period)
     engine = sdof_kernels
     if compiled:

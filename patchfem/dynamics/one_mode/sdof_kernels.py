@@ -1,9 +1,5 @@
-"""Events of one mode with one Coulomb interface: plain Python for a short scene, compiled by `event_kernels` for long
-ones.
-
-A stick ends where the force that holds the interface, an offset plus a sine, reaches static friction; its phase there
-is kept as sine and cosine, so that nothing is lost where the limit is only just reached. `o` is that of `slip_kernels`.
-"""
+"""Events of one mode with one Coulomb interface: plain Python for a short scene, compiled by `event_kernels` for a long
+one."""
 
 from math import atan2, cos, floor, inf, pi, sin, sqrt
 

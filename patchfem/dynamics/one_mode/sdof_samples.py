@@ -132,12 +132,12 @@ def _one(u, rows, owner, block, om, parts) -> np.ndarray:
 
 
 def position(u, rows, owner, block: OneMode):
-    """z alone, as `states`."""
+    """Position z alone, as `states` gives it."""
     return _states(u, rows, owner, block, 1)[0]
 
 
 def states(u, rows, owner, block: OneMode) -> tuple:
-    """(z, v, z'') at times u (k,) after the starts of the phases rows[owner], rows (p, 10), owner (k,)."""
+    """Motion (z, v, z'') at times u (k,) after the starts of the phases rows[owner]; rows (p, 10), owner (k,)."""
     return _states(u, rows, owner, block, 3)
 
 
@@ -153,7 +153,7 @@ def _states(u, rows, owner, block, parts):
 
 
 def pull(u, rows, owner, block: OneMode) -> tuple:
-    """(drive force over the mass, its first and second derivative) at times u (k,) after the starts of phases."""
+    """Drive force over the mass and its first and second derivative at times u (k,) after the starts of phases."""
     _, _, push, b, om, _ = block.segments[rows[owner, 9].astype(int)].T
     angle = rows[owner, 1] + om * u
     wave = b * np.sin(angle)

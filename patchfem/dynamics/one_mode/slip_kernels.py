@@ -70,7 +70,7 @@ def motion(u, v0, g0, bc, bs, o):
 
 
 def moved(u, co, so, v0, g0, bc, bs, o):
-    """The same with the cosine and sine of om u at hand."""
+    """Motion as `motion` gives it, with the cosine and sine of om u at hand."""
     beta, alpha, decay, own, kind, om, top = o
     if u * top < REACH:
         return series(u, v0, g0, bc, bs, o)

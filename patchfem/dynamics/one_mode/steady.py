@@ -22,11 +22,14 @@ class Regime(StrEnum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Steady:
-    """A steady motion. stops: sticks per drive cycle; amplitude: half peak to peak of the output [m]; starts: drive
-    phases [rad] at which slips begin out of a stick; stick_fraction of the time; multipliers: of a small disturbance
-    (z, v) over the time after which the motion repeats, `periods` drive periods (0: lost in a stick); condition: change
-    of amplitude omega^2/|base a| per change of D, static friction over the drive's force; symmetric: the second half
-    turns the first over; residual of the periodicity over the amplitude."""
+    """A steady motion of one mode.
+
+    stops: sticks per drive cycle; amplitude: half peak to peak of the output [m]; starts: drive phases [rad] at which
+    slips begin out of a stick; stick_fraction of the time; multipliers: of a small disturbance (z, v) over the time
+    after which the motion repeats, `periods` drive periods (0: lost in a stick); condition: change of amplitude
+    omega^2/|base a| per change of D, static friction over the drive's force; symmetric: the second half turns the first
+    over; residual of the periodicity over the amplitude.
+    """
 
     regime: Regime
     stops: float
@@ -76,11 +79,10 @@ def _condition(row, found, output: float) -> float:
 
 def point(modes: ModalBasis, drive, static: float, kinetic: float, start: Start | None = None, patience: int = 4000,
           compiled: bool = False) -> Steady:
-    """The steady motion under a sine with friction forces [N], the one reached from rest or `start` where there are
-    several (static > kinetic friction); at most `patience` cycles are marched in search of it.
+    """Steady motion under a sine with friction forces [N].
 
-    compiled: by `steady_kernels`, loaded through `patchfem.compiled`. PatchfemError as `sdof.scene_of` and for other
-    drives; a motion that does not become periodic is `unsettled`, not an error.
+    It is the one reached from rest or `start` where there are several (static > kinetic friction). At most `patience`
+    cycles are marched in search of it.
     """
     row, output = _row(modes, drive, static, kinetic, start)
     found, phases = np.zeros(12), np.full(orbit_kernels.PHASES, np.nan)
