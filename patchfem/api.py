@@ -61,7 +61,7 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 
 
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """What a scene would run, its sizes, cost, stiffness chain and groups; no physics is computed."""
+    """Plan a scene: what it would run, its sizes, cost, stiffness chain and groups; no physics is computed."""
     return plan_model(build(scene, **sets))
 
 

@@ -167,8 +167,8 @@ def using(key: str) -> str:
 
 
 def refusal(word: str, least: str = "") -> str:
-    """What serves in place of a law that is not carried: "use law 'coulomb' or 'tanh'; not yet built"; least: what the
-    law must carry besides."""
+    """Alternative to a law that is not carried: "use law 'coulomb' or 'tanh'; not yet built"; least: what the law must
+    carry."""
     laws = (f"'{name}'" for name, law in LAWS.items() if {word, *least.split()} <= set(law.carries.split()))
     return f"use law {in_words(laws, 'or')}; not yet built"
 

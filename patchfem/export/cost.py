@@ -7,7 +7,10 @@ from .pictures import drawing, styled
 
 
 def write(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> tuple:
-    """(cost.csv, cost.svg) in a folder that is made: one row per run with seconds, values and errors of `names`."""
+    """Write cost.csv and cost.svg into a folder that is made; returns both paths.
+
+    The table has one row per run with seconds, values and errors of `names`.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     table, picture = folder / f"cost_{knob}.csv", folder / f"cost_{knob}.svg"

@@ -13,14 +13,14 @@ MARKED = 40  # points of a curve up to which each is marked
 
 
 def spans(curve: dict) -> list:
-    """[(regime, first, last + 1)] of neighbouring points of a curve that share a regime."""
+    """Stretches [(regime, first, last + 1)] of neighbouring points of a curve that share a regime."""
     regime = np.asarray(curve["regime"], str)
     edges = [0, *(np.flatnonzero(regime[1:] != regime[:-1]) + 1), regime.size]
     return [(str(regime[a]), int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def axis_of(curve: dict) -> tuple:
-    """(values along a curve, what they are, unit)."""
+    """Horizontal axis of a curve: (values along it, their name, unit)."""
     if np.ptp(curve["frequency"]) > 0:
         return np.asarray(curve["frequency"]), "drive frequency", "Hz"
     return np.asarray(curve["level"]) / G, "drive level", "g"
@@ -38,7 +38,7 @@ def regime(steady: dict | None) -> str:
 
 
 def caption(found: dict) -> str:
-    """What the picture of a curve shows."""
+    """Caption of the picture of a curve."""
     what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
     text = f"Half peak-to-peak of the steady motion over the {what}, {count} points; "
@@ -50,8 +50,10 @@ def caption(found: dict) -> str:
 
 @styled
 def curve(found: dict):
-    """Amplitude of the steady motion over frequency or level, its regime by colour and line: stable ones whole,
-    unstable ones broken; folds marked."""
+    """Draw the amplitude of the steady motion over frequency or level.
+
+    The regime is shown by colour and line: stable motions whole, unstable ones broken; folds are marked.
+    """
     along, what, unit = axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
     value = np.asarray(found["amplitude"]) * scale
@@ -83,7 +85,7 @@ def _gaps(axis, along, value) -> None:
 
 @styled
 def levels(rows: list):
-    """Amplitude after every level, in the order of the test; arrows run upwards and downwards."""
+    """Draw the amplitude after every level, in the order of the test; arrows run upwards and downwards."""
     drive = np.array([row["drive"] for row in rows]) / G
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
     name, scale = axis_unit(amplitude, "m")

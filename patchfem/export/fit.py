@@ -11,8 +11,11 @@ LABEL = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
 
 
 def write_rows(path: Path, time, displacement, measured, model, held, quantity: str) -> None:
-    """A CSV in SI that `fit` reads back: time (where there is one), displacement, the measured reading, then fitted and
-    held as columns without a unit."""
+    """Write a CSV in SI that `fit` reads back.
+
+    Its columns are time (where there is one), displacement and the measured reading, then fitted and held without a
+    unit.
+    """
     unit = "[N]" if quantity == "force" else "[1]"
     head = [*([] if time is None else ["time [s]"]), "displacement [m]", f"{quantity} {unit}", "fitted", "held"]
     columns = [*([] if time is None else [time]), displacement, measured, model]
@@ -25,7 +28,7 @@ def write_rows(path: Path, time, displacement, measured, model, held, quantity: 
 
 @styled
 def draw(displacement, measured, model, held, quantity: str):
-    """Measured and fitted reading against displacement, and what is left over along the rows, as SVG text."""
+    """Draw measured and fitted reading against displacement, and what is left over along the rows, as SVG text."""
     figure, (loop, rest) = drawing(2, 3.6)
     name, unit = LABEL[quantity]
     along, size = axis_unit(displacement, "m")

@@ -34,7 +34,7 @@ def _bar(ends) -> str:
 
 
 def answer_of(fitted: Fitted) -> dict:
-    """The object of fit.json; SI."""
+    """The object of fit.json, in SI."""
     found, loop = fitted.found, fitted.loop
     values = {one.key: _value(one, found, k) for k, one in enumerate(fitted.free)}
     unit = "N" if loop.quantity == "force" else "1"

@@ -39,7 +39,10 @@ def summary_of(result: Result) -> dict:
 
 
 def effects_of(result: Result) -> list:
-    """[{"effect", "equations", "seconds"}]: the law and the modes share one loop, whose time stands with the law."""
+    """Effects of a run as [{"effect", "equations", "seconds"}].
+
+    The law and the modes share one loop, whose time stands with the law.
+    """
     patch, out = result.patch, []
     loop = result.seconds.get("march", result.seconds.get("bench", 0.0))
     for name in result.plan.effects:
@@ -57,8 +60,11 @@ def effects_of(result: Result) -> list:
 
 
 def run_into(what, target: Path, say=None, progress=None, fresh: bool = False) -> dict:
-    """Claim the results folder `target`, run the plan, fill the folder; the summary. An older folder of results is
-    replaced only when the new one is whole, and a folder with other files is refused before anything runs."""
+    """Run a plan into the results folder `target` and return its summary.
+
+    The folder is claimed first. An older folder of results is replaced only when the new one is whole, and a folder
+    with other files is refused before anything runs.
+    """
     with Folder(target) as folder:
         result = run(what, say, progress, fresh=fresh)
         return write(result, folder.path)

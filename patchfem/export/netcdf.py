@@ -78,8 +78,11 @@ def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | Non
 
 
 def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, meanings, source: str) -> xr.Dataset:
-    """With the table of events (e,): time [s], number of the interface from 1 (0: of the drive), kind as a flag of
-    `meanings`, slide [m]; count: how many there were, the last of them are kept."""
+    """Add the table of events (e,) to a dataset.
+
+    time [s]; interface: its number from 1, 0 for a border of the drive; kind: a flag of `meanings`; slide [m]; count:
+    how many there were, the last of them are kept.
+    """
     flags = {"long_name": "what happened, up: towards positive slip", "flag_meanings": " ".join(meanings),
              "flag_values": np.arange(len(meanings), dtype=np.int8)}
     about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
@@ -93,7 +96,8 @@ def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, mean
 
 
 def with_curve(data: xr.Dataset, curve: dict) -> xr.Dataset:
-    """With a curve of steady motions (c,): frequency [Hz], level, amplitude [m], regime, multiplier, and its folds."""
+    """Add a curve of steady motions (c,) to a dataset: frequency [Hz], level, amplitude [m], regime, multiplier, and
+    its folds."""
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
     out = {"curve_frequency": (point, curve["frequency"], {"units": "Hz", "long_name": "drive frequency"}),
@@ -120,7 +124,7 @@ def _attributes(name: str, dimensions: int = 1) -> dict:
 
 
 def described(data: xr.Dataset, summary: dict, scene_text: str, versions: dict) -> xr.Dataset:
-    """With where the numbers come from: program, scene, outcome, measures; no host name and no path."""
+    """Add the origin of the numbers to a dataset: program, scene, outcome, measures; no host name and no path."""
     return data.assign_attrs({
         "Conventions": "CF-1.11", "title": summary["title"], "source": f"patchfem {summary['patchfem']}",
         "outcome": summary["outcome"], "scene": scene_text,

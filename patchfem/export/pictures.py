@@ -28,7 +28,7 @@ DOTS, BANDS = 800, 1500
 
 
 def step_of(ladder: tuple, size: float) -> tuple:
-    """(name, scale) of the smallest unit of a ladder in which `size` [SI] stays below 1000."""
+    """Unit (name, scale) of a ladder: the smallest in which `size` [SI] stays below 1000."""
     for name, scale in ladder:
         if abs(size) * scale < 1000:
             return name, scale
@@ -36,15 +36,15 @@ def step_of(ladder: tuple, size: float) -> tuple:
 
 
 def axis_unit(values, unit: str) -> tuple:
-    """(name, scale) for an axis that shows `values` [SI]."""
+    """Unit (name, scale) for an axis that shows `values` [SI]."""
     values = np.asarray(values)
     return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def envelope(time, value, period: float) -> tuple:
-    """(middle, lowest, highest) of the samples of each cycle; a cycle without samples is a gap of NaN.
+    """Middle, lowest and highest value of the samples of each cycle; a cycle without samples is a gap of NaN.
 
-    time, value: (k,), ascending; cycles are put together where there are more than a picture can show.
+    time, value: (k,), ascending. Cycles are put together where there are more than a picture can show.
     """
     many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / BANDS)))
     number = np.floor(time / (many * period) + 1e-9).astype(int)
@@ -92,8 +92,10 @@ def _svg(figure) -> str:
 
 
 def styled(draw):
-    """A function that draws a Figure, as one that answers with its SVG text; its `figure` gives the Figure itself,
-    which a notebook shows as the same SVG."""
+    """Turn a function that draws a Figure into one that answers with its SVG text.
+
+    Its `figure` gives the Figure itself, which a notebook shows as the same SVG.
+    """
     @wraps(draw)
     def figure(*args, **kwargs):
         import matplotlib
@@ -111,7 +113,8 @@ def styled(draw):
 
 
 def part_in_contact(x, sigma) -> tuple | None:
-    """(first, last) x [m] to show where less than half the length is pressed, None where all of it is worth showing."""
+    """Ends (first, last) x [m] of the part to show where less than half the length is pressed, None where all is worth
+    showing."""
     used = np.flatnonzero(sigma > 0)
     if not used.size or used.size >= 0.5 * x.size:
         return None
@@ -121,7 +124,8 @@ def part_in_contact(x, sigma) -> tuple | None:
 
 @styled
 def interface(x, fields: dict):
-    """sigma_n(x) of the pressed state and, where some shear acts, tau(x) with the frame of the largest resultant."""
+    """Draw sigma_n(x) of the pressed state and, where some shear acts, tau(x) with the frame of the largest
+    resultant."""
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
     both = tau is not None and bool(np.any(tau))
     figure, axes = drawing(2 if both else 1, 3.2)
@@ -146,7 +150,7 @@ def interface(x, fields: dict):
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:
-    """(left, right, height) [m] of the part of both pieces that shows the contact, right - left = 2 height ratio."""
+    """Part (left, right, height) [m] of both pieces that shows the contact, right - left = 2 height ratio."""
     used = np.flatnonzero(sigma > 0)
     first, last, length = x[used[0]], x[used[-1]], x[-1] - x[0]
     width = min(1.6 * (last - first) + 2 * (x[1] - x[0]), 0.4 * length)
@@ -197,7 +201,7 @@ def bodies(x, depths, mises, sigma):
 
 @styled
 def loop(slide, force, title: str):
-    """Friction force [N] against slide [m]."""
+    """Draw the friction force [N] against the slide [m]."""
     figure, (axis,) = drawing(1, 3.6)
     along, um = axis_unit(slide, "m")
     up, scale = axis_unit(force, "N")

@@ -100,7 +100,7 @@ def _row(model: type, key: str, at: str) -> tuple:
 
 
 def _needed(path: str) -> str:
-    """What makes a key necessary: "law `tanh`", the values of a selector, or a condition in words."""
+    """Condition that makes a key necessary: "law `tanh`", the values of a selector, or words."""
     table, _, key = path.rpartition(".")
     said = [CONDITIONS[path]] if path in CONDITIONS else []
     for selector, used in NEEDS.items():

@@ -45,7 +45,7 @@ def matched(value, error=None) -> tuple:
 
 
 def units(name: str, value: float, unit: str) -> list:
-    """[(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first."""
+    """Units [(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first."""
     if name.endswith("fraction"):
         return [("%", 100.0)]
     if name.endswith("phase"):
@@ -57,7 +57,7 @@ def units(name: str, value: float, unit: str) -> list:
 
 
 def pair(name: str, measure: dict) -> str:
-    """`14.808 ± 0.041 um`: a measure with its error in the first of its units."""
+    """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`."""
     value, error = measure["value"], measure["error"]
     unit, scale = (units(name, value, measure["unit"]) or [("" if measure["unit"] == "1" else measure["unit"], 1.0)])[0]
     value, error = matched(value * scale, None if error is None else error * scale)
@@ -161,7 +161,7 @@ def _placed(number: int, svg: str, caption: str) -> str:
 
 
 def figures(data: dict) -> list:
-    """[(svg, caption)] of the pictures that this run has something to show in."""
+    """Pictures [(svg, caption)] that this run has something to show in."""
     found = [picture(name, data) for name in PICTURES]
     return [(one.draw(*one.values), one.caption) for one in found if one is not None]
 

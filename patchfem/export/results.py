@@ -15,9 +15,11 @@ LOCK = ".writer"
 
 
 class Folder:
-    """Context of a results folder, claimed at entry. `path` is the partial folder to write into; leaving without an
-    error renames it, leaving with one removes it. PatchfemError for a target that holds other files or is in use,
-    Missing where it cannot be written."""
+    """Context of a results folder, which is claimed at entry.
+
+    `path` is the partial folder to write into. Leaving without an error renames it, leaving with one removes it.
+    PatchfemError for a target that holds other files or is in use, Missing where it cannot be written.
+    """
 
     def __init__(self, target: Path):
         self.target = Path(os.path.abspath(target)).resolve()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def measure_object(measure) -> dict:
-    """{"value", "unit", "error", "floor"} of a Measure; a value that is not finite becomes null."""
+    """The object {"value", "unit", "error", "floor"} of a Measure; a value that is not finite becomes null."""
     def clean(number):
         return None if number is None or not math.isfinite(number) else float(number)
 

@@ -88,7 +88,7 @@ def format_si(value: float, kind: str) -> str:
 
 
 def wanted(kind: str) -> str:
-    """What a key of this kind wants, with an example, as the end of a message."""
+    """Requirement of a key of this kind, with an example, as the end of a message."""
     return f"{_article(kind)} with its unit is wanted, such as '{EXAMPLES[kind]}'"
 
 

@@ -33,7 +33,7 @@ class Draft:
         return self.value(key) is not None
 
     def value(self, key: str) -> Any:
-        """What was written at a dotted key; None if nothing."""
+        """Value that was written at a dotted key; None where nothing was."""
         value: Any = self.raw
         for part in key.split("."):
             if isinstance(value, list):
@@ -261,7 +261,7 @@ def _allowed(model: type[Table], name: str) -> tuple[str, ...]:
 
 
 def _wanted(model: type[Table], name: str) -> str:
-    """What a key wants, as a clause of a message."""
+    """Requirement of a key, as a clause of a message."""
     annotation = model.model_fields[name].annotation
     types = (annotation, *_types(model, name))
     clause = "a text in quotes is wanted"

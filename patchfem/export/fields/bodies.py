@@ -6,8 +6,10 @@ import numpy as np
 
 
 def write_fields(result, path: Path) -> dict:
-    """Both bodies and the interface, frame by frame, of one pair; the pressed state for the report's picture, which is
-    drawn for tensor grids only."""
+    """Write both bodies and the interface of one pair, frame by frame.
+
+    Returns the pressed state for the report's picture, which is drawn for tensor grids only.
+    """
     from ...elasticity.elasticity import Piece
     from .vtkhdf import bodies, write_series
 
@@ -41,7 +43,8 @@ def _moved(interface: dict, x, nodes) -> dict:
 
 
 def _loads(patch, fields: dict, side: str) -> tuple:
-    """(shear, normal) (1 + f, n) [N/m] on the nodes of a piece: the pressed state, then the shear of every frame."""
+    """Loads (shear, normal) (1 + f, n) [N/m] on the nodes of a piece: the pressed state, then the shear of every
+    frame."""
     sign, at = (-1.0, 0) if side == "lower" else (1.0, 1)
     force = patch.pieces.interface.weight / patch.pieces.interface.width
     tau = fields.get("shear_stress", np.zeros((len(fields["time"]), force.size)))
@@ -91,7 +94,8 @@ def _body(patch, fields: dict, side: str, u) -> dict:
 
 
 def _inside(piece, grid, u) -> tuple:
-    """(points (n, 2) as x and depth, blocks of cells, interface nodes, cell stress) of a piece displaced by u."""
+    """Inside of a piece displaced by u: (points (n, 2) as x and depth, blocks of cells, interface nodes, cell
+    stress)."""
     from ...elasticity import elasticity
 
     if isinstance(piece, elasticity.Piece):

@@ -11,7 +11,8 @@ from .vtkhdf import Frame
 
 
 def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
-    """Both pieces whole and near their contact, and the stress along the interface, as the ending of `path` says."""
+    """Draw both pieces whole and near their contact, and the stress along the interface, as the ending of `path`
+    says."""
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(STYLE | {"axes.grid": False}):

@@ -13,9 +13,11 @@ VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Panel:
-    """One view of both pieces. places (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion;
-    window: (left, right, bottom, top) [mm] of what is drawn; top: stress [Pa] at the upper end of the colours; over:
-    whether some cell exceeds it."""
+    """One view of both pieces.
+
+    places: (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion; window: (left, right, bottom,
+    top) [mm] of what is drawn; top: stress [Pa] at the upper end of the colours; over: whether some cell exceeds it.
+    """
 
     places: np.ndarray
     cells: np.ndarray
@@ -25,7 +27,7 @@ class Panel:
     over: bool
 
     def title(self) -> str:
-        """How the panel is drawn, for its head."""
+        """Head of the panel: how it is drawn."""
         text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
         unit, scale = axis_unit([self.top], "Pa")
         return text + (f", top colour {self.top * scale:.3g} {unit} and more" if self.over else "")
@@ -39,7 +41,8 @@ class Panel:
 
 
 def panels(frame: Frame, magnify: float | None = None) -> tuple:
-    """(Panel of both pieces whole, Panel of where they touch), each with a factor of its own unless `magnify` is given.
+    """Panels of both pieces whole and of the place where they touch, each with a factor of its own unless `magnify` is
+    given.
 
     The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
     """
@@ -79,8 +82,11 @@ def _exceeded(values, weight, share: float) -> float:
 
 
 def moved(frame: Frame) -> np.ndarray:
-    """(N, 2) displacement [m], that of the upper piece with the shape of its surface, fading towards its far face, so
-    that the drawn gap is the gap."""
+    """Displacement (N, 2) [m] as drawn.
+
+    That of the upper piece includes the shape of its surface, fading towards its far face, so that the drawn gap is the
+    gap.
+    """
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
     line = frame.interface()
     x = frame.points[line, 0]
@@ -94,7 +100,7 @@ def moved(frame: Frame) -> np.ndarray:
 
 
 def rounded(factor: float, least: float = 1.0) -> float:
-    """The next lower of 1, 2, 5 times a power of ten, `least` at least; factor > 0."""
+    """A factor rounded down to 1, 2 or 5 times a power of ten, `least` at least; factor > 0."""
     if factor < least:
         return least
     power = 10.0**np.floor(np.log10(factor))
@@ -119,13 +125,13 @@ def near(frame: Frame) -> tuple:
 
 
 def middles(frame: Frame) -> np.ndarray:
-    """(cells, 2) middles of the cells [mm]."""
+    """Middles of the cells (cells, 2) [mm]."""
     sums = np.add.reduceat(frame.points[frame.connectivity, :2], frame.offsets[:-1])
     return sums / np.diff(frame.offsets)[:, None] * 1e3
 
 
 def areas(frame: Frame) -> np.ndarray:
-    """(cells,) areas [m2], 0 of lines."""
+    """Areas of the cells (cells,) [m2], 0 of lines."""
     size, out = np.diff(frame.offsets), np.zeros(len(frame.types))
     for count in np.unique(size[size > 2]):
         mine = size == count
@@ -136,7 +142,7 @@ def areas(frame: Frame) -> np.ndarray:
 
 
 def curves(frame: Frame) -> tuple:
-    """(x [mm], ((label, values in the unit), ...), unit) of the stresses along the interface."""
+    """Stresses along the interface: (x [mm], ((label, values in the unit), ...), unit)."""
     line = frame.interface()
     shown = [("normal stress", frame.point_data["normal_stress"][line])]
     if "shear_stress" in frame.point_data:
@@ -146,7 +152,7 @@ def curves(frame: Frame) -> tuple:
 
 
 def borders(frame: Frame, cells) -> tuple:
-    """((e, 2) outer edges of both pieces, (e, 2) edges between coating and substrate) that the `cells` (bool) have."""
+    """Edges (e, 2) of the `cells` (bool): the outer ones of both pieces, and those between coating and substrate."""
     outer, inner = [], []
     size, material = np.diff(frame.offsets), frame.cell_data["material"]
     for part in (0, 1):

@@ -18,10 +18,11 @@ LINE, TRIANGLE, QUAD = 3, 5, 9
 
 
 def write_series(path: Path, points, blocks, times, point_data: dict, cell_data: dict, units: dict) -> None:
-    """points (N, 3); blocks: (t, 2 to 4) node numbers of lines, triangles or quads, one array after the other; times
-    (f,); data: name -> (f or 1, N or cells, ...), 1 if constant.
+    """Write a series of fields on one fixed grid.
 
-    The file is written whole beside `path` and then renamed; written with an HDF5 version that VTK's reader knows.
+    points: (N, 3); blocks: (t, 2 to 4) node numbers of lines, triangles or quads, one array after the other; times:
+    (f,); data: name -> (f or 1, N or cells, ...), 1 if constant. The file is written whole beside `path` and then
+    renamed; it is of an HDF5 version that VTK's reader knows.
     """
     path = Path(path)
     partial = path.with_name(path.name + ".partial")
@@ -119,8 +120,11 @@ def bodies(lower: dict, upper: dict, interface: dict, above: dict | None = None)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame:
-    """One moment of a series. points (N, 3) [m]; connectivity, offsets (cells + 1,), types: as VTK has them;
-    point_data, cell_data: name -> (N or cells, ...); units: name -> unit; time [s]; number: from 0."""
+    """One moment of a series.
+
+    points: (N, 3) [m]; connectivity, offsets (cells + 1,), types: as VTK has them; point_data, cell_data: name -> (N or
+    cells, ...); units: name -> unit; time [s]; number: from 0.
+    """
 
     points: np.ndarray
     connectivity: np.ndarray
@@ -139,15 +143,15 @@ class Frame:
                 for n in np.unique(size[mine])]
 
     def interface(self) -> np.ndarray:
-        """(m,) points of the interface by rising x."""
+        """Points of the interface (m,) by rising x."""
         nodes = np.unique(np.concatenate([block.ravel() for block in self.cells(2)]))
         return nodes[np.argsort(self.points[nodes, 0], kind="stable")]
 
 
 class Series:
-    """The fields of a results folder, frame by frame, as written. `times`: (f,) [s]; a context that holds the file.
+    """The fields of a results folder, frame by frame, as written; a context that holds the file.
 
-    Missing where the folder has no fields, PatchfemError for a file that is not one of `write_series`.
+    times: (f,) [s]. Missing where the folder has no fields, PatchfemError for a file that is not one of `write_series`.
     """
 
     def __init__(self, folder: Path):

@@ -71,7 +71,7 @@ def frames_beside(path: Path) -> Path:
 
 
 def write_pvd(path: Path, series: Series) -> int:
-    """The series as a .pvd and one .vtu per frame in the folder beside it; the number of frames.
+    """Write the series as a .pvd and one .vtu per frame in the folder beside it; returns the number of frames.
 
     Frames left there by a longer series are removed; PatchfemError where the folder holds anything else.
     """
@@ -139,7 +139,7 @@ def _packed(values) -> str:
 
 
 def write_csv(path: Path, frame: Frame) -> None:
-    """The interface of one frame: a row per node by rising x, a column per field; SI, the unit in the header."""
+    """Write the interface of one frame: a row per node by rising x, a column per field; SI, the unit in the header."""
     nodes = frame.interface()
     head, columns = ["x [m]"], [[repr(float(x)) for x in frame.points[nodes, 0]]]
     for name, values in frame.point_data.items():
