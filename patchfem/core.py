@@ -1,6 +1,7 @@
-"""The nouns that travel between stages: frozen, read-only, SI.
+"""The nouns that travel between stages: frozen, read-only, in SI units.
 
-Letters for shapes, the same everywhere: m interface points, n modes, k times, t elements.
+Shapes use the same letters everywhere: m interface points, n modes, i interfaces, k times, t elements.
+
 Signs: compression, normal stress and load > 0; slip = upper - lower; rotation > 0 opens the gap at +x.
 """
 
@@ -49,10 +50,10 @@ _SENTENCES = {
 
 
 class PatchfemError(Exception):
-    """A named failure a person can act on; `code` is the exit code of the command line.
+    """A named failure that a person can act on; `code` is the exit code of the command line.
 
-    key: the key of the scene at fault, whose file and line `model.source.placed` puts before the text; "" for the scene
-    as a whole, None where the text says it all.
+    key: the key of the scene at fault. `model.source.placed` puts its file and line before the text. "" stands for the
+    scene as a whole, None where the text says it all.
     """
 
     code = 2
@@ -83,7 +84,10 @@ def frozen_array(values, dtype=np.float64) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Interface:
-    """Points along the sliding direction. x: (m,) [m], 0 in the middle; weight: (m,) nodal areas of all pairs [m2]."""
+    """Points of the interface along the sliding direction.
+
+    x: (m,) [m], 0 in the middle; weight: (m,) nodal areas [m2] of all pairs; width [m] of all pairs.
+    """
 
     x: np.ndarray
     weight: np.ndarray
@@ -100,7 +104,7 @@ class Compliance:
     """The pair of pieces seen from their interface, all pairs together.
 
     normal: (m, m) closing per nodal normal force [m/N]; tangential: (m, m) relative slide per nodal shear force [m/N].
-    Both symmetric positive definite; far faces are held, so no rigid motion is inside.
+    Both are symmetric and positive definite: the far faces are held, so no rigid motion is inside.
     """
 
     interface: Interface
@@ -112,8 +116,9 @@ class Compliance:
 class Pressure:
     """A solved static contact state.
 
-    sigma_n: (m,) nodal normal stress [Pa], >= 0; gap: (m,) remaining gap [m], >= 0; approach [m] and rotation [rad]
-    of the upper holder; `residuals` from the independent check, relative.
+    sigma_n: (m,) nodal normal stress [Pa], >= 0; gap: (m,) gap that remains [m], >= 0; approach [m] and rotation [rad]
+    of the upper holder; load [N]; moment [N m] about x = 0; iterations: contact sets tried; residuals: relative, from
+    the independent check.
     """
 
     sigma_n: np.ndarray
@@ -129,14 +134,16 @@ class Pressure:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ModalBasis:
-    """n coordinates of equal mass: z_i'' + (D z')_i + omega_i^2 z_i = -base_i a(t) - (slide_i F + ...)/mass.
+    """Modes of a rig, or its masses, as n coordinates of equal mass.
 
-    omega [rad/s], zeta [1], slide/base/output [1]: (n,); mass [kg]. base is the share of the drive: of the base's
+    Equation (3.4) of the report: z_i'' + (D z')_i + omega_i^2 z_i = -base_i a(t) - (slide_i F + ...)/mass.
+
+    omega [rad/s], zeta [1], slide, base, output [1]: (n,); mass [kg]. base is the share of the drive: of the base's
     acceleration a(t), or of a force over the mass, a(t) = F/mass, with its sign turned. damping: (n, n) D [1/s] where
-    it couples the coordinates, None: D = diag(2 zeta omega). faces: (i, n) slide of every interface, None: the one
-    interface `slide`. normal (away from contact, 1), pitch [rad/m], lateral, yaw [rad/m]: (n,) motion of the patch per
-    coordinate, None where no mode has any. shapes: (p, n) the scene's own modes or masses per coordinate, `names` are
-    theirs; None: they are the coordinates.
+    it couples the coordinates; None: D = diag(2 zeta omega). faces: (i, n) slide of every interface; None: the one
+    interface `slide`. normal (away from the contact, 1), pitch [rad/m], lateral [1], yaw [rad/m]: (n,) motion of the
+    patch per coordinate, None where no mode has any. shapes: (p, n) the modes or masses of the scene, which `names` are
+    of, per coordinate; None: they are the coordinates.
     """
 
     names: tuple
@@ -161,13 +168,13 @@ class ModalBasis:
 
     @property
     def dampers(self) -> np.ndarray:
-        """D (n, n) [1/s], coupled or not."""
+        """Damping matrix D (n, n) [1/s], coupled or not."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Start:
-    """Coordinates z (n,) [m] and their rates v (n,) [m/s] at t = 0."""
+    """State of a rig at t = 0: coordinates z (n,) [m] and their rates v (n,) [m/s]."""
 
     z: np.ndarray
     v: np.ndarray
@@ -175,7 +182,10 @@ class Start:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Segment:
-    """From `start` [s] on: constant + amplitude sin(omega (t - start) + phase) [m s-2], until the next one."""
+    """One stretch of a drive in closed form, from `start` [s] until the next segment starts.
+
+    It is constant + amplitude sin(omega (t - start) + phase) [m s-2]; omega [rad/s], phase [rad].
+    """
 
     start: float
     constant: float = 0.0
@@ -186,10 +196,10 @@ class Segment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BaseSine:
-    """Drive +a sin(omega t) from t = 0; a [m s-2], omega [rad/s]. moving: it is the base that accelerates; False: a
-    force over the modal mass, the frame is at rest.
+    """A sine drive, +a sin(omega t) from t = 0; acceleration a [m s-2], omega [rad/s].
 
-    Every drive has period [s], moving, segments (closed form, () where there is none) and values(t).
+    moving: the base accelerates. Not moving: the drive is a force over the modal mass and the frame is at rest. Every
+    drive has period [s], moving, segments (in closed form, () where there is none) and values(t).
     """
 
     acceleration: float
@@ -203,7 +213,7 @@ class BaseSine:
 
     @property
     def segments(self) -> tuple:
-        """The one Segment."""
+        """The drive as a tuple of one Segment."""
         return (Segment(0.0, 0.0, self.acceleration, self.omega),)
 
     def values(self, t):
@@ -267,11 +277,12 @@ def rounded(value: float | None, error: float | None = None) -> tuple[str, str]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Response:
-    """Time histories of a run on its kept samples; arrays (k,) unless noted.
+    """Time histories of a run at its kept samples; arrays (k,) unless noted.
 
-    time [s]; modal (k, n) [m]; modal_rate (k, n) [m/s]; slide, slide_rate: interface motion; output, output_rate,
-    acceleration (absolute, at the accelerometer); force: friction resultant [N]; slip: irreversible part of `slide`.
-    `extra` may hold "ledger" (4, k) [J]: friction work, energy stored in the interface, dissipated, created.
+    time [s]; modal (k, n) [m]; modal_rate (k, n) [m/s]; slide [m], slide_rate [m/s] of the interface; output [m],
+    output_rate [m/s]; acceleration [m s-2], absolute, at the accelerometer; base_acceleration [m s-2]; force: friction
+    resultant [N]; slip: irreversible part of `slide` [m]. `extra` may hold "ledger" (4, k) [J]: friction work, energy
+    stored in the interface, dissipated, created.
     """
 
     time: np.ndarray

@@ -20,8 +20,12 @@ COARSEST = 60  # nodes below which no coarser problem is solved first
 
 
 class Ask(NamedTuple):
-    """What is asked: nodes x (m,), gap (m,) [m] from first touch on (below zero: overlap, for a given approach), load
-    (None: approach given), moment (None: rotation held) and spring of the rotation [N m/rad]."""
+    """A contact problem: what presses two pieces of a given gap.
+
+    x: (m,) nodes [m]; gap: (m,) [m] from first touch on, below zero where the pieces overlap under a given approach;
+    load [N], None: the approach is given and already in the gap; moment [N m], None: the rotation is held and already
+    in the gap; spring [N m/rad] of the holder against rotation.
+    """
 
     x: np.ndarray
     gap: np.ndarray
@@ -31,13 +35,17 @@ class Ask(NamedTuple):
 
     @property
     def least(self) -> int:
-        """Fewest nodes that determine the rigid motion."""
+        """Fewest touching nodes that determine the rigid motion."""
         return 2 if self.moment is not None and self.spring == 0 else 1
 
 
 class Found(NamedTuple):
-    """Forces and opening (m,), closing [m] at x = 0, rotation theta and dN/d(closing) at held rotation [N/m] of a set;
-    scale (m,): the size of the terms in each opening."""
+    """The motion under a given contact set, whatever the signs of its forces.
+
+    force: (m,) [N]; opening: (m,) [m]; scale: (m,) sum of the magnitudes of the terms of each opening [m], against
+    which its round-off is measured; closing [m] at x = 0; theta: rotation [rad]; stiffness: dN/d(closing) at held
+    rotation [N/m].
+    """
 
     force: np.ndarray
     opening: np.ndarray
@@ -48,7 +56,10 @@ class Found(NamedTuple):
 
 
 class _Motion:
-    """The equations of one contact set: forces and rigid motion from a gap on it, a load and a moment about centre."""
+    """Equations of one contact set: from a gap, a load and a moment to forces and rigid motion.
+
+    The moment is taken about `centre`, which makes lift and lean independent of each other.
+    """
 
     def __init__(self, operator: Operator, ask: Ask, active, index):
         x, gap = ask.x[index], ask.gap[index]
@@ -74,8 +85,10 @@ class _Motion:
             raise np.linalg.LinAlgError("the set does not determine the rigid motion")
 
     def forces(self, target, free=None, near: float = 0.0) -> tuple:
-        """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`; of the gap asked
-        for where `free` is not given."""
+        """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`.
+
+        Without `free` they are those of the gap of the problem.
+        """
         free, near = (self.free, self.near) if free is None else (free, near)
         motion = (target + self.rows @ free) / self.stiffness
         force = self.lift @ motion - free
@@ -83,12 +96,15 @@ class _Motion:
         return force, motion
 
     def correction(self, opening, lack) -> tuple:
-        """What to add to forces and motion where an opening (n,) and a lack of the sums are left."""
+        """Changes of forces and motion that close an opening (n,) and make up for a lack of load and moment."""
         return self.forces(lack, self.solve(opening[:, None])[:, 0])
 
 
 def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) -> Found:
-    """The answer with the nodes `active` (m,) in contact, whatever the signs; `polish` steps of refinement."""
+    """Forces and motion with the nodes `active` (m,) in contact, whatever the signs.
+
+    polish: steps of iterative refinement. LinAlgError where the set does not determine the motion.
+    """
     index = np.flatnonzero(active)
     system = _Motion(operator, ask, active, index)
     target = np.array([value for value in (ask.load, ask.moment) if value is not None])
@@ -114,7 +130,11 @@ def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) ->
 
 
 def settle(operator: Operator, ask: Ask, active: np.ndarray, limit: int = 100) -> tuple:
-    """(Found or None, last set, iterations); None where a set came back, was singular or `limit` was reached."""
+    """Primal-dual active set from `active` (m,) on: (Found or None, last set, iterations).
+
+    None where a set came back, where a set was singular or after `limit` iterations. Nodes that pull leave the set,
+    nodes that overlap enter it (Hintermüller, Ito, Kunisch 2003).
+    """
     seen = set()
     for count in range(1, limit + 1):
         active = supported(ask, active)
@@ -134,7 +154,10 @@ def settle(operator: Operator, ask: Ask, active: np.ndarray, limit: int = 100) -
 
 
 def supported(ask: Ask, active: np.ndarray) -> np.ndarray:
-    """The set, with the lowest node on each side of the load line where it does not reach to both sides."""
+    """The set, completed so that it can carry the load.
+
+    Where it does not reach to both sides of the load line, the lowest node of each side is added.
+    """
     index = np.flatnonzero(active)
     if ask.least == 1:
         return active if index.size else ask.gap <= ask.gap.min()
@@ -148,7 +171,7 @@ def supported(ask: Ask, active: np.ndarray) -> np.ndarray:
 
 
 def flaw(found: Found) -> float:
-    """Largest violation of contact: openings in their scale, pulls in the load."""
+    """Largest relative violation of contact: openings and overlaps over their scale, pulls over the load."""
     share = found.opening / np.where(found.scale > 0, found.scale, 1.0)
     inside = np.abs(share[found.force != 0]).max(initial=0.0)
     pull = -found.force.min() / max(found.force.sum(), 1e-300)
@@ -156,7 +179,7 @@ def flaw(found: Found) -> float:
 
 
 def polished(operator, ask, active, found: Found) -> Found:
-    """The same set refined once where rounding is seen in its openings."""
+    """The answer on the same set, refined once where its openings show round-off."""
     off = np.abs(found.opening[active]) > ROUND / 10 * found.scale[active]
     if not off.any():
         return found
@@ -165,8 +188,11 @@ def polished(operator, ask, active, found: Found) -> Found:
 
 
 def rest(x, gap, load: float, moment: float, spring: float = 0.0) -> float:
-    """Rotation theta at which a rigid piece under load and moment (and spring) comes to rest on the gap: it lies on
-    the edge of the lower convex hull below the load line, or with a spring perhaps on one corner."""
+    """Rotation theta [rad] at which a rigid piece comes to rest on the gap (m,) under load and moment.
+
+    It lies on the edge of the lower convex hull of the gap below the load line; against a spring [N m/rad] it may lie
+    on one corner. load [N], moment [N m]; x (m,), gap (m,) [m].
+    """
     a, b = 0, x.size - 1
     while a < b:
         theta = -(gap[b] - gap[a]) / (x[b] - x[a])
@@ -188,8 +214,11 @@ def rest(x, gap, load: float, moment: float, spring: float = 0.0) -> float:
 
 
 def first_set(operator: Operator, ask: Ask) -> np.ndarray:
-    """Nodes within the depth to which the load sinks the piece at most half way between a point load and an even one,
-    of the rest position; those that overlap for a given approach."""
+    """First guess of the contact set: the nodes that the load is likely to reach from the rest position.
+
+    The load sinks the piece by the geometric mean of what a point load and an even load would. Under a given approach
+    the nodes that overlap are taken.
+    """
     if ask.load is None:
         return ask.gap < 0
     deep = ask.load * np.sqrt(abs(operator.c.diagonal().mean() * operator.c.mean()))
@@ -197,8 +226,11 @@ def first_set(operator: Operator, ask: Ask) -> np.ndarray:
 
 
 def nested_set(operator: Operator, ask: Ask, every: int = 4) -> tuple:
-    """(first set, iterations on coarser nodes): a contact of the lowest node of each four, solved from coarser nodes in
-    turn, spread over those of the four that its rigid motion reaches."""
+    """First guess of the contact set from coarser nodes: (set, iterations spent there).
+
+    The lowest of each four nodes form a coarser problem, which is solved in the same way. Its set is spread over those
+    of the four that its rigid motion reaches.
+    """
     m = ask.x.size
     if m < COARSEST:
         return first_set(operator, ask), 0

@@ -1,9 +1,11 @@
-"""The normal contact as a piecewise linear map of the holder's motion: approach delta and rotation theta.
+"""The contact map: normal contact as a piecewise linear function of approach delta and rotation theta of the holder.
 
 The unilateral contact of `unilateral`, w = g + theta x - delta + C f >= 0, f >= 0, f . w = 0, is affine in (delta,
-theta) as long as its set of touching nodes stays; the plane falls into convex polygons, one for each set. Counted from
-a solved reference state: d = delta - delta0, t = theta - theta0. The energy E = f . C f/2 is convex and has the slopes
-dE/d(delta) = N, dE/d(theta) = -M, M = sum f x, across the borders as well, so the forces give back what they took.
+theta) as long as its set of touching nodes stays. So the plane falls into convex polygons, one for each contact set.
+Motions are counted from a solved reference state: d = delta - delta0, t = theta - theta0.
+
+The energy E = f . C f/2 is convex and has the slopes dE/d(delta) = N and dE/d(theta) = -M, M = sum f x, across the
+borders of the polygons as well. So the forces give back the energy that they took.
 """
 
 from dataclasses import dataclass
@@ -22,40 +24,46 @@ SIDES = 16  # most sides of a polygon, as in `polygon_kernels`
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """One contact set `on` (m,): force where it touches and gap where it does not, rows (3, m) per (1, d, t); energy
-    (6,): of the preloaded contact, E - E0 - N0 d + M0 t, the coefficients of 1, d, t, d^2/2, d t, t^2/2."""
+    """One contact set of the map, with its forces and gaps as affine functions of the motion.
+
+    on: (m,) the nodes that touch; rows: (3, m) force [N] where they touch and gap [m] where not, per (1, d, t); energy:
+    (6,) of the preloaded contact, E - E0 - N0 d + M0 t, the coefficients of 1, d, t, d^2/2, d t, t^2/2.
+    """
 
     on: np.ndarray
     rows: np.ndarray
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """(m,) forces [N] on the set and gaps [m] off it."""
+        """Forces [N] on the set and gaps [m] off it at (d [m], t [rad]), (m,)."""
         return self.rows[0] + d * self.rows[1] + t * self.rows[2]
 
     def forces(self, d: float, t: float) -> np.ndarray:
-        """(m,) nodal forces [N]."""
+        """Nodal forces (m,) [N] at (d [m], t [rad]); round-off below zero is cut off."""
         return np.where(self.on, np.maximum(self.values(d, t), 0.0), 0.0)
 
     @property
     def tangent(self) -> np.ndarray:
-        """(2, 2): change of N [N] and M [N m] (rows) per approach [m] and rotation [rad]; exact within the piece."""
+        """Stiffness (2, 2) of the set: change of N [N] and M [N m] (rows) per approach [m] and rotation [rad].
+
+        It is exact as long as the contact set stays.
+        """
         _, _, _, dd, dt, tt = self.energy
         return np.array([[dd, dt], [-dt, -tt]])
 
     def share(self, d: float, t: float, dd: float, dt: float) -> float:
-        """Share of an increment (dd, dt) from (d, t) in the piece up to which it holds, and its tangent with it; inf
-        where it never ends."""
+        """Share of an increment (dd, dt) from (d, t) after which the contact set changes; inf where it never does."""
         here, rate = self.values(d, t), dd * self.rows[1] + dt * self.rows[2]
         falls = rate < 0
         return float((np.maximum(here[falls], 0.0) / -rate[falls]).min(initial=np.inf))
 
 
 class Atlas:
-    """Pieces of a pair of bodies around a solved state, made when first asked for and kept.
+    """Contact map of a pair of bodies around a solved state; contact sets are worked out when first met and kept.
 
-    c (m, m) [m/N], x (m,) [m], opening (m,) [m]: g + theta0 x - delta0 of the state, < 0 where the bodies would
-    overlap without forces; on (m,) bool: its contact set. load N0 [N], moment M0 [N m].
+    c: (m, m) [m/N]; x: (m,) [m]; opening: (m,) [m], g + theta0 x - delta0 of the state, below zero where the bodies
+    would overlap without forces; on: (m,) bool, the contact set of the state. load N0 [N] and moment M0 [N m] are those
+    of the state. PatchfemError where nothing presses. Compiled twin: `press_kernels`.
     """
 
     def __init__(self, c, x, opening, on):
@@ -117,8 +125,10 @@ class Atlas:
         return piece
 
     def flaw(self, piece: Piece, d: float, t: float) -> float:
-        """Largest violation of contact at (d, t), from the definition: gaps in the size of the openings, pulls in the
-        load."""
+        """Largest relative violation of contact at (d, t), recomputed from the definition.
+
+        Gaps are measured in the size of the openings, pulls in the load.
+        """
         force = np.where(piece.on, piece.values(d, t), 0.0)
         opening = self.opening - d + t * self.x + self.c @ force
         size = self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()
@@ -126,14 +136,17 @@ class Atlas:
         return float(max(np.abs(opening[piece.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
 
     def resultant(self, d: float, t: float, start: Piece | None = None) -> tuple:
-        """(N [N], M [N m], energy of the preloaded contact [J]) at (d, t)."""
+        """Load N [N], moment M [N m] and energy [J] of the preloaded contact at (d, t)."""
         q = self.at(d, t, start).energy
         by_d, by_t = q[3] * d + q[4] * t, q[4] * d + q[5] * t
         return (float(self.load + q[1] + by_d), float(self.moment - q[2] - by_t),
                 float(q[0] + d * (q[1] + by_d / 2) + t * (q[2] + by_t / 2)))
 
     def arrays(self, room: float = ROOM) -> dict:
-        """Arrays of `press_kernels.Book` with nothing but the set of the reference state in `wanted`."""
+        """The map as arrays of `press_kernels.Book`, nothing in it yet but the reference set in `wanted`.
+
+        room: bytes that its contact sets may take.
+        """
         m = self.x.size
         count = int(max(16, min(room / (25 * m + 400), 100_000)))
         names = np.random.default_rng(5).integers(-2**63, 2**63, m, dtype=np.int64)
@@ -147,12 +160,12 @@ class Atlas:
                 "meta": np.zeros(5, np.int64), **sides(count)}
 
     def name(self, arrays: dict) -> int:
-        """Name of the reference set in these arrays."""
+        """64-bit name of the reference set in these arrays: the exclusive or of the names of its nodes."""
         return int(np.bitwise_xor.reduce(arrays["node"][self.reference.on], initial=0))
 
 
 def sides(count: int) -> dict:
-    """Arrays of the polygons of `count` pieces."""
+    """Empty arrays for the polygons of `count` contact sets."""
     return {"sides": np.zeros(count, np.int64), "edge": np.zeros((count, SIDES), np.int64),
             "beside": np.zeros((count, SIDES), np.int64), "limit": np.zeros((count, 2)),
             "corner": np.zeros((2, 3, 4 * SIDES))}

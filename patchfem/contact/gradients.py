@@ -1,8 +1,10 @@
-"""Fallbacks of the active set: constrained conjugate gradients on the same dense operator, and a finite descent.
+"""Fallbacks of the active set: constrained conjugate gradients on the same dense compliance, and a finite descent.
 
-The gradients follow Polonsky and Keer (Wear 231, 1999, 206), with the load, or load and moment, restored after each
-step by the nearest admissible forces, and the energy watched: where it rises, a step that cannot fail is put between.
-The descent is the primal active-set method of the strictly convex program: feasible, its energy falls at each step.
+The gradients follow Polonsky and Keer (Wear 231, 1999, 206). The load, or load and moment, is restored after each step
+by the nearest admissible forces. The energy is watched: where it rises, a step that cannot fail is put between.
+
+The descent is the primal active-set method of the strictly convex program: its forces stay feasible and its energy
+falls at each step.
 """
 
 import numpy as np
@@ -13,9 +15,11 @@ from .parts import Operator
 
 
 def _program(operator: Operator, ask: Ask) -> tuple:
-    """(bent, gap, rigid, sums) of: min f.bent(f)/2 + gap.f, f >= 0, rigid^T f = sums; all rigid motions of size 1.
+    """The contact problem as a convex program: (bent, gap, rigid, sums) of min f.bent(f)/2 + gap.f, f >= 0, rigid^T f =
+    sums.
 
-    A spring takes part as two more forces >= 0 that turn the piece either way, of the compliance of a node.
+    All rigid motions have the size 1. A spring takes part as two more forces >= 0 that turn the piece either way; each
+    has the compliance of a node.
     """
     c, gap = operator.c, ask.gap
     middle, half = ask.x.mean(), np.ptp(ask.x) / 2
@@ -34,8 +38,11 @@ def _program(operator: Operator, ask: Ask) -> tuple:
 
 
 def nearest(force: np.ndarray, rigid: np.ndarray, sums: np.ndarray, limit: int = 100) -> np.ndarray:
-    """The nonnegative forces nearest to `force` with rigid^T f = sums: f = max(0, force + rigid q), where q maximises a
-    concave piecewise quadratic; Newton with an exact line search ends after finitely many pieces."""
+    """The nonnegative forces nearest to `force` (m,) [N] whose sums over the rigid motions (m, r) are `sums` (r,).
+
+    They are max(0, force + rigid q), where q maximises a concave piecewise quadratic. Newton's method with an exact
+    line search ends after finitely many pieces.
+    """
     if not sums.size:
         return np.maximum(force, 0.0)
     most, raised = rigid.T @ rigid, force
@@ -53,7 +60,7 @@ def nearest(force: np.ndarray, rigid: np.ndarray, sums: np.ndarray, limit: int =
 
 
 def _top(start, step, rise: float) -> float:
-    """t > 0 with rise = step . max(0, start + t step); the right-hand side grows with t, piece by piece."""
+    """The t > 0 with step . max(0, start + t step) = rise; the left-hand side grows with t, piece by piece."""
     inside = (start > 0) | ((start == 0) & (step > 0))
     change = np.flatnonzero(start * step < 0)
     at = -start[change] / step[change]
@@ -68,7 +75,10 @@ def _top(start, step, rise: float) -> float:
 
 
 def gradients(operator: Operator, ask: Ask, tolerance: float = 1e-11, limit: int = 1000) -> tuple:
-    """(forces (m,), iterations): nonnegative, admissible, near to the answer; the polish is left to the active set."""
+    """Conjugate gradients: forces (m,) [N] near the answer, nonnegative and with the right sums, and the iterations.
+
+    The last digits are left to the active set.
+    """
     bent, gap, rigid, sums = _program(operator, ask)
     longest = np.abs(operator.c).sum(axis=1).max()
     safe = 1 / max(longest, operator.c.diagonal().mean())
@@ -104,7 +114,8 @@ def gradients(operator: Operator, ask: Ask, tolerance: float = 1e-11, limit: int
 
 
 def _restored(force, rigid, sums) -> np.ndarray:
-    """Admissible forces near to nonnegative ones, without waking the nodes at rest unless the others cannot do it."""
+    """Admissible forces near to nonnegative ones; nodes at rest stay at rest unless the others cannot carry the load.
+   """
     awake = force > 0
     out = np.zeros(force.size)
     if np.count_nonzero(awake) >= sums.size:
@@ -119,7 +130,10 @@ def _fit(rigid, values) -> np.ndarray:
 
 
 def descend(operator: Operator, ask: Ask, force: np.ndarray, limit: int | None = None) -> tuple:
-    """(Found, iterations) from admissible forces (m,); NotConverged when `limit` (20 m) steps do not end it."""
+    """Answer by a descent that must end, from admissible forces (m,) [N]: (Found, iterations).
+
+    NotConverged when `limit` (20 m unless given) steps do not end it.
+    """
     force = force.copy()
     active = force > 0
     limit = limit or 20 * force.size

@@ -1,10 +1,11 @@
 """Frictionless contact of two periodic half planes, in waves along the interface: a second, independent solver.
 
 Find p >= 0 with w = g - closing + u >= 0, p . w = 0 and a given mean of p, where each wave of the pressure sinks the
-faces on its own, u_k = C(k) p_k. C is handed in (`closed_forms.layered_compliance` for coated bodies,
-                                                  the sum over
-both); no mesh, no far face and no free edge are in it. Constrained conjugate gradients of Polonsky and Keer
-(Wear 231, 1999, 206): two pairs of transforms per iteration, memory of a few arrays.
+faces on its own, u_k = C(k) p_k. C is handed in, the sum over both bodies; `closed_forms.layered_compliance` has it for
+coated ones. No mesh, no far face and no free edge are in it.
+
+Method: constrained conjugate gradients of Polonsky and Keer (Wear 231, 1999, 206), two pairs of transforms per
+iteration, memory of a few arrays.
 """
 
 from dataclasses import dataclass
@@ -20,8 +21,11 @@ LIMIT = 1e-9  # largest relative residual that still counts as solved
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PeriodicContact:
-    """A solved period. pressure (n,) [Pa], gap (n,) [m] after closing, both >= 0; closing [m] of the mean planes;
-    residuals: relative, recomputed from the definition."""
+    """A solved period of wavy contact.
+
+    pressure: (n,) [Pa], >= 0; gap: (n,) [m] after closing, >= 0; closing [m] of the mean planes; residuals: relative,
+    recomputed from the definition.
+    """
 
     pressure: np.ndarray
     gap: np.ndarray
@@ -93,7 +97,7 @@ def press_periodic(compliance_k, gap, length: float, load: float, limit: int | N
 
 
 def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tuple:
-    """Pressure, closing and iterations; waves[0] = 0."""
+    """Pressure (n,) [Pa], closing [m] and iterations of Polonsky and Keer's method; waves[0] = 0."""
     n = gap.size
     pressure, direction, sunk = np.full(n, mean), np.zeros(n), None
     old, own = 0.0, irfft(waves, n)[0]  # own: what a point sinks under its own pressure

@@ -1,8 +1,8 @@
-"""Maps of the patch over loads, tilts and load lines: one operator, one contact after the other, each started from the
-set of its neighbour.
+"""Maps of the patch over loads, tilts and load lines: one condensed pair, pressed point after point.
 
-Loads run forth and back for every tilt, so that each point differs from the one before in one step of one quantity;
-the factor of the last contact set is carried along and only changed where nodes come or go.
+Each point starts from the contact set of its neighbour. Loads run forth and back for every tilt, so that each point
+differs from the one before in one step of one quantity. The factor of the last contact set is carried along and only
+changed where nodes come or go.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from .unilateral import checked, refuse, solve
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PressMap:
-    """Contact at all combinations of loads (n,) [N], angles (a,) [rad] and load lines (l,) [m]: arrays (n, a, l).
+    """Contact at all combinations of loads (n,) [N], angles (a,) [rad] and load lines (l,) [m]; arrays (n, a, l).
 
     fraction: share of the area with pressure; peak: largest nodal pressure [Pa]; centre: pressure centre from the
-    middle [m]; approach [m] and rotation [rad] of the upper holder; normal_stiffness dN/d(approach) at held rotation
-    and shear_stiffness dT/d(slide) in stick [N/m]; sigma_n (n, a, l, m) [Pa]; the last two None where not asked.
-    outcome: Outcome of each point; numbers of a point that is not solved are NaN and `reasons` says why by its index.
-    residual: largest relative residual of the independent check; iterations: active sets tried.
+    middle [m]; approach [m] and rotation [rad] of the upper holder; normal_stiffness: dN/d(approach) at held rotation
+    [N/m]; shear_stiffness: dT/d(slide) in stick [N/m]; sigma_n: (n, a, l, m) [Pa]; the last two are None where not
+    asked for. outcome: Outcome of each point. Numbers of a point that is not solved are NaN, and `reasons` says why by
+    its index. residual: largest relative residual of the independent check; iterations: contact sets tried.
     """
 
     loads: np.ndarray
@@ -50,12 +50,15 @@ NUMBERS = ("fraction", "peak", "centre", "approach", "rotation", "normal_stiffne
 
 def press_map(pieces: Compliance, gap: np.ndarray, loads, angles=(0.0,), lines=None, spring: float = 0.0,
               shear: bool = False, keep: bool = False) -> PressMap:
-    """Static pressure on the gap (m,) [m] plus angle*x under every load [N] (n,), angle [rad] (a,) and load line (l,).
+    """Static pressure on the gap (m,) [m] for all combinations of loads (n,) [N], angles (a,) [rad] and load lines (l,)
+    [m].
 
-    Without `lines` the angles are held. With them the load acts `lines` [m] right of the middle and the piece is free
-    to rotate, or held by the `spring` [N m/rad] of its holder from the angle on. `shear`: also the shear stiffness;
-    `keep`: also the pressures. A point without an answer (load line outside the patch, not converged) is marked and
-    the others go on; zero load is no_contact, with approach at first touch. PatchfemError for inputs that are no map.
+    An angle adds angle * x to the gap. Without `lines` the angles are held. With them the load acts `lines` [m] right
+    of the middle and the piece is free to rotate, or held by the `spring` [N m/rad] of its holder from the angle on.
+    shear: the shear stiffness as well; keep: the pressures as well.
+
+    A point without an answer (load line outside the patch, not converged) is marked and the others go on. Zero load is
+    no_contact, with the approach at first touch. PatchfemError for inputs that are no map.
     """
     loads, angles, lines, held = _axes(pieces, gap, loads, angles, lines)
     shape, m = (loads.size, angles.size, lines.size), pieces.interface.x.size
@@ -100,7 +103,7 @@ def _axes(pieces, gap, loads, angles, lines) -> tuple:
 
 
 def _order(loads, angles, lines):
-    """Points from one to the next in one step: loads forth and back, below them load lines, below them angles."""
+    """Indices of all points, neighbours one after the other: loads run fastest, then load lines, then angles."""
     steps = [np.argsort(values, kind="stable") for values in (loads, lines, angles)]
     up_load, up_line = True, True
     for a in steps[2]:

@@ -1,4 +1,5 @@
-"""Equations on a part of the nodes of a dense compliance, by a Cholesky factor that is changed, not made anew."""
+"""Equations on a part of the nodes of a dense compliance; its Cholesky factor is changed from set to set, not made
+anew."""
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs
@@ -7,7 +8,8 @@ SMALL = 100  # nodes up to which a new factor costs no more than the change of a
 
 
 def factor(matrix: np.ndarray) -> np.ndarray:
-    """Lower Cholesky factor in place of a symmetric C-ordered matrix; LinAlgError unless positive definite."""
+    """Lower Cholesky factor of a symmetric C-ordered matrix, in its place; LinAlgError unless it is positive definite.
+   """
     low, info = dpotrf(matrix.T, lower=1, overwrite_a=1, clean=0)
     if info:
         raise np.linalg.LinAlgError("not positive definite")
@@ -15,10 +17,10 @@ def factor(matrix: np.ndarray) -> np.ndarray:
 
 
 class Operator:
-    """A compliance c (m, m), symmetric positive definite, and equations on a part of its nodes.
+    """A compliance c (m, m) [m/N], symmetric positive definite, that solves equations on a part of its nodes.
 
-    The last factor is kept: a set that differs from its set by few nodes is solved with it, an entering node as one
-    more row, a leaving node as one more force that makes its own vanish.
+    The last factor is kept. A set that differs by few nodes is solved with it: an entering node is one more row, a
+    leaving node one more force that makes its own vanish.
     """
 
     __slots__ = ("answers", "base", "c", "index", "low")
@@ -27,13 +29,13 @@ class Operator:
         self.c, self.base, self.index, self.low, self.answers = c, None, None, None, {}
 
     def part(self, rows: np.ndarray) -> np.ndarray:
-        """Fresh C-ordered block of `rows` (sorted indices)."""
+        """Copy of the block of `rows` (sorted indices), C-ordered."""
         if rows[-1] - rows[0] == rows.size - 1:
             return self.c[rows[0]:rows[-1] + 1, rows[0]:rows[-1] + 1].copy()
         return self.c[rows[:, None], rows]
 
     def solver(self, active: np.ndarray):
-        """Function (n, k) -> (n, k) that solves with the block of the n nodes set in `active` (m,)."""
+        """Function (n, k) -> (n, k) that solves with the block of the n nodes that are set in `active` (m,)."""
         index = np.flatnonzero(active)
         if self.base is not None and index.size > SMALL:
             changed = np.flatnonzero(active != self.base)
@@ -46,7 +48,10 @@ class Operator:
         return dpotrs(self.low, sides, lower=1)[0]
 
     def _columns(self, gone, new) -> np.ndarray:
-        """What unit forces at the nodes do to those of the factor (n, k); kept, as the next sets differ little."""
+        """Answers (n, k) of the kept factor to unit forces at the nodes that leave and enter.
+
+        They are kept as well, because the next sets differ little.
+        """
         lacking = [node for node in (*gone, *new) if node not in self.answers]
         if lacking:
             unit = self.c[self.index[:, None], lacking]
@@ -79,6 +84,6 @@ class Operator:
         return solve
 
     def bent(self, force: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """C f (m,) of forces that vanish outside the sorted nodes `index`."""
+        """Displacement C f (m,) of forces that vanish outside the sorted nodes `index`."""
         span = slice(index[0], index[-1] + 1)
         return self.c[:, span] @ force[span]

@@ -1,7 +1,7 @@
-"""Compiled polygons of the contact sets: a piece holds where none of its few sides is passed.
+"""Compiled polygons of the contact sets: a set holds where none of its few sides is passed.
 
-Every node of a set bounds by a line the motions (d, t) at which the set holds; few of these lines are sides of the
-polygon that they leave. `book` is a `press_kernels.Book`.
+Every node of a set bounds by a line the motions (d, t) at which the set holds. Few of these lines are sides of the
+polygon that they enclose. `book` is a `press_kernels.Book`.
 """
 
 import numpy as np
@@ -15,15 +15,18 @@ SIDES, BOX = 16, 100.0  # most sides of a polygon; half its largest width, in th
 
 @njit(error_model="numpy", **LEAN)
 def units(book):
-    """Sizes of a closing [m] and of a turn [rad] that matter."""
+    """Scale of a closing [m] and of a turn [rad] in the polygons."""
     arm = max(abs(book.x[0]), abs(book.x[-1]))
     return book.base[3], book.base[3] / arm if arm > 0 else 1.0
 
 
 @njit(error_model="numpy", **LEAN)
 def outline(book, slot):
-    """The sides of a piece: a box, cut by the line of every node at which it fails (Sutherland, Hodgman 1974); first
-    of the nodes at the ends of the contact, which leave little to the others."""
+    """Work out the polygon of the set in a slot: a box, cut by the line of every node (Sutherland, Hodgman 1974).
+
+    The nodes at the ends of the contact cut first, because they leave little to the others. A set of too many sides
+    gets none.
+    """
     unit_d, unit_t = units(book)
     r0, r1, r2, on = book.rows[slot, 0], book.rows[slot, 1], book.rows[slot, 2], book.on[slot]
     top = 0.0
@@ -79,14 +82,14 @@ def outline(book, slot):
 
 @njit(error_model="numpy", **LEAN)
 def boxed(book, d, t):
-    """Whether a place lies in the box of the polygons."""
+    """Whether a motion (d, t) lies in the box of the polygons."""
     unit_d, unit_t = units(book)
     return abs(d) <= BOX * unit_d and abs(t) <= BOX * unit_t
 
 
 @njit(error_model="numpy", **LEAN)
 def margin(book, k, side, d, t):
-    """What the node of a side of piece k has left at (d, t) before it fails."""
+    """How far the node of a side of set k is from failing at (d, t): force [N] or gap [m]."""
     i = book.edge[k, side]
     least = book.limit[k, 0] if book.on[k, i] else book.limit[k, 1]
     return book.rows[k, 0, i] + book.rows[k, 1, i] * d + book.rows[k, 2, i] * t - least
@@ -94,7 +97,7 @@ def margin(book, k, side, d, t):
 
 @njit(error_model="numpy", **LEAN)
 def within(book, k, d, t):
-    """Whether the sides of piece k say that it holds at (d, t); False also where there are none to ask."""
+    """Whether the polygon of set k says that the set holds at (d, t); False also where it has no polygon."""
     if book.sides[k] == 0 or not boxed(book, d, t):
         return False
     for side in range(book.sides[k]):
@@ -105,7 +108,8 @@ def within(book, k, d, t):
 
 @njit(error_model="numpy", **LEAN)
 def way_out(book, k, d, t, dd, dt):
-    """(share of the increment (dd, dt) at which piece k ends, side there), side -1 where its sides cannot say."""
+    """Share of the increment (dd, dt) after which set k ends, and the side where it does; side -1 where no polygon can
+    say."""
     out, found = np.inf, -1
     if book.sides[k] == 0 or not (boxed(book, d, t) and boxed(book, d + dd, t + dt)):
         return out, found

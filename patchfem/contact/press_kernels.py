@@ -1,10 +1,12 @@
-"""Compiled atlas of the normal contact: on a contact set everything is affine in the motion of the upper holder.
+"""Compiled contact map: on one contact set everything is affine in the motion of the upper holder.
 
-d = closing beyond a reference state, t = rotation beyond it. With the unknowns of a set (forces where it touches, gaps
-where not) the complementarity problem w = b + t x - d + C f reads y = R (1, d, t); one node more or less is a principal
-pivot of the tableau [T | R]. A set is known by its 64-bit name, the exclusive or of the names of its nodes, so a state
-on a known set costs one pass over the nodes. The search flips all nodes that fail, later the first of them alone, which
-ends for every positive definite C (Murty, Opsearch 11, 1974). Twin: `atlas.Atlas`.
+d is the closing beyond a reference state, t the rotation beyond it. With the unknowns of a set (forces where it
+touches, gaps where not) the complementarity problem w = b + t x - d + C f reads y = R (1, d, t). One node more or less
+is a principal pivot of the tableau [T | R].
+
+A set is known by its 64-bit name, the exclusive or of the names of its nodes, so a state on a known set costs one pass
+over the nodes. The search flips all nodes that fail, later the first of them alone; that ends for every positive
+definite C (Murty, Opsearch 11, 1974). NumPy twin: `atlas.Atlas`.
 """
 
 from typing import NamedTuple
@@ -22,15 +24,17 @@ COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)
 
 
 class Book(NamedTuple):
-    """Arrays of an atlas of m nodes with room for k pieces.
+    """Arrays of a contact map of m nodes with room for k contact sets.
 
-    c (m, m); x, b (m,) places and openings of the reference state; tableau (m, m + 3) with its set `here` (m,);
-    rows (k, 3, m): force or gap per (1, d, t) of every piece; on (k, m); energy (k, 6): of the preloaded contact, the
-    coefficients of 1, d, t, d^2/2, d t, t^2/2; names (k,), heads, link: hash chains; node (m,) names; base (5,): force,
-    moment and energy of the reference state, size of its openings, its dN/d(delta); wanted (m,), side (2, 3, m),
-    row (m + 3,): scratch; meta: COUNT .. RENEWED. Where a piece is a polygon of few sides: sides (k,) their number, 0
-    where the rows have to be asked; edge (k, SIDES) their nodes; beside (k, SIDES) slots of the pieces there, -1; limit
-    (k, 2) forces and gaps below which a node fails; corner (2, 3, 4 SIDES): scratch.
+    c (m, m); x, b (m,): places and openings of the reference state; tableau (m, m + 3) with its set `here` (m,); rows
+    (k, 3, m): force or gap per (1, d, t) of every set; on (k, m); energy (k, 6): of the preloaded contact, the
+    coefficients of 1, d, t, d^2/2, d t, t^2/2; names (k,), heads, link: hash chains; node (m,): names of the nodes;
+    base (5,): force, moment and energy of the reference state, size of its openings, its dN/d(delta); wanted (m,), side
+    (2, 3, m), row (m + 3,): scratch; meta: COUNT .. RENEWED.
+
+    A set whose motions form a polygon of few sides has more: sides (k,): their number, 0 where the rows have to be
+    asked; edge (k, SIDES): the node of each side; beside (k, SIDES): slot of the set beyond it, -1 unknown; limit (k,
+    2): forces and gaps below which a node fails; corner (2, 3, 4 SIDES): scratch.
     """
 
     c: np.ndarray
@@ -59,7 +63,7 @@ class Book(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def pivot(book, k):
-    """Exchange force and gap of node k; m^2 multiplications. False where the pivot is not positive."""
+    """Exchange force and gap of node k in the tableau; m^2 multiplications. False where the pivot is not positive."""
     tableau, row = book.tableau, book.row
     m, wide = tableau.shape
     p = tableau[k, k]
@@ -85,7 +89,7 @@ def pivot(book, k):
 
 @njit(error_model="numpy", **LEAN)
 def renew(book):
-    """The tableau of the empty set."""
+    """Write the tableau of the empty contact set."""
     m = book.x.size
     for i in range(m):
         for j in range(m):
@@ -99,7 +103,8 @@ def renew(book):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def refine(book):
-    """Rows of the set from the tableau, refined once on C itself. Returns the relative residual found before that."""
+    """Read the rows of the set off the tableau and refine them once on C itself; relative residual found before that.
+   """
     m, c, tableau = book.x.size, book.c, book.tableau
     force, left = book.side[0], book.side[1]
     for i in range(m):
@@ -141,7 +146,8 @@ def refine(book):
 
 @njit(error_model="numpy", **LEAN)
 def store(book, name):
-    """Read the refined set off the tableau into the next slot, the oldest piece's where no other is free; its slot."""
+    """Keep the refined set of the tableau in the next slot and return the slot; the oldest set gives way where none is
+    free."""
     m, meta = book.x.size, book.meta
     slot, bucket = meta[SLOT], book.heads.size - 1
     meta[SLOT] = (slot + 1) % book.names.size
@@ -190,7 +196,7 @@ def to_wanted(book):
 
 @njit(error_model="numpy", **LEAN)
 def build(book, name):
-    """The piece of the set `wanted`; -1 where the operator is not positive definite on it."""
+    """Work out the set `wanted` and return its slot; -1 where the compliance is not positive definite on it."""
     if not to_wanted(book) or refine(book) > FLAW:
         renew(book)
         if not to_wanted(book) or refine(book) > FLAW:
@@ -200,7 +206,7 @@ def build(book, name):
 
 @njit(error_model="numpy", **LEAN)
 def find(book, name):
-    """Slot of the set `wanted`, -1 where it is not kept."""
+    """Slot of the set `wanted`; -1 where it is not kept."""
     k = book.heads[name & (book.heads.size - 1)]
     while k >= 0:
         if book.names[k] == name:
@@ -217,7 +223,7 @@ def find(book, name):
 
 @njit(error_model="numpy", fastmath=LEAST, **LEAN)
 def holds(book, k, d, t):
-    """(whether no node of piece k fails at (d, t), forces and gaps below which a node fails)."""
+    """Whether no node of set k fails at (d, t), and the force and the gap below which a node counts as failing."""
     r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
     top, pull, deep = 0.0, 0.0, 0.0
     for i in range(on.size):
@@ -233,7 +239,8 @@ def holds(book, k, d, t):
 
 @njit(error_model="numpy", **LEAN)
 def flip(book, k, d, t, force, gap, alone):
-    """Name of the set `wanted`: that of piece k with the nodes that fail flipped, or the first of them `alone`."""
+    """Write set k with its failing nodes exchanged into `wanted` and return its name; `alone`: only the first of them.
+   """
     name, searching = book.names[k], True
     for i in range(book.x.size):
         on = book.on[k, i]
@@ -248,8 +255,10 @@ def flip(book, k, d, t, force, gap, alone):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def locate(book, k, d, t):
-    """Slot of the piece that holds at (d, t), searched from piece k; -1 where none was found. On a known set 0.5 us
-    for 400 nodes, a node more or less 0.3 ms."""
+    """Slot of the contact set at (d, t), searched from set k; -1 where none was found.
+
+    Cost: 0.5 us for 400 nodes on a known set, 0.3 ms for a new one that differs by one node.
+    """
     for count in range(BLOCKS + 10 * book.x.size):
         if within(book, k, d, t):
             return k
@@ -266,15 +275,17 @@ def locate(book, k, d, t):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def begin(book, name):
-    """The piece of the set `wanted`, from the empty set."""
+    """Work out the set `wanted` from the empty set; its slot, -1 as in `build`."""
     renew(book)
     return build(book, name)
 
 
 @njit(error_model="numpy", **LEAN)
 def pull(book, k, h, turn):
-    """(energy, its slope in heave h = -d, in turn): of the preloaded contact of piece k; N = N0 - second, M = M0 -
-    third."""
+    """Energy of the preloaded contact of set k, and its slopes in heave h = -d and in turn.
+
+    N = N0 - slope in heave, M = M0 - slope in turn.
+    """
     q, d = book.energy[k], -h
     by_d, by_t = q[3] * d + q[4] * turn, q[4] * d + q[5] * turn
     return q[0] + d * (q[1] + 0.5 * by_d) + turn * (q[2] + 0.5 * by_t), -(q[1] + by_d), q[2] + by_t
@@ -282,7 +293,7 @@ def pull(book, k, h, turn):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def press_state(book, k, d, t, force):
-    """(N, M, energy) of piece k at (d, t) and its nodal forces (m,), none below zero."""
+    """Load N, moment M and energy of set k at (d, t); writes its nodal forces (m,), none below zero."""
     energy, slope, turn = pull(book, k, -d, t)
     for i in range(force.size):
         y = book.rows[k, 0, i] + book.rows[k, 1, i] * d + book.rows[k, 2, i] * t

@@ -1,4 +1,4 @@
-"""Compiled path mean of the normal contact's forces, from piece to piece along a straight increment."""
+"""Compiled mean of the contact forces along a straight increment of the holder's motion, from set to set."""
 
 import numpy as np
 from numba import njit
@@ -9,7 +9,7 @@ from .press_kernels import LEAST, holds, locate, pull
 
 @njit(error_model="numpy", fastmath=LEAST, **LEAN)
 def reach(book, k, d, t, dd, dt, force, gap):
-    """Share of the increment (dd, dt) from (d, t) at which the first node of piece k falls to its bound."""
+    """Share of the increment (dd, dt) from (d, t) at which the first node of set k falls to its bound."""
     r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
     out = np.inf
     for i in range(on.size):
@@ -22,7 +22,7 @@ def reach(book, k, d, t, dd, dt, force, gap):
 
 @njit(error_model="numpy", **LEAN)
 def across(book, k, side, d, t):
-    """Slot of the piece beyond a side of piece k (-1: of any) that holds at (d, t), -1 where none was found."""
+    """Slot of the contact set beyond a side of set k at (d, t); -1 where none was found. side -1: any side."""
     if side >= 0:
         following = book.beside[k, side]
         name = book.names[k] ^ book.node[book.edge[k, side]]
@@ -37,11 +37,12 @@ def across(book, k, side, d, t):
 
 @njit(error_model="numpy", **LEAN)
 def path_mean(book, k, h, turn, dh, dt, out):
-    """Mean slopes of the energy of the preloaded contact along a straight increment of heave and turn from piece k on,
-    piece by piece. Returns the slot at the end, -1 where none was found.
+    """Mean slopes of the energy of the preloaded contact along a straight increment (dh, dt) of heave and turn from set
+    k on.
 
-    out (9,): mean slopes (2,), energy and slopes (2,) at the end, derivatives of the mean by (dh, dt) (2, 2). The mean
-    times the increment is the difference of the energies, and it is itself the gradient of a convex function.
+    Returns the slot at the end, -1 where none was found. out (9,): mean slopes (2,), energy and slopes (2,) at the end,
+    derivatives of the mean by (dh, dt) (2, 2). The mean times the increment is the difference of the energies (a
+    discrete gradient), and it is itself the gradient of a convex function.
     """
     out[:] = 0.0
     at, small = 0.0, 1e-10

@@ -28,9 +28,12 @@ FLOOR = -300.0  # log pressure below which an approach does not reach the skin
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SkinState:
-    """A solved skin; every array (m,). force [N] >= 0; pressure [Pa]; separation [m] of the mean planes by the law
-    (< 0: crushed); stiffness k_n = -dP/ds [Pa/m]; delta [m] and theta [rad] of the upper holder; load [N] and moment
-    [N m] carried; `residuals` from the independent check, relative."""
+    """A solved skin; arrays (m,).
+
+    force [N], >= 0; pressure [Pa]; separation [m] of the mean planes by the law, below zero where the skin is crushed;
+    stiffness k_n = -dP/ds [Pa/m]; delta [m] and theta [rad] of the upper holder; load [N] and moment [N m] carried;
+    residuals: relative, from the independent check.
+    """
 
     force: np.ndarray
     pressure: np.ndarray
@@ -46,8 +49,11 @@ class SkinState:
 
 
 class Control(NamedTuple):
-    """What is prescribed: R^T f + H q = target of the free rigid motions R (m, r) with coordinates q (r,), all of the
-    size 1 at the ends; hold H (r, r): the holder's spring; q = scale * (delta, -theta)."""
+    """The balances that are prescribed: R^T f + H q = target.
+
+    rigid: the free rigid motions R (m, r), of size 1 at the ends, with coordinates q (r,); target: (r,) [N]; hold: H
+    (r, r), the spring of the holder; scale: q = scale * (delta, -theta).
+    """
 
     rigid: np.ndarray
     target: np.ndarray
@@ -55,7 +61,7 @@ class Control(NamedTuple):
     scale: np.ndarray
 
     def lack(self, force, q) -> np.ndarray:
-        """What is missing in each balance (r,) [N]."""
+        """Load that is missing in each balance (r,) [N]."""
         return self.target - self.rigid.T @ force - self.hold @ q
 
 
@@ -67,13 +73,16 @@ def _control(x, target, spring: float) -> Control:
 
 
 def _live(force: np.ndarray) -> np.ndarray:
-    """Indices of the nodes whose forces take part in a Newton step; the others follow the geometry."""
+    """Indices of the nodes whose forces take part in a Newton step; the others carry next to nothing and follow the
+    geometry."""
     return np.flatnonzero(force > 1e-18 * force.max())
 
 
 def _step(c, control, lack, slope, missing) -> tuple:
-    """Newton step (df, dq, ds) of f = A P(s), s = missing + s + C f - R q, R^T f + H q = target; slope D = -A P'
-    (m,), lack (r,) of the balances."""
+    """Newton step (df, dq, ds) of f = A P(s), s = missing + s + C f - R q, R^T f + H q = target.
+
+    slope: D = -A P' (m,); lack: (r,) of the balances; missing: (m,) [m] of the separations.
+    """
     live = _live(slope)
     root = np.sqrt(slope[live])
     system = root[:, None] * c[np.ix_(live, live)] * root
@@ -116,7 +125,7 @@ def _newton(skin, c, weight, gap, control, s, q, limit: int) -> tuple | None:
 
 
 def _start(skin, c, x, weight, gap, target, spring) -> tuple:
-    """Separations and motions of the law's tangent at the mean pressure, taken as a linear skin."""
+    """First separations and motions: the law's tangent at the mean pressure, solved as a linear skin."""
     mean = target[0] / weight.sum()
     rest = skin.separation(np.array([mean]))
     fall = skin.log_pressure(rest)[1]
@@ -133,7 +142,8 @@ def _start(skin, c, x, weight, gap, target, spring) -> tuple:
 
 
 def _softening(skin, c, x, weight, gap, target, limit: int, spring: float = 0.0) -> tuple | None:
-    """The answer reached through softened laws: from one as long as the whole gap back to the law itself."""
+    """The answer by way of softer laws: from a law as long as the whole gap back to the law itself; None where one
+    fails."""
     control = _control(x, target, spring)
     mean = target[0] / weight.sum()
     fall = skin.log_pressure(skin.separation(np.array([mean])))[1][0]
@@ -153,7 +163,10 @@ def _softening(skin, c, x, weight, gap, target, limit: int, spring: float = 0.0)
 
 
 def _reach(skin, c, weight, overlap) -> np.ndarray | None:
-    """First separations under an approach: no node can carry more than flattens its overlap (m,); None: no contact."""
+    """First separations (m,) under an approach; None where the skin is not reached.
+
+    No node can carry more than what flattens its overlap (m,) [m].
+    """
     s, diagonal = -overlap, np.diag(c)
     if skin.log_pressure(s)[0].max() <= FLOOR:
         return None
@@ -166,7 +179,7 @@ def _reach(skin, c, weight, overlap) -> np.ndarray | None:
 
 
 def _smooth(skin, c, x, weight, gap, target, delta, start, limit, spring=0.0) -> tuple:
-    """Forces, separations, motions (delta or delta, -theta) and steps of a smooth law."""
+    """Forces, separations, motions (delta or delta, -theta) and Newton steps of a smooth law."""
     control = _control(x, target, spring)
     scale = control.scale
     if not target.size:
@@ -189,7 +202,10 @@ def _smooth(skin, c, x, weight, gap, target, delta, start, limit, spring=0.0) ->
 
 
 def _crush(skin, c, weight, gap, control, s, q) -> tuple:
-    """Semismooth Newton on the crush: forces, separations, motions and steps (60 of them: not settled)."""
+    """Semismooth Newton's method on the crush of a linear skin: forces, separations, motions and steps.
+
+    60 steps mean that it did not settle.
+    """
     for count in range(1, 61):
         held = np.where(s < 0, skin.k * weight, 0.0)
         force = -held * s
@@ -203,8 +219,11 @@ def _crush(skin, c, weight, gap, control, s, q) -> tuple:
 
 
 def _linear(skin, c, x, weight, gap, target, delta, start, spring) -> tuple:
-    """Forces, separations, motions (delta or delta, -theta) and steps of the linear skin: the active set of
-    `unilateral`, then steps on the crush that take out the round-off of gaps far larger than the crush."""
+    """Forces, separations, motions (delta or delta, -theta) and steps of the linear skin.
+
+    The active set of `unilateral` finds the nodes that carry. Steps on the crush then take out the round-off of gaps
+    that are far larger than the crush.
+    """
     control = _control(x, target, spring)
     scale = control.scale
     gap = gap if target.size else gap - delta
@@ -247,14 +266,16 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
 def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarray, load: float | None = None,
           moment: float | None = None, approach: float | None = None, rotation: float = 0.0,
           start: SkinState | None = None, limit: int = 60, spring: float = 0.0) -> SkinState:
-    """Skin between bodies of the closing compliance c (m, m) [m/N], symmetric, positive semidefinite (0: rigid bodies).
+    """Press two bodies through a rough skin.
 
-    x (m,) [m], nodal areas weight (m,) [m2], gap (m,) [m]. Controls: `load` [N] with `rotation` [rad] held (already in
-    the gap, so only reported); `load` and `moment` [N m] with the rotation free, or against the `spring` [N m/rad] of
-    the holder from `rotation` on; `approach` [m] with the rotation held. `start`: a neighbouring answer under the same
-    control. Zero load, or an approach that leaves the skin open: outcome no_contact. PatchfemError for other
-    controls, a load below zero, a moment that no pressure can carry, a gap that is not finite or an exponential law
-    without `reference` under an approach; NotConverged above a residual of 1e-9.
+    c: closing compliance of the bodies (m, m) [m/N], symmetric, positive semidefinite, 0 for rigid bodies; x: (m,) [m];
+    weight: nodal areas (m,) [m2]; gap: (m,) [m]. Controls: `load` [N] with `rotation` [rad] held (already in the gap,
+    so only reported); `load` and `moment` [N m] with the rotation free, or against the `spring` [N m/rad] of the holder
+    from `rotation` on; `approach` [m] with the rotation held. start: a neighbouring answer under the same control. Zero
+    load, or an approach that leaves the skin open, gives the outcome no_contact.
+
+    PatchfemError for other controls, a load below zero, a moment that no pressure can carry, a gap that is not finite
+    or an exponential law without `reference` under an approach; NotConverged above a residual of 1e-9.
     """
     _refuse(skin, x, gap, load, moment, approach, spring)
     target = np.array([value for value in (load, moment) if value is not None])
@@ -281,7 +302,7 @@ def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarra
 
 
 def _refuse(skin, x, gap, load, moment, approach, spring: float = 0.0) -> None:
-    """PatchfemError for controls without an answer."""
+    """Raise PatchfemError for controls without an answer."""
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
     if not (np.isfinite(gap).all() and np.isfinite(load if approach is None else approach) and (load or 0.0) >= 0):

@@ -1,6 +1,6 @@
-"""Local laws of a rough skin: pressure P over the separation s of the mean planes, and its fall.
+"""Local laws of a rough skin: pressure P as a function of the separation s of the mean planes, and its slope.
 
-P >= 0 falls with s. The linear skin carries nothing beyond s = 0; the smooth laws reach everywhere and are handled by
+P >= 0 falls with s. The linear skin carries nothing beyond s = 0. The smooth laws reach everywhere; they are handled by
 the logarithm of P, which neither overflows nor vanishes.
 """
 
@@ -13,39 +13,42 @@ _V = 0.1 * np.arange(1, 70)  # trapezoidal rule on an even analytic integrand: e
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearSkin:
-    """P = k max(0, -s); k [Pa/m] > 0. s < 0 is the crush of the skin, s >= 0 carries nothing."""
+    """A linear skin: P = k max(0, -s), k [Pa/m] > 0.
+
+    s < 0 is the crush of the skin; at s >= 0 it carries nothing.
+    """
 
     k: float
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
-        """P (m,) [Pa] at the separations s (m,) [m]."""
+        """Pressure P (m,) [Pa] at the separations s (m,) [m]."""
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """-dP/ds (m,) [Pa/m]; 0 where the skin is not crushed."""
+        """Stiffness -dP/ds (m,) [Pa/m]; 0 where the skin is not crushed."""
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
 class Smooth:
-    """What the laws with P > 0 everywhere share; they give `log_pressure`, `separation`, `softened`."""
+    """Shared by the laws with P > 0 everywhere, each of which has `log_pressure`, `separation` and `softened`."""
 
     __slots__ = ()
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
-        """P (m,) [Pa] at the separations s (m,) [m]."""
+        """Pressure P (m,) [Pa] at the separations s (m,) [m]."""
         return np.exp(np.minimum(self.log_pressure(np.asarray(s, float))[0], 700.0))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """-dP/ds (m,) [Pa/m]."""
+        """Stiffness -dP/ds (m,) [Pa/m]."""
         return self.pressure(s) * self.log_pressure(np.asarray(s, float))[1]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ExponentialSkin(Smooth):
-    """P = reference exp(-s/u0); u0 [m] > 0, reference [Pa] the pressure at s = 0.
+    """An exponential skin: P = reference exp(-s/u0), u0 [m] > 0, reference [Pa] the pressure at s = 0.
 
     Without a reference `solve` takes the mean pressure of the given load, so that flat aligned pieces have s = 0 and
-    the approach is the closing of the bodies alone; the choice shifts the approach and nothing else.
+    the approach is the closing of the bodies alone. The choice shifts the approach and nothing else.
     """
 
     u0: float
@@ -56,7 +59,7 @@ class ExponentialSkin(Smooth):
         return np.log(self.reference) - s / self.u0, np.full(np.shape(s), 1 / self.u0)
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
-        """s [m] that carries `pressure` [Pa] > 0."""
+        """Separation s [m] that carries `pressure` [Pa] > 0."""
         return -self.u0 * np.log(pressure / self.reference)
 
     def softened(self, factor: float) -> "ExponentialSkin":
@@ -66,10 +69,11 @@ class ExponentialSkin(Smooth):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HertzSkin(Smooth):
-    """Greenwood-Williamson: P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, Gaussian peaks of mean height 0.
+    """A skin of Hertzian peaks of Gaussian heights (Greenwood, Williamson 1966).
 
-    radius R [m] of a peak, density eta [1/m2], deviation [m] of the peak heights, modulus E* [Pa] of the pair:
-    1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2. All > 0. Relative error of P below 1e-13 at any s.
+    P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, mean height 0. radius: R [m] of a peak; density: eta [1/m2];
+    deviation [m] of the peak heights; modulus: E* [Pa] of the pair, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2. All >
+    0. The relative error of P is below 1e-13 at any s.
     """
 
     radius: float
@@ -87,7 +91,10 @@ class HertzSkin(Smooth):
         return self._level + log, fall / self.deviation
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
-        """s [m] that carries `pressure` [Pa] > 0, by Newton on the concave log P (from the steep side: monotone)."""
+        """Separation s [m] that carries `pressure` [Pa] > 0.
+
+        Newton's method on the concave log P; it starts from the steep side, so it is monotone.
+        """
         wanted = np.log(np.asarray(pressure, float)) - self._level
         h = np.where(wanted < 0, np.sqrt(np.maximum(0.0, -2 * wanted)), -np.exp(np.clip(wanted, 0, 400) / 1.5))
         for _ in range(80):
@@ -103,10 +110,12 @@ class HertzSkin(Smooth):
 
 
 def peak_integral(h: np.ndarray) -> tuple:
-    """log F and -d(log F)/dh of F(h) = int_h^inf (z - h)^3/2 phi(z) dz, phi the unit normal density; h any shape.
+    """Logarithm and its fall -d(log F)/dh of F(h) = int_h^inf (z - h)^3/2 phi(z) dz, phi the unit normal density; h any
+    shape.
 
-    F = phi(h) 2 int_0^inf v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of
-    (z - h)^3/2 below h = -8, short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of its fall 3e-13."""
+    F = phi(h) 2 int_0^inf v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of (z - h)^3/2
+    below h = -8, which is short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of its fall 3e-13.
+    """
     h = np.asarray(h, float)
     flat = np.maximum(h, -8.0).reshape(-1, 1)
     scale = 1 + np.maximum(flat, 0.0)
@@ -121,7 +130,7 @@ def peak_integral(h: np.ndarray) -> tuple:
 
 
 def _moment(n: float, a: np.ndarray) -> np.ndarray:
-    """E (1 + z/a)^n for a unit normal z and large a: sum binom(n, 2k) (2k - 1)!! a^-2k."""
+    """Expectation of (1 + z/a)^n for a unit normal z and large a: sum binom(n, 2k) (2k - 1)!! a^-2k."""
     out, term = np.zeros_like(a), np.ones_like(a)
     for k in range(0, 24, 2):
         out += term

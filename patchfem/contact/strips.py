@@ -1,9 +1,11 @@
-"""Strips side by side over the width: the condensed operator of a slice, repeated under one rigid holder that may roll.
+"""Strips side by side over the width: one condensed slice, repeated under one rigid holder that may roll.
 
-Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own) and the compliance C; strips do not
-feel each other: the shear between them is neglected. The holder's motion q = (delta, -theta) is common, so the answer
-minimises the convex dual sum_j Phi_j(R q - g_j) + q.S q/2 - q.target, R = (1, x), S the spring of the rotation. Every
-answer of `strips_solve` is checked again by `residuals` from the definitions alone.
+Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own) and the compliance C. Strips do not
+feel each other: the shear between them is neglected. The motion q = (delta, -theta) of the holder is common, so the
+answer minimises the convex dual sum_j Phi_j(R q - g_j) + q.S q/2 - q.target, with R = (1, x) and S the spring of the
+rotation.
+
+Every answer of `strips_solve` is checked again by `residuals` from the definitions alone.
 """
 
 from dataclasses import dataclass, replace
@@ -26,10 +28,10 @@ NEGLECTED = ("the strips over the width do not feel each other: the shear betwee
 class StripsState:
     """Strips pressed by one holder; s strips of m nodes, forces of all pairs together.
 
-    force (s, m) [N] >= 0; pressure (s, m) [Pa]; gap (s, m) [m] left open, with a skin the separation of its mean planes
-    (< 0: crushed); stiffness (s, m) [Pa/m] of the skin, None without one; offsets y (s,) [m]. delta [m] and theta [rad]
-    of the holder; load [N], moment sum f x and roll_moment sum f y [N m]; centre_x, centre_y [m] of the pressure;
-    fraction: share of the area that carries. `residuals` from the independent check, relative.
+    force: (s, m) [N], >= 0; pressure: (s, m) [Pa]; gap: (s, m) [m] left open, with a skin the separation of its mean
+    planes (below zero: crushed); stiffness: (s, m) [Pa/m] of the skin, None without one; offsets: y (s,) [m]; delta [m]
+    and theta [rad] of the holder; load [N]; moment sum f x and roll_moment sum f y [N m]; centre_x, centre_y [m] of the
+    pressure; fraction: share of the area that carries; residuals: relative, from the independent check.
     """
 
     force: np.ndarray
@@ -51,11 +53,11 @@ class StripsState:
 
     @property
     def note(self) -> str:
-        """What the answer leaves out, in words."""
+        """A sentence on what the answer leaves out."""
         return NEGLECTED
 
     def yaw_moment(self, friction: float) -> float:
-        """Moment mu sum f y [N m] about +z of friction on the upper piece while all of it slides towards +x."""
+        """Yaw moment mu sum f y [N m] about +z of friction on the upper piece while all of it slides towards +x."""
         return friction * self.roll_moment
 
 
@@ -67,16 +69,16 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
 
 
 def one_strip(pieces: Compliance, count: int) -> tuple:
-    """(normal, tangential, weight) of one of `count` equal strips: compliances (m, m) [m/N], nodal areas (m,) [m2]."""
+    """One of `count` equal strips: normal and tangential compliance (m, m) [m/N] and nodal areas (m,) [m2]."""
     return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
 
 
 def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=None, moment=None,
               spring: float = 0.0) -> MappingProxyType:
-    """Relative residuals of pressed strips, recomputed from the definitions alone; `free` rotation beyond the gap's.
+    """Relative residuals of pressed strips, recomputed from the definitions alone.
 
-    The worst strip's penetration, tension and complementarity (bare) or law and tension (skin); force_balance and
-    moment_balance of them all, where prescribed.
+    Keys: the worst strip's penetration, tension and complementarity (bare) or law and tension (skin); force_balance and
+    moment_balance of all strips, where prescribed. free: rotation [rad] beyond that in the gap.
     """
     bent = force @ c
     opening = gap + free * x - delta + bent
@@ -102,13 +104,15 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
                  start: StripsState | None = None) -> StripsState:
-    """Strips of closing compliance c (m, m) [m/N] each (`one_strip`), pressed by one holder with a prescribed roll.
+    """Press strips by one holder with a prescribed roll.
 
-    x (m,) [m], nodal areas of one strip weight (m,) [m2], offsets y (s,) [m] (`strip_offsets`), gap (m,) or (s, m) [m],
-    roll [rad] > 0 opens the gap at +y. Controls: `load` [N] of all strips with `rotation` [rad] held (already in the
-    gap, only reported); `load` and `moment` sum f x [N m] with the rotation free, or held by the holder's `spring`
-    [N m/rad] from `rotation` on; `approach` [m] with the rotation held. skin: None (bare), or a law of `skin`; with
-    rigid bodies (c = 0) only a skin. start: a neighbouring answer. Nothing touching: outcome no_contact.
+    c: closing compliance (m, m) [m/N] of each strip (`one_strip`); x: (m,) [m]; weight: nodal areas (m,) [m2] of one
+    strip; offsets: y (s,) [m] (`strip_offsets`); gap: (m,) or (s, m) [m]; roll [rad] > 0 opens the gap at +y. Controls:
+    `load` [N] of all strips with `rotation` [rad] held (already in the gap, only reported); `load` and `moment` sum f x
+    [N m] with the rotation free, or held by the holder's `spring` [N m/rad] from `rotation` on; `approach` [m] with the
+    rotation held. skin: None (bare), or a law of `skin_laws`; rigid bodies (c = 0) need a skin. start: a neighbouring
+    answer. Where nothing touches the outcome is no_contact.
+
     PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
     approach; NotConverged above a residual of 1e-9.
     """
@@ -158,8 +162,9 @@ def _state(skin, weight, x, offsets, force, opening, delta, theta, count, checks
 def strips_tangent(c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0) -> float:
     """Stiffness [N/m] of all strips for one common rigid motion, skin and pieces in series.
 
-    c (m, m) [m/N] and weight (m,) [m2] of one strip. With the normal compliance dN/d(approach) at fixed rotation and
-    roll; with the tangential one dT/d(slide) in stick without yaw, `ratio` = k_t/k_n of the skin, inf: rigid in shear.
+    c: (m, m) [m/N] and weight: (m,) [m2] of one strip. With the normal compliance it is dN/d(approach) at fixed
+    rotation and roll; with the tangential one dT/d(slide) in stick without yaw. ratio: k_t/k_n of the skin, inf where
+    it is rigid in shear.
     """
     if not state.load:
         return 0.0

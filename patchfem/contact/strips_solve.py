@@ -1,8 +1,8 @@
-"""Solvers of strips under one holder: all of them and the holder at once, or the holder alone down its dual.
+"""Solvers of strips under one holder: strips and holder together by Newton, or the holder alone along its dual.
 
-Newton takes a step of all strips and of the holder's motion q together: an active set for bare strips and the linear
-skin, the law's tangent for the smooth skins, strips eliminated one by one. Where that repeats itself or wanders, q is
-led down the dual alone, its slope bracketed along each direction, with every strip solved under its own approach.
+Newton's method takes a step of all strips and of the holder's motion q together: an active set for bare strips and the
+linear skin, the law's tangent for the smooth skins, strips eliminated one by one. Where that repeats itself or wanders,
+q alone is led down the dual, its slope bracketed along each direction, with every strip solved under its own approach.
 """
 
 import numpy as np
@@ -15,24 +15,29 @@ from .unilateral import solve_forces
 
 
 def smooth(skin) -> bool:
-    """Whether a law carries something at every separation; False for None and the linear skin."""
+    """Whether a law of the skin carries something at every separation; False for None and the linear skin."""
     return skin is not None and not isinstance(skin, LinearSkin)
 
 
 def softer(skin, c, weight) -> np.ndarray:
-    """C with the linear skin in series: bare contact of these is contact through the skin."""
+    """Compliance (m, m) with the linear skin in series, so that bare contact of it is contact through the skin."""
     return c + np.diag(1 / (skin.k * weight)) if isinstance(skin, LinearSkin) else c
 
 
 def holder_motions(x, size: int, spring: float) -> tuple:
-    """Rigid motions (m, r) of size 1 at the ends, their spring (r, r), and what turns q into (delta, -theta)."""
+    """Rigid motions (m, r) of size 1 at the ends, their spring (r, r), and the factors that turn q into (delta,
+    -theta)."""
     half = np.abs(x).max() or 1.0
     rigid = np.column_stack([np.ones(x.size), x / half])[:, :size]
     return rigid, np.diag([0.0, spring / half**2])[:size, :size], np.array([1.0, half])[:size]
 
 
 def bare_parts(c, rigid, active, gap=None) -> tuple:
-    """Per group of strips with one active set (strips, nodes, C^-1 R, C^-1 g), and the tangent (r, r) of sum R^T f."""
+    """Answers of bare strips to rigid motions, one entry per group of strips with the same active set, and their
+    tangent.
+
+    Entries: (strips, nodes, C^-1 R, C^-1 g); tangent (r, r) of sum R^T f.
+    """
     groups, parts, system = {}, [], np.zeros((rigid.shape[1], rigid.shape[1]))
     for strip, row in enumerate(active):
         if row.any():
@@ -47,8 +52,11 @@ def bare_parts(c, rigid, active, gap=None) -> tuple:
 
 
 def skin_parts(c, rigid, slope, missing) -> tuple:
-    """Per strip (strip, nodes, root D, (I + root D C root D)^-1 root D (R, missing)), D = slope, and the tangent (r, r)
-    of sum R^T f; nodes of next to no slope follow the geometry."""
+    """Answers of strips with a skin to rigid motions, one entry per strip, and their tangent (r, r) of sum R^T f.
+
+    Entries: (strip, nodes, root D, (I + root D C root D)^-1 root D (R, missing)) with D = slope. Nodes of next to no
+    slope follow the geometry.
+    """
     least, size = 1e-18 * slope.max(), rigid.shape[1]
     parts, system = [], np.zeros((size, size))
     for strip, row in enumerate(slope):
@@ -79,7 +87,7 @@ def _bordered(c, gap, rigid, target, spring, active) -> tuple:
 
 
 def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple | None:
-    """Forces, motion, steps of bare strips by the primal-dual active set; None where it does not settle."""
+    """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
     seen, bend, least = set(), np.abs(c).max(), 1 if spring.any() else target.size
     span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)
     for count in range(1, limit + 1):
@@ -153,12 +161,8 @@ def by_strip(skin, c, x, weight, gap) -> tuple:
 
 
 def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span: float) -> tuple:
-    """Forces (s, m), motion q at the bottom of the dual, and steps, from `sink` [m] beyond the nearest node.
-
-    Newton directions, stiffened by 1e-9 of the load over `span` [m]. Along each the slope of the dual rises, so the
-    step is bracketed and taken where the slope is halved at least and not yet > 0: the dual falls each time; or at once
-    where what is lacking halves its record.
-    """
+    """Descent of the dual: forces (s, m), motion q at its bottom, and steps, from `sink` [m] beyond the nearest node.
+   """
     q, soft = np.zeros(target.size), 1e-9 * target[0] / span * np.eye(target.size)
     q[0] = gap.min() + sink
 
@@ -220,7 +224,7 @@ def _bare_loaded(c, x, gap, rigid, target, spring, active=None) -> tuple:
 
 
 def _linearised(skin, c, x, weight, gap, rigid, target, spring) -> tuple:
-    """Separations and motion of the law's tangent at the mean pressure, taken as a linear skin."""
+    """First separations and motion: the law's tangent at the mean pressure, solved as a linear skin."""
     mean = target[0] / (weight.sum() * len(gap))
     rest = skin.separation(np.array([mean]))
     k = mean * skin.log_pressure(rest)[1][0]
@@ -244,7 +248,11 @@ def _smooth_loaded(skin, c, x, weight, gap, rigid, target, spring, first) -> tup
 
 
 def loaded(skin, c, x, weight, gap, target, spring, start, rotation) -> tuple:
-    """Forces, separations (None but for a smooth skin), motion (delta or delta, -theta), steps."""
+    """Forces, separations, motion (delta or delta, -theta) and steps of strips under a load, and a moment where one is
+    given.
+
+    Separations are None but for a smooth skin.
+    """
     rigid, spring, scale = holder_motions(x, target.size, spring)
     target = target / scale
     if not smooth(skin):

@@ -24,8 +24,12 @@ LEAST = 1e-200  # N or m; below it the products of the check lose their digits
 
 
 class Solved(NamedTuple):
-    """Forces (m,), closing beyond the first touch of the gap as given [m], theta [rad], dN/d(delta) at held rotation
-    [N/m] (0 under an approach), active set (m,) and iterations."""
+    """Answer of a contact problem.
+
+    force: (m,) [N]; closing [m] beyond the first touch of the gap as given; theta: rotation [rad]; stiffness:
+    dN/d(delta) at held rotation [N/m], 0 under an approach; active: (m,) nodes that touch; iterations: contact sets
+    tried.
+    """
 
     force: np.ndarray
     closing: float
@@ -36,7 +40,10 @@ class Solved(NamedTuple):
 
 
 def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
-    """(Found, iterations) where sets came back: from all nodes, from conjugate gradients, by descent."""
+    """(Found, iterations) by slower methods, for problems whose contact sets came back.
+
+    In turn: the active set from all nodes, the active set from where conjugate gradients end, a finite descent.
+    """
     found, _, first = settle(operator, ask, np.ones(ask.x.size, bool), limit)
     if found is not None and flaw(found) <= SOLVED:
         return found, first
@@ -49,8 +56,11 @@ def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
 
 
 def _balanced_on_one(operator: Operator, ask: Ask, lean: float) -> Found | None:
-    """One node below the load line that carries all of it while no other touches; of the rotations that leave them
-    open the middle one, or none (`lean` is already in the gap) where that is among them."""
+    """The answer where one node under the load line carries the whole load and no other touches; None where none does.
+
+    Of the rotations that leave the other nodes open the middle one is taken, or none where that is among them. lean
+    [rad]: rotation that is already in the gap.
+    """
     line = ask.moment / ask.load
     k = int(np.argmin(np.abs(ask.x - line)))
     if abs(ask.x[k] - line) > 1e-15 * np.ptp(ask.x):
@@ -71,9 +81,10 @@ def _balanced_on_one(operator: Operator, ask: Ask, lean: float) -> Found | None:
 
 
 def solve(operator: Operator, ask: Ask, start: np.ndarray | None = None, limit: int = 100) -> Solved:
-    """Forces and rigid motion of a question with any gap; `start` (m,): contact set of a neighbouring solve.
+    """Forces and rigid motion of a contact problem.
 
-    NotConverged when active set, gradients and descent all miss; LinAlgError for an operator that is not definite.
+    start: (m,) contact set of a neighbouring problem. limit: iterations of one active set. NotConverged when active
+    set, conjugate gradients and descent all miss; LinAlgError for a compliance that is not positive definite.
     """
     lean, low = 0.0, None
     if ask.load is not None:
@@ -98,11 +109,11 @@ def solve(operator: Operator, ask: Ask, start: np.ndarray | None = None, limit: 
 
 
 def solve_forces(c, x, gap, target, start=None, limit: int = 100, spring: float = 0.0) -> tuple:
-    """Nodal forces, rigid motions (none, delta or delta, -theta) and iterations.
+    """Nodal forces (m,) [N], rigid motions and iterations of a contact problem given as plain arrays.
 
-    c (m, m) [m/N], x (m,), gap (m,) [m], target () with the approach inside the gap, (N,) or (N, M); spring [N m/rad]
-    of the rotation. `start`: active set of a neighbouring solve.
-    NotConverged when both the active set and its fallbacks miss the complementarity.
+    c: (m, m) [m/N]; x: (m,), gap: (m,) [m]; target: () with the approach inside the gap, (N,) or (N, M); spring: [N
+    m/rad] of the holder; start: (m,) contact set of a neighbouring problem. The rigid motions are (), (delta,) or
+    (delta, -theta). NotConverged when both the active set and its fallbacks miss the complementarity.
     """
     load, moment = (*map(float, target), None, None)[:2]
     out = solve(Operator(c), Ask(x, gap, load, moment, spring), start, limit)
@@ -131,7 +142,7 @@ def residuals(c, x, gap, force, delta: float, theta: float, load: float, moment:
 
 
 def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
-    """PatchfemError for a question without an answer."""
+    """Raise PatchfemError, with the key of the scene, for a contact problem that has no answer."""
     if not (0 <= load <= 1 / LEAST and np.isfinite(gap).all()):
         raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
     if 0 < load < LEAST:
@@ -148,13 +159,14 @@ def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
 
 def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None = None, rotation: float = 0.0,
           start: np.ndarray | None = None, spring: float = 0.0) -> Pressure:
-    """Static pressure under `load` [N] (all pairs) on the gap (m,) [m].
+    """Static pressure on the gap (m,) [m] under `load` [N] of all pairs.
 
-    With `moment` [N m] of the load about the middle the upper piece is free to rotate, or held by the `spring`
-    [N m/rad] of its holder from `rotation` [rad] on; without it `rotation` is held (and already in `gap`, so it is only
-    reported). `start` (m,): contact set of a neighbouring solve. Zero load gives the outcome no_contact. PatchfemError
-    for a moment that no pressure can carry, a load that is negative or below 1e-200 N, or a gap that is not finite;
-    NotConverged when a residual exceeds 1e-12.
+    With `moment` [N m] of the load about the middle the upper piece is free to rotate, or held by the `spring` [N
+    m/rad] of its holder from `rotation` [rad] on. Without it `rotation` is held; it is already in `gap`, so it is only
+    reported. start: (m,) contact set of a neighbouring solve. Zero load gives the outcome no_contact.
+
+    PatchfemError for a moment that no pressure can carry, a load that is negative or below 1e-200 N, or a gap that is
+    not finite; NotConverged when a residual exceeds 1e-12.
     """
     refuse(pieces.interface.x, gap, load, moment, spring)
     if load == 0:
@@ -165,7 +177,11 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
 
 def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: float = 0.0,
              start: np.ndarray | None = None) -> Pressure:
-    """Static pressure at a given `approach` [m] of the holders, the rotation held; no_contact where nothing touches."""
+    """Static pressure on the gap (m,) [m] at a given `approach` [m] of the holders, the rotation held.
+
+    Outcome no_contact where nothing touches. `rotation` [rad] is already in the gap; start as in `press`. PatchfemError
+    for values that are not finite, or an overlap too small to compute with.
+    """
     if not (np.isfinite(approach) and np.isfinite(gap).all()):
         raise PatchfemError("contact.approach: the distance and the gap must be finite")
     if approach <= gap.min():
@@ -182,7 +198,7 @@ def _apart(gap, approach: float, rotation: float) -> Pressure:
 
 
 def _pressed(pieces: Compliance, ask: Ask, start, touch: float, rotation: float) -> Pressure:
-    """The solved and checked state; gaps are measured from `touch` [m], so that a far offset costs no digits."""
+    """Solve and check a problem; gaps are counted from `touch` [m], so that a far offset costs no digits."""
     x, c, weight = pieces.interface.x, pieces.normal, pieces.interface.weight
     with one_thread():
         try:
@@ -197,7 +213,7 @@ def _pressed(pieces: Compliance, ask: Ask, start, touch: float, rotation: float)
 
 
 def checked(c, ask: Ask, out: Solved) -> tuple:
-    """(opening (m,) [m], residuals) of an answer; NotConverged where a residual exceeds 1e-12."""
+    """Openings (m,) [m] and residuals of an answer; NotConverged where a residual exceeds 1e-12."""
     gap = ask.gap if ask.load is None else ask.gap - ask.gap.min()
     load = float(out.force.sum()) if ask.load is None else ask.load
     checks = residuals(c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring)

@@ -1,7 +1,7 @@
-"""Condensed interface operators kept on disk, found again by the content that made them.
+"""Condensed compliances of pieces kept on disk, found again by the content that made them.
 
-The key is a hash of the mesh, the layers and the source text that assembles and condenses, so neither a changed piece
-nor a changed program ever meets an old operator. Files are written whole and renamed; the folder is kept below a
+The key is a hash of the mesh, the layers and the source text that assembles and condenses. So neither a changed piece
+nor a changed program ever meets an old compliance. Files are written whole and renamed; the folder is kept below a
 size; a file that cannot be read is made again.
 """
 
@@ -20,7 +20,7 @@ PARTS = ("nn", "tt", "nt")
 
 
 def folder() -> Path:
-    """Where operators are kept: below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
+    """Folder of the kept compliances: below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(base) / "patchfem" / "operators"
 
@@ -35,8 +35,11 @@ def key_of(x, depth, coating_rows: int, layers) -> str:
 
 
 def key_of_mesh(mesh, layers) -> str:
-    """Content hash of one piece of any mesh (mesh.anymesh.PieceMesh): points, cells, tags, its Layers, and the factors
-    named for this run. Renumbered nodes make another key."""
+    """Content hash of one piece of any mesh.
+
+    mesh: mesh.anymesh.PieceMesh with points, cells and tags; layers: its Layers. The factors named for this run take
+    part. Renumbered nodes make another key.
+    """
     arrays = (np.asarray(mesh.points, np.float64), *(np.asarray(part, np.int64) for part in (
         mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)))
     return _hash(arrays, ("mesh", os.environ.get("PATCHFEM_FACTOR", "")), layers, MESH_SOURCE)
@@ -55,7 +58,10 @@ def _hash(arrays, words: tuple, layers, source: tuple) -> str:
 
 
 def fetch(key: str, columns: int) -> tuple | None:
-    """(nn, tt, nt), each (columns, columns) read-only [m2/N], or None where nothing usable is kept."""
+    """The compliances (nn, tt, nt) kept under `key`, or None where nothing usable is kept.
+
+    Each is (columns, columns), read-only [m2/N].
+    """
     path = folder() / f"{key}.npz"
     try:
         with np.load(path, allow_pickle=False) as kept:
@@ -82,7 +88,7 @@ def keep(key: str, parts: tuple) -> None:
 
 
 def _trim(place: Path) -> None:
-    """Delete what was used longest ago until the folder is below its size, and leftovers of killed writers."""
+    """Delete the files unused for longest until the folder is below its size, and what killed writers left behind."""
     kept = sorted((path for path in place.iterdir() if path.is_file()), key=lambda path: path.stat().st_mtime)
     total = sum(path.stat().st_size for path in kept)
     for path in kept[:-1]:

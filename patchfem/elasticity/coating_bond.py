@@ -1,4 +1,5 @@
-"""What a coating hands to its substrate: nodal forces along the coating's lower boundary, so they balance exactly."""
+"""Traction between a coating and its substrate, as nodal forces along their common line, so that they balance
+exactly."""
 
 from dataclasses import dataclass
 
@@ -9,9 +10,12 @@ from .recovery import Cells, quadratures, stresses
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Bond:
-    """The lower boundary of the coating. node: (b,) by rising x; length: (b,) of the line that belongs to each node
-    [m]; force: (frames, b, 2) of the coating on its substrate along x and inward, per unit width [N/m]; shear, normal:
-    (frames, b) force along the line and across it, compression > 0, per length [Pa]."""
+    """Forces along the lower boundary of a coating.
+
+    node: (b,) by rising x; length: (b,) of the line that belongs to each node [m]; force: (frames, b, 2) of the coating
+    on its substrate along x and inward, per unit width [N/m]; shear, normal: (frames, b) force along the line and
+    across it, compression > 0, per length [Pa].
+    """
 
     node: np.ndarray
     length: np.ndarray
@@ -21,9 +25,9 @@ class Bond:
 
 
 def bond_line(cells: Cells, u) -> Bond | None:
-    """What the coating hands to its substrate, u (frames, N, 2) [m]; None without a coating.
+    """Forces of the coating on its substrate under the displacements u (frames, N, 2) [m]; None without a coating.
 
-    Nodal forces of the coating's own stress, so they carry exactly the load on the coating's face.
+    They are the nodal forces of the coating's own stress, so they carry exactly the load on the coating's face.
     """
     edge, aside = _bond_edges(cells)
     if not len(edge):
@@ -44,7 +48,8 @@ def bond_line(cells: Cells, u) -> Bond | None:
 
 
 def _bond_edges(cells: Cells) -> tuple:
-    """(e, 2) edges of coating cells that a substrate cell shares, (e, 2) their normals into the substrate, as long."""
+    """Edges (e, 2) of coating cells that a substrate cell shares, and their normals (e, 2) into the substrate, as
+    long."""
     ends = np.concatenate([np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
                            for block in cells.blocks])
     coat = cells.is_coating[cells.owner()]
@@ -55,7 +60,7 @@ def _bond_edges(cells: Cells) -> tuple:
 
 
 def _coating_forces(cells: Cells, rules: list, u) -> np.ndarray:
-    """(N, 2) nodal forces that the stress of the coating balances [N/m]."""
+    """Nodal forces (N, 2) [N/m] that the stress of the coating balances."""
     out, first = np.zeros((len(cells.points), 2)), 0
     for rule, stress in zip(rules, stresses(cells, rules, u)):
         coat = cells.is_coating[first:first + len(rule.block)]
@@ -69,8 +74,11 @@ def _coating_forces(cells: Cells, rules: list, u) -> np.ndarray:
 
 
 def at(cells: Cells, bond: Bond | None, x) -> dict:
-    """{"normal_bond", "shear_bond"} (frames, m) [Pa] of `bond_line` at the places x (m,) [m] of the interface, NaN
-    beyond the coating's ends; {} without a coating."""
+    """Stress on the bond line at the places x (m,) [m] of the interface.
+
+    Returns {"normal_bond", "shear_bond"} (frames, m) [Pa] of `bond_line`, NaN beyond the ends of the coating; {}
+    without a coating.
+    """
     if bond is None:
         return {}
     own = cells.points[bond.node, 0]

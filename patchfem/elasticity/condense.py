@@ -40,11 +40,11 @@ def sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
 
 
 def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
-    """As `sweep` at half its cost, for a piece that is its own mirror image.
+    """Interface block of the inverse as `sweep` finds it, at half the cost, for a piece that is its own mirror image.
 
-    Motion that is even inward and odd along x and motion the other way round do not mix: each is that of the right
-    half, with what it forbids held in a middle column, or with the left neighbour of the first column its own image.
-    A force on the right is half the sum of its even and its odd pair.
+    Two kinds of motion do not mix: those that are even inward and odd along x, and those the other way round. Each is
+    the motion of the right half. Where a column stands in the middle, its forbidden unknowns are held; else the left
+    neighbour of the first column is its own image. A force on the right is half the sum of its even and its odd pair.
     """
     diagonal, upper = _blocks(matrix, columns)
     middle = columns // 2
@@ -64,9 +64,10 @@ def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
 
 
 def _half(diagonal, upper, bridge, held: int) -> np.ndarray:
-    """Half the compliance of the right half in even (held 0: nothing moves along x in the middle) or odd motion.
+    """Half the compliance of the right half in one kind of motion: even (held 0: nothing moves along x in the middle)
+    or odd.
 
-    bridge: the block between the two middle columns, None where one stands in the middle.
+    bridge: the block between the two middle columns, None where one column stands in the middle.
     """
     size = diagonal.shape[1]
     first, rest = diagonal[0].copy(), upper

@@ -11,11 +11,11 @@ LEAF = 48  # nodes below which a part is not cut any further
 
 
 def dissection(points, pairs) -> tuple:
-    """((n,) nodes in the order of elimination, (f + 1,) where each part or cut begins in it).
+    """Order of elimination of the nodes: (n,) nodes, and (f + 1,) where each part or cut begins in it.
 
-    points (n, 2) [m], pairs (e, 2) neighbours. A part is cut at the median of x or y, whichever parts fewer pairs; its
-    cut is the least set of nodes that touches all of them, eliminated after both halves. Nodes of a cut lie in sequence
-    along it.
+    points: (n, 2) [m]; pairs: (e, 2) neighbours. A part is cut at the median of x or y, whichever parts fewer pairs.
+    Its cut is the least set of nodes that touches all of those pairs; it is eliminated after both halves. Nodes of a
+    cut lie in sequence along it.
     """
     count = len(points)
     if not count:
@@ -42,7 +42,7 @@ def dissection(points, pairs) -> tuple:
 
 
 def _sides(rising, pairs, of) -> np.ndarray:
-    """0 or 1 per node: the half of its part by the better of the two medians. rising: all nodes by x and by y."""
+    """Half of its part, 0 or 1, for each node, by the better of the two medians. rising: all nodes by x and by y."""
     sizes = np.bincount(of[of >= 0])
     sides, severed = np.zeros((2, of.size), np.int64), np.empty((2, sizes.size), np.int64)
     small = np.uint16 if sizes.size < 2**16 else np.int64  # short integers are sorted by their digits
@@ -59,7 +59,8 @@ def _sides(rising, pairs, of) -> np.ndarray:
 def least_cover(pairs, side) -> np.ndarray:
     """The fewest nodes that touch every one of the pairs (e, 2) between nodes of side 0 and of side 1.
 
-    Koenig's theorem: what alternating paths from the unmatched nodes do not reach on one side, and do on the other.
+    Koenig's theorem: the nodes of one side that alternating paths from the unmatched nodes do not reach, and those of
+    the other side that they do reach.
     """
     if not len(pairs):
         return np.empty(0, np.int64)
@@ -82,7 +83,7 @@ def least_cover(pairs, side) -> np.ndarray:
 
 
 def _in_sequence(points, key) -> tuple:
-    """The order by key and, within one, along the longer extent; and where each key begins."""
+    """The nodes in order of key and, within one key, along its longer extent; and where each key begins."""
     _, own, sizes = np.unique(key, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
     firsts = np.concatenate([[0], np.cumsum(sizes)])

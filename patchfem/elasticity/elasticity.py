@@ -16,7 +16,10 @@ from .stiffness import stiffness
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Layers:
-    """Young's moduli [Pa] and Poisson ratios of coating and substrate; plane is "strain" or "stress"."""
+    """Elastic constants of a coated piece: Young's modulus [Pa] and Poisson ratio of coating and of substrate.
+
+    plane: "strain" or "stress".
+    """
 
     coating: tuple
     substrate: tuple
@@ -33,8 +36,11 @@ def lame(young: float, poisson: float, plane: str) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """Assembled piece. matrix: free unknowns ordered column by column, row by row, two per node (x, inward);
-    far-face nodes are left out. cells: (t, 4) node numbers column * ny + row; is_coating: (t,)."""
+    """An assembled piece on its tensor grid.
+
+    x: (nx,), depth: (ny,) [m]; matrix: free unknowns column by column, row by row, two per node (along x, inward),
+    without those of the far face; cells: (t, 4) node numbers column * ny + row; is_coating: (t,); layers: its Layers.
+    """
 
     x: np.ndarray
     depth: np.ndarray
@@ -45,7 +51,7 @@ class Piece:
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Stiffness per unit width [N/m per m] of one piece held at its far face; x (nx,), depth (ny,) [m]."""
+    """Assemble one piece held at its far face; x (nx,), depth (ny,) [m]; stiffness per unit width [N/m per m]."""
     nx, ny = x.size, depth.size
     mesh = MeshQuad.init_tensor(np.asarray(x), np.asarray(depth))
     middle = mesh.p[:, mesh.t].mean(axis=1)[1]
@@ -70,9 +76,10 @@ def _counter_clockwise(cells, ny: int) -> np.ndarray:
 
 
 def displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(frames, nx*ny, 2) displacement [m] (along x, inward) under nodal interface forces per unit width [N/m].
+    """Displacements of a piece under nodal interface forces per unit width [N/m].
 
-    shear, normal: (frames, nx) acting on the piece along +x and inward; one sparse factorisation for all frames.
+    Returns (frames, nx*ny, 2) [m], along x and inward. shear, normal: (frames, nx) acting on the piece along +x and
+    inward. One sparse factorisation serves all frames.
     """
     nx, ny = piece.x.size, piece.depth.size
     frames = np.atleast_2d(normal).shape[0]
@@ -88,10 +95,11 @@ def displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndar
 
 
 def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
-    """Stress at cell middles, tension > 0: (frames, t, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t) [Pa].
+    """Stress at the middles of the cells, tension > 0.
 
-    u: (frames, nodes, 2). The inward axis is kept, so xy changes sign for the piece drawn at y < 0.
-    The middle of a bilinear quad is its superconvergent point.
+    Returns (frames, t, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t) [Pa]. u: (frames, nodes, 2) [m]. The inward
+    axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a bilinear quad is its superconvergent
+    point.
     """
     corner = u[:, piece.cells]
     nodes = np.stack([np.repeat(piece.x, piece.depth.size), np.tile(piece.depth, piece.x.size)], axis=1)[piece.cells]
@@ -104,7 +112,8 @@ def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
 
 
 def hooke(exx, eyy, exy, is_coating, layers: Layers) -> tuple:
-    """((..., t, 4) stresses xx, yy, zz, xy [Pa], (..., t) von Mises [Pa]) of plane strains (..., t) [1]."""
+    """Stresses of plane strains (..., t) [1] by Hooke's law: (..., t, 4) as xx, yy, zz, xy and von Mises (..., t)
+    [Pa]."""
     pick = is_coating.astype(int)
     lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[pick].T
     poisson = np.array([layers.substrate[1], layers.coating[1]])[pick]

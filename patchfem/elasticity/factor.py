@@ -1,8 +1,9 @@
 """Factors of a piece's stiffness behind one small interface, by the package's own fronts or by another library.
 
-Every one has `solve(load (n, r)) -> (n, r)` and `compliance() -> (k, k)`, the last diagonal block of the inverse. The
-fronts are the default: they need nothing but LAPACK and are the fastest (studies/speed/large_pair.py); the others check
-them. PATCHFEM_FACTOR names one for a whole run; one that is missing or broken is replaced with a remark on stderr.
+Every kind of factors has `solve(load (n, r)) -> (n, r)` and `compliance() -> (k, k)`, the last diagonal block of the
+inverse. The fronts are the default: they need nothing but LAPACK and are the fastest (studies/speed/large_pair.py). The
+others check them. PATCHFEM_FACTOR names one for a whole run; one that is missing or broken is replaced with a remark on
+stderr.
 """
 
 import ctypes
@@ -22,11 +23,11 @@ DEFAULT = "fronts"
 
 
 def factorise(matrix: csc_matrix, firsts, name: str | None = None):
-    """Factors of a symmetric positive definite stiffness in the order it comes, the interface its last front.
+    """Factorise a symmetric positive definite stiffness in the order it comes, the interface its last front.
 
-    firsts: (f + 1,) first node of every front, two unknowns a node. name: of BACKENDS, [PATCHFEM_FACTOR, else fronts].
-    PatchfemError for an unknown name, Missing when `name` is given and its library cannot be used, NotConverged where
-    the matrix is singular.
+    firsts: (f + 1,) first node of every front, two unknowns a node; name: one of BACKENDS, else that of
+    PATCHFEM_FACTOR, else the fronts. PatchfemError for an unknown name, Missing when `name` is given and its library
+    cannot be used, NotConverged where the matrix is singular.
     """
     wanted = name or os.environ.get("PATCHFEM_FACTOR") or DEFAULT
     if wanted not in BACKENDS:
@@ -43,17 +44,17 @@ def factorise(matrix: csc_matrix, firsts, name: str | None = None):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SuperLU:
-    """SciPy's factors L U without pivoting; S = L_ss U_ss."""
+    """Factors L U by SciPy's SuperLU without pivoting; the Schur complement is S = L_ss U_ss."""
 
     factor: object
     size: int
 
     def solve(self, load) -> np.ndarray:
-        """(n, r) solution for (n, r) loads."""
+        """Solution (n, r) for the loads (n, r)."""
         return self.factor.solve(np.ascontiguousarray(load, float))
 
     def compliance(self) -> np.ndarray:
-        """(k, k) last diagonal block of the inverse."""
+        """Last diagonal block (k, k) of the inverse, that of the interface."""
         n, k = self.factor.shape[0], self.size
         order = self.factor.perm_c
         if not (np.array_equal(order[n - k:], np.arange(n - k, n)) and np.array_equal(self.factor.perm_r, order)):
@@ -73,17 +74,17 @@ def _superlu(matrix, firsts) -> SuperLU:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cholmod:
-    """CHOLMOD's factors L L^T in the given order; C = L_ss^-T L_ss^-1."""
+    """Factors L L^T by CHOLMOD in the given order; the compliance is C = L_ss^-T L_ss^-1."""
 
     factor: object
     size: int
 
     def solve(self, load) -> np.ndarray:
-        """(n, r) solution for (n, r) loads."""
+        """Solution (n, r) for the loads (n, r)."""
         return self.factor(np.asarray(load, float))
 
     def compliance(self) -> np.ndarray:
-        """(k, k) last diagonal block of the inverse."""
+        """Last diagonal block (k, k) of the inverse, that of the interface."""
         low = self.factor.L()
         n = low.shape[0]
         return _inverse(low[n - self.size:, n - self.size:].toarray())
@@ -107,7 +108,7 @@ def _inverse(low) -> np.ndarray:
 
 
 class Pardiso:
-    """MKL Pardiso's factors with the Schur complement of the last unknowns; its memory is released with the object."""
+    """Factors by MKL Pardiso with the Schur complement of the last unknowns; its memory is released with the object."""
 
     __slots__ = ("library", "matrix", "schur", "size")
 
@@ -139,14 +140,14 @@ class Pardiso:
             raise NotConverged(f"the stiffness of the piece cannot be factorised (Pardiso error {fault.value})")
 
     def solve(self, load) -> np.ndarray:
-        """(n, r) solution for (n, r) loads."""
+        """Solution (n, r) for the loads (n, r)."""
         load = np.asfortranarray(load, float)
         out = np.zeros_like(load, order="F")
         self._call(33, load, out)
         return np.ascontiguousarray(out)
 
     def compliance(self) -> np.ndarray:
-        """(k, k) last diagonal block of the inverse."""
+        """Last diagonal block (k, k) of the inverse, that of the interface."""
         try:
             return _inverse(np.linalg.cholesky(self.schur))
         except np.linalg.LinAlgError:

@@ -1,8 +1,9 @@
 """Sparse Cholesky factors of a stiffness in dense fronts (multifrontal, Duff and Reid 1983), by LAPACK alone.
 
-The nodes of one part or cut of a nested dissection make a front: their own unknowns first, then all later ones they
-touch. Eliminating its own unknowns leaves an update that is added to the front of the first of the later ones. The
-last front is the interface, so its update-free matrix is the Schur complement S and C = S^-1 is the compliance.
+The nodes of one part or cut of a nested dissection make a front: their own unknowns first, then all later ones that
+they touch. Eliminating its own unknowns leaves an update, which is added to the front of the first of the later ones.
+The last front is the interface. Nothing is left to update there, so its matrix is the Schur complement S, and C = S^-1
+is the compliance.
 """
 
 from dataclasses import dataclass
@@ -21,8 +22,11 @@ LARGE = 40  # nodes of an update from which slices are added
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fronts:
-    """Factors L L^T of a matrix (n, n). panels: per front (own + later, own) the columns of L; firsts: (f + 1,) first
-    own unknown of every front; later: per front the unknowns below its own."""
+    """Factors L L^T of a matrix (n, n) in fronts.
+
+    panels: per front (own + later, own) the columns of L; firsts: (f + 1,) first own unknown of every front; later: per
+    front the unknowns below its own.
+    """
 
     panels: list
     firsts: np.ndarray
@@ -30,16 +34,16 @@ class Fronts:
 
     @property
     def entries(self) -> int:
-        """Numbers kept."""
+        """Count of the numbers that are kept."""
         return sum(panel.size for panel in self.panels)
 
     def compliance(self) -> np.ndarray:
-        """(k, k) last diagonal block of the inverse, that of the unknowns of the last front."""
+        """Last diagonal block (k, k) of the inverse, that of the unknowns of the last front."""
         both, _ = dpotri(self.panels[-1], lower=1)
         return np.tril(both) + np.tril(both, -1).T
 
     def solve(self, load) -> np.ndarray:
-        """(n, r) solution for (n, r) loads."""
+        """Solution (n, r) for the loads (n, r)."""
         x = np.array(load, dtype=float, order="C")
         steps = list(zip(self.panels, self.firsts, self.firsts[1:], self.later))
         for panel, start, stop, later in steps:
@@ -85,7 +89,8 @@ def factorise(matrix: csc_matrix, firsts) -> Fronts:
 
 
 def _add(whole, update, at) -> None:
-    """Add the lower half of a large update, or all of a small one, at the nodes `at`, block by block of consecutive."""
+    """Add an update at the nodes `at`, block by block of consecutive ones: its lower half where it is large, else all
+    of it."""
     if at.size < LARGE:
         at = _unknowns(at)
         whole.T[at[:, None], at] += update.T  # along the columns of both
@@ -105,7 +110,7 @@ def _unknowns(nodes) -> np.ndarray:
 
 
 def _reach(low: csc_matrix, firsts) -> list:
-    """Per front the later nodes that its own ones touch once all before are eliminated, rising."""
+    """Later nodes that the own nodes of each front touch once all before are eliminated, rising."""
     count = len(firsts) - 1
     owner = np.repeat(np.arange(count), np.diff(firsts))
     pointer, rows = low.indptr[::PER_NODE], low.indices // PER_NODE
@@ -122,7 +127,7 @@ def _reach(low: csc_matrix, firsts) -> list:
 
 
 def _gathered(low: csc_matrix, start: int, stop: int, size: int, place) -> np.ndarray:
-    """(size, size) lower entries of the matrix in the columns of a front's own nodes, Fortran order."""
+    """Lower entries (size, size) of the matrix in the columns of a front's own nodes, in Fortran order."""
     whole = np.zeros((size, size), order="F")
     pointer = low.indptr[PER_NODE * start:PER_NODE * stop + 1]
     rows = low.indices[pointer[0]:pointer[-1]]

@@ -49,16 +49,18 @@ class Mortar:
     reason: str
 
     def forces(self, nodal: np.ndarray) -> tuple:
-        """(..., m_l) and (..., m_u) forces on the nodes of the lower and the upper piece from forces (..., m) at x."""
+        """Forces on the nodes of the lower piece (..., m_l) and of the upper piece (..., m_u) from forces (..., m) at
+        x."""
         return nodal @ self.to_lower, nodal @ self.to_upper
 
 
 def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray, side: str | None = None) -> Mortar:
-    """The pair from the compliances (nn, tt, nt) of its pieces per unit width and their rising interface nodes [m].
+    """Join two pieces by their compliances (nn, tt, nt) per unit width and their rising interface nodes [m].
 
     side: the piece whose nodes shall carry the pressure, "lower" or "upper"; without one the grid is chosen. A side
     that would ripple (more than RIPPLE) is replaced by the chosen grid, and `reason` says so. Where one piece overhangs
-    the other only the stretch they share carries pressure, its ends become nodes of the grid.
+    the other only the stretch they share carries pressure, and its ends become nodes of the grid.
+
     PatchfemError for nodes that do not rise, pieces that do not face one another, another side, and where every grid
     ripples more than WORST.
     """
@@ -103,9 +105,10 @@ def _steadiest(grids, pair) -> Mortar:
 
 
 def transfer(x, own) -> csr_array:
-    """T (m, n) from a body's nodes own (n,) to the grid x (m,), both rising; x within own's ends. Exact by segments.
+    """Matrix T (m, n) that carries motions from a body's nodes own (n,) to the grid x (m,), both rising.
 
-    Rows sum to 1 and T own = x to round-off; the identity where the nodes are the same.
+    x lies within the ends of own. The integrals are exact, segment by segment. Rows sum to 1 and T own = x to
+    round-off; T is the identity where the nodes are the same.
     """
     if np.array_equal(x, own):
         return csr_array(eye_array(x.size))
@@ -130,7 +133,7 @@ def _hats(x, cell, place) -> np.ndarray:
 
 
 def tributary(x) -> np.ndarray:
-    """(m,) length that belongs to each node [m]; sums to the length."""
+    """Length that belongs to each node (m,) [m]; the lengths sum to that of the interface."""
     half = np.diff(x) / 2
     return np.append(half, 0.0) + np.insert(half, 0, 0.0)
 
@@ -157,10 +160,11 @@ def clipped(x, begin: float, end: float) -> np.ndarray:
 
 
 def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
-    """(m,) nodes of both pieces of the same ends, from left to right always on to the farther of the two next ones.
+    """A grid (m,) of nodes of two pieces of the same ends: from left to right always on to the farther of the two next
+    nodes.
 
     Where one piece is the coarser everywhere these are its nodes. soft_lower, soft_upper: `softness` of each piece at
-    its nodes; where one is SOFTER times softer, its nodes alone.
+    its nodes; where one piece is SOFTER times softer, its nodes alone are taken.
     """
     at, end, out = x_lower[0], x_lower[-1], [x_lower[0]]
     close = CLOSE * (end - at)
@@ -174,8 +178,11 @@ def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
 
 
 def zigzag(x, c) -> np.ndarray:
-    """(m - 2,) compliance [m2/N] of c (m, m) to balanced triples of forces (-b, a + b, -a)/(a + b) on the inner nodes
-    of x, a and b the cells on either side: the softness of a body at the scale of a cell, whatever its size."""
+    """Softness of a body at the scale of a cell, whatever its size: (m - 2,) [m2/N] at the inner nodes of x.
+
+    It is the compliance c (m, m) to balanced triples of forces (-b, a + b, -a)/(a + b), a and b the cells on either
+    side.
+    """
     v, w = _triple(x)
     i = np.arange(1, x.size - 1)
     return c[i, i] + v**2 * c[i - 1, i - 1] + w**2 * c[i + 1, i + 1] + \
@@ -188,17 +195,18 @@ def _triple(x) -> tuple:
 
 
 def softness(x, c, place) -> np.ndarray:
-    """`zigzag` of a body (its nodes x, compliance c) at other places."""
+    """Softness of a body (its nodes x, compliance c) as of `zigzag` at other places."""
     return np.interp(place, x[1:-1], zigzag(x, c))
 
 
 def ripples(x, bodies, nn) -> np.ndarray:
-    """(m - 2,) ripple of the pressure to expect at the inner points, over its peak, in a smooth contact CELLS cells of
-    the coarser side in half width; it falls with the square of the width.
+    """Ripple of the pressure to expect at the inner points (m - 2,), over its peak.
 
-    A body deformed to a parabola reaches the grid with the kinks of its own nodes, d = T (x_s)^2 - x^2. What of d is
-    not smooth is made up by zigzag forces against the joined compliance nn. bodies: (x_s, nn_s, T_s) of each piece. For
-    Hertz contact the measured ripple was 0.4 to 1.3 times this one over cells of 1:1.5 to 1:10, moduli of 1:1 to 1:100.
+    It holds for a smooth contact CELLS cells of the coarser side in half width, and falls with the square of the width.
+    A body deformed to a parabola reaches the grid with the kinks of its own nodes, d = T (x_s)^2 - x^2. The part of d
+    that is not smooth is made up by zigzag forces against the joined compliance nn. bodies: (x_s, nn_s, T_s) of each
+    piece. For Hertz contact the measured ripple was 0.4 to 1.3 times this one over cells of 1:1.5 to 1:10 and moduli of
+    1:1 to 1:100.
     """
     v, w = _triple(x)
     total = np.zeros(x.size - 2)
@@ -225,7 +233,7 @@ def _judged(grids, name: str, pair) -> Mortar:
 
 
 def _name(grids) -> str:
-    """The piece whose nodes are the common grid, or "both"."""
+    """Name of the piece whose nodes are the common grid, or "both"."""
     for side in ("lower", "upper"):
         same = grids[side].size == grids["both"].size
         if same and np.abs(grids[side] - grids["both"]).max() <= CLOSE * np.ptp(grids["both"]):

@@ -1,8 +1,8 @@
-"""Stress inside a pressed piece, recovered node by node, how wrong it is, and where it is largest.
+"""Stress inside a pressed piece, recovered node by node, with an estimate of its error and the place of its peak.
 
-Recovery: a plane is fitted to the stresses at the cell middles around a node (Zienkiewicz and Zhu, Int. J. Numer.
-Meth. Eng. 33, 1992, 1331), coating and substrate apart, because stress jumps between them. The recovered field less
-the computed one estimates the error (Zienkiewicz and Zhu 1987).
+Recovery: a plane is fitted to the stresses at the cell middles around a node (Zienkiewicz and Zhu, Int. J. Numer. Meth.
+Eng. 33, 1992, 1331), coating and substrate apart, because stress jumps between them. The recovered field less the
+computed one estimates the error (Zienkiewicz and Zhu 1987).
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,11 @@ CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """The cells of one piece. points: (N, 2) as x and depth [m]; blocks: arrays (c, 3 or 4) of node numbers, in the
-    order of the cell stresses; is_coating: (t,); layers: the two materials."""
+    """The cells of one piece.
+
+    points: (N, 2) as x and depth [m]; blocks: arrays (c, 3 or 4) of node numbers, in the order of the cell stresses;
+    is_coating: (t,); layers: the two materials.
+    """
 
     points: np.ndarray
     blocks: tuple
@@ -29,16 +32,16 @@ class Cells:
     layers: Layers
 
     def owner(self) -> np.ndarray:
-        """(corners,) cell of every corner, block after block."""
+        """Cell of every corner (corners,), block after block."""
         sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in self.blocks])
         return np.repeat(np.arange(sizes.size), sizes)
 
     def corners(self) -> np.ndarray:
-        """(corners,) node of every corner, block after block."""
+        """Node of every corner (corners,), block after block."""
         return np.concatenate([block.ravel() for block in self.blocks])
 
     def middles(self) -> np.ndarray:
-        """(t, 2) middles of the cells [m]."""
+        """Middles of the cells (t, 2) [m]."""
         return np.concatenate([self.points[block].mean(axis=1) for block in self.blocks])
 
 
@@ -54,7 +57,7 @@ def cells_of(piece) -> Cells:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recovery:
-    """Linear map from cell middles to places: a node has one in each material it touches.
+    """A linear map from cell middles to places; a node has one place in each material that it touches.
 
     node, coating: (s,) node number and material of each place; fit: (s, t) sparse, rows sum to one; place: (corners,)
     of every corner of every cell, in the order of Cells.corners.
@@ -67,7 +70,8 @@ class Recovery:
     fit: csr_matrix
 
     def __call__(self, values) -> np.ndarray:
-        """(..., s, k) at the places from (..., t, k) at the cell middles; linear fields are recovered exactly."""
+        """Values (..., s, k) at the places from values (..., t, k) at the cell middles; linear fields are recovered
+        exactly."""
         values = np.asarray(values)
         flat = np.moveaxis(values, -2, 0)
         out = self.fit @ flat.reshape(len(flat), -1)
@@ -75,8 +79,11 @@ class Recovery:
 
 
 def recovery(cells: Cells) -> Recovery:
-    """Fits of a plane to the cell middles around every node, per material; patches too thin for a plane (edges,
-    corners) take in their neighbours, and one that stays thin is fitted along itself alone."""
+    """Fit a plane to the cell middles around every node, per material.
+
+    Patches too thin for a plane (edges, corners) take in their neighbours. One that stays thin is fitted along itself
+    alone.
+    """
     owner, corners = cells.owner(), cells.corners()
     key, place = np.unique(2 * corners + cells.is_coating[owner], return_inverse=True)
     shape = (key.size, cells.is_coating.size)
@@ -95,7 +102,8 @@ def recovery(cells: Cells) -> Recovery:
 
 
 def _planes(near, at, middle) -> tuple:
-    """(weights of the cells of every patch, whether the patch is too thin for a plane); least squares, equal shares."""
+    """Weights of the cells of every patch by least squares, and whether the patch is too thin for a plane: equal shares
+    then."""
     near = near.tocsr()
     starts, counts = near.indptr[:-1], np.diff(near.indptr)
     row = np.repeat(np.arange(counts.size), counts)
@@ -117,8 +125,10 @@ def _planes(near, at, middle) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Quadrature:
-    """Points of integration in one block of cells. block: its nodes (c, n); shape: (g, n); slope: (c, g, n, 2) [1/m];
-    weight: (c, g) [m2]."""
+    """Points of integration in one block of cells.
+
+    block: its nodes (c, n); shape: (g, n); slope: (c, g, n, 2) [1/m]; weight: (c, g) [m2].
+    """
 
     block: np.ndarray
     shape: np.ndarray
@@ -132,7 +142,10 @@ class Quadrature:
 
 
 def quadratures(cells: Cells) -> list:
-    """One Quadrature per block: 2 x 2 Gauss points in quads, the points the stiffness is built with, 3 in triangles."""
+    """One Quadrature per block: the points that the stiffness is built with.
+
+    2 x 2 Gauss points in quadrilaterals, 3 points in triangles.
+    """
     out = []
     for block in cells.blocks:
         if block.shape[1] == 3:
@@ -166,20 +179,26 @@ def stresses(cells: Cells, rules: list, u) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Indicator:
-    """Estimated error of the stress. error: (frames, t) squared energy norm of every cell [J/m]; energy: (frames,)
-    squared energy norm of the computed stress, twice the stored energy [J/m]."""
+    """Estimated error of the stress in energy norm.
+
+    error: (frames, t) squared norm of the error of every cell [J/m]; energy: (frames,) squared norm of the computed
+    stress, which is twice the stored energy [J/m].
+    """
 
     error: np.ndarray
     energy: np.ndarray
 
     @property
     def relative(self) -> np.ndarray:
-        """(frames,) estimated error over the whole, both in energy norm [1]; 0 where nothing is loaded."""
+        """Estimated error (frames,) over the whole, both in energy norm [1]; 0 where nothing is loaded."""
         return self.shares()[1]
 
     def shares(self, *others) -> tuple:
-        """((frames, t) error of each cell, (frames,) of all of them) over the energy norm of the whole [1], `others`
-        the Indicators of the pieces pressed together with this one. The squares of the cells add up to that of all."""
+        """Estimated errors over the energy norm of the whole [1]: (frames, t) of each cell, (frames,) of all of them.
+
+        others: the Indicators of the pieces pressed together with this one. The squares of the cells add up to that of
+        all.
+        """
         total = self.error.sum(axis=1)
         whole = sum((one.energy + one.error.sum(axis=1) for one in (self, *others)), np.zeros(total.size))
         whole = np.where(whole > 0, whole, 1.0)
@@ -213,7 +232,7 @@ def indicator(found: Recovery, u, stress) -> Indicator:
 
 
 def _complementary(stress, lam, mu) -> np.ndarray:
-    """s : C^-1 : s (c, g) [Pa] of plane stresses (c, g, 3), lam and mu (c,)."""
+    """Complementary energy density s : C^-1 : s (c, g) [Pa] of plane stresses (c, g, 3); lam and mu (c,)."""
     xx, yy, xy = np.moveaxis(stress, -1, 0)
     lam, mu = lam[:, None], mu[:, None]
     return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy)**2) / (2 * mu)
@@ -221,7 +240,7 @@ def _complementary(stress, lam, mu) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Peak:
-    """The largest value inside a piece and where it lies: x, depth [m]."""
+    """The largest value inside a piece, and its place x, depth [m]."""
 
     value: float
     x: float
@@ -230,8 +249,10 @@ class Peak:
 
 
 def peak(found: Recovery, stress, of=von_mises, least_depth: float = 0.0) -> Peak:
-    """Largest value of `of` (von Mises) of one frame of cell stresses (t, 4) [Pa] deeper than `least_depth` [m]: the
-    top of the paraboloid through the recovered values around the largest of them, if it has one there."""
+    """Largest value of `of` (von Mises) in one frame of cell stresses (t, 4) [Pa] deeper than `least_depth` [m].
+
+    It is the top of the paraboloid through the recovered values around the largest of them, if there is one.
+    """
     value = of(found(stress))
     at = found.cells.points[found.node]
     top = int(np.argmax(np.where(at[:, 1] >= least_depth, value, -np.inf)))
@@ -247,8 +268,10 @@ def peak(found: Recovery, stress, of=von_mises, least_depth: float = 0.0) -> Pea
 
 
 def _vertex(offset, value) -> tuple:
-    """(place, value) of the top of the paraboloid through values (k,) at offsets (k, 2); (zero, None) without one in
-    the middle half of the points."""
+    """Place and value of the top of the paraboloid through values (k,) at offsets (k, 2).
+
+    (zero, None) where no top lies in the middle half of the points.
+    """
     reach = np.abs(offset).max(axis=0)
     if len(value) < 6 or not reach.all():
         return np.zeros(2), None

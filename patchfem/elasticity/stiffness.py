@@ -7,24 +7,24 @@ from skfem import BilinearForm
 
 @BilinearForm
 def along(u, v, w):
-    """Energy of motions along x only."""
+    """Energy form of motions along x only."""
     return (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
 
 
 @BilinearForm
 def inward(u, v, w):
-    """Energy of motions into the piece only."""
+    """Energy form of motions into the piece only."""
     return (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
 
 
 @BilinearForm
 def mixed(u, v, w):
-    """Energy of an inward motion u with one along x, v."""
+    """Energy form of an inward motion u with one along x, v."""
     return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
 
 
 def stiffness(parts, count: int) -> csr_matrix:
-    """(2 count, 2 count) stiffness per unit width [N/m per m], unknowns (along x, inward) node by node.
+    """Stiffness (2 count, 2 count) per unit width [N/m per m], unknowns (along x, inward) node by node.
 
     parts: (basis, lam, mu, place) for each kind of cell: scalar basis, Lame pair per cell [Pa], and the node number of
     each of its unknowns, -1 where it is held. Entries that vanish by symmetry are kept as zeros.

@@ -23,9 +23,10 @@ RESIDUAL = 1e-8  # of a solve with random loads, relative
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Substructure:
-    """One piece, assembled and factorised when first needed: a piece whose compliance is kept on disk never is.
+    """One piece of any mesh, assembled and factorised when first needed.
 
-    mesh: as mesh.anymesh.PieceMesh; name: of the factors, see `factor.factorise`; made: what has been assembled.
+    A piece whose compliance is kept on disk is never assembled. mesh: mesh.anymesh.PieceMesh; layers: its Layers; name:
+    of the factors, see `factor.factorise`; made: what has been assembled.
     """
 
     mesh: object
@@ -35,7 +36,7 @@ class Substructure:
 
     @property
     def order(self) -> np.ndarray:
-        """(n,) free nodes as eliminated, interface last by x."""
+        """Free nodes (n,) in the order of elimination, the interface last by x."""
         return self._part("order")
 
     @property
@@ -55,7 +56,7 @@ class Substructure:
 
 
 def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
-    """Stiffness per unit width [N/m per m] of one piece held at its far face, and its factors, at once.
+    """Assemble and factorise at once one piece held at its far face.
 
     mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
     factor: name of the factors, see `factor.factorise`. NotConverged when they do not solve the system.
@@ -78,7 +79,8 @@ def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
 
 
 def elimination(mesh) -> tuple:
-    """((n,) free nodes in the order of elimination, interface last by x; (f + 1,) where each front begins in it)."""
+    """Free nodes (n,) in the order of elimination, the interface last by x, and (f + 1,) where each front begins in
+    it."""
     inside = np.ones(len(mesh.points), bool)
     inside[mesh.interface] = inside[mesh.far] = False
     nodes, new = np.flatnonzero(inside), np.cumsum(inside) - 1
@@ -131,9 +133,10 @@ def joined(lower: tuple, upper: tuple) -> tuple:
 
 
 def displacement(piece: Substructure, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(frames, N, 2) displacement [m] (along x, inward) under nodal interface forces per unit width [N/m].
+    """Displacements of a piece under nodal interface forces per unit width [N/m].
 
-    shear, normal: (frames, m) acting on the piece along +x and inward; the factors of the piece are used again.
+    Returns (frames, N, 2) [m], along x and inward. shear, normal: (frames, m) acting on the piece along +x and inward.
+    The factors of the piece are used again.
     """
     shear, normal = np.atleast_2d(shear), np.atleast_2d(normal)
     frames, m = normal.shape
@@ -147,7 +150,7 @@ def displacement(piece: Substructure, shear: np.ndarray, normal: np.ndarray) -> 
 
 
 def _gradients(corner) -> np.ndarray:
-    """(cells, n, 2) gradients of the shape functions at the middle of triangles or quads with corners (cells, n, 2)."""
+    """Gradients (cells, n, 2) of the shape functions at the middle of triangles or quads with corners (cells, n, 2)."""
     local = np.array([[-1, -1], [1, 0], [0, 1]]) if corner.shape[1] == 3 else \
         np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 4
     jacobian = np.einsum("ni,cnj->cij", local, corner)
@@ -155,9 +158,10 @@ def _gradients(corner) -> np.ndarray:
 
 
 def cell_stress(piece: Substructure, u: np.ndarray) -> tuple:
-    """Stress at cell middles, tension > 0: (frames, t + q, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t + q).
+    """Stress at the middles of the cells, tension > 0; triangles first.
 
-    u: (frames, N, 2); triangles first. The inward axis is kept, so xy changes sign for the piece drawn at y < 0.
+    Returns (frames, t + q, 4) as xx, yy, zz, xy [Pa] and von Mises (frames, t + q). u: (frames, N, 2) [m]. The inward
+    axis is kept, so xy changes sign for the piece drawn at y < 0.
     """
     mesh = piece.mesh
     slope = np.concatenate([np.einsum("cnj,fcni->fcij", _gradients(mesh.points[cells]), u[:, cells])

@@ -1,4 +1,4 @@
-"""One BLAS thread for small dense work, at 10 us per entry: the libraries are looked up once, not at each call."""
+"""One BLAS thread for small dense work; the libraries are looked up once, so that an entry costs 10 us."""
 
 from functools import cache
 

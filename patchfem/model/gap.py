@@ -19,9 +19,12 @@ SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Gap:
-    """shapes: (name, keys of its table) each; profile: path of measured heights or None, which stand for content down
-    to profile_size [m], None: of the mesh's own cells; rough: asperities stand for what is finer; side: the piece that
-    carries the shapes, "upper" or "lower"."""
+    """The shapes that open the gap between the pieces.
+
+    shapes: (name, keys of its table) each; profile: path of measured heights or None; profile_size [m]: the size down
+    to which these heights stand for content, None: that of the mesh's own cells; rough: asperities stand for what is
+    finer; side: the piece that carries the shapes, "upper" or "lower".
+    """
 
     shapes: tuple
     profile: Path | None
@@ -35,7 +38,7 @@ class Gap:
         return next((part.angle for name, part in self.shapes if name == "tilt" and self.side == "upper"), 0.0)
 
     def at(self, x) -> tuple:
-        """((m,) gap of the unloaded surfaces [m] at x (m,) [m], notes, seconds by shape)."""
+        """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape."""
         gap, seconds, notes = np.zeros(x.size), {}, ()
         for name, part in self.shapes:
             begin = perf_counter()

@@ -13,29 +13,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbing:
-    """One interface and its law. key: of its table, for messages; numbers: keys of the law as they act; load: normal
-    load [N] of an interface between masses, None where the patch or the point of the model carries it."""
+    """One interface that rubs, with its law.
+
+    key: of its table, for messages; numbers: keys of the law as they act; load: normal load [N] of an interface between
+    masses, None where the patch or the point of the model carries it.
+    """
 
     key: str
     numbers: object
     load: float | None
 
     def limits(self, load: float) -> tuple:
-        """(static, kinetic) friction force [N] under a load [N]."""
+        """Static and kinetic friction force [N] under a load [N]."""
         return limits_of(self.numbers, load)
 
 
 def limits_of(f, load: float) -> tuple:
-    """(static, kinetic) friction force [N] of the keys of a law under a load [N]."""
+    """Static and kinetic friction force [N] of the keys of a law under a load [N]."""
     return f.static * load, (f.kinetic if f.kinetic is not None else f.static) * load
 
 
 def acting(f, width: float | None, where):
-    """The keys of a law with the effects that only change its numbers worked in: rest_growth and slip_growth at
-    friction.temperature, static and kinetic times the pad's share of friction.spread.
+    """The keys of a law after the effects that only change its numbers.
 
-    width [m]: of the contact across the path. where(key) -> place of a key. PatchfemError where a rate leaves the range
-    of numbers.
+    rest_growth and slip_growth are those at friction.temperature; static and kinetic are multiplied by the pad's share
+    of friction.spread. width [m]: of the contact across the path; where(key) -> place of a key. PatchfemError where a
+    rate leaves the range of numbers.
     """
     if f is None or (f.temperature is None and f.spread is None):
         return f
@@ -58,7 +61,10 @@ def acting(f, width: float | None, where):
 
 
 def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
-    """Bond parameters of the keys of a law; v_h defaults to 1e-3 of the peak speed [m/s], but not below `least`."""
+    """Bond parameters of the keys of a law.
+
+    The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
+    """
     from ..friction.bonds.parameters import Bonds
 
     ratio = f.kinetic / f.static if f.static > 0 else 1.0

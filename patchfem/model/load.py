@@ -12,8 +12,10 @@ MOST_SAMPLES = 5_000_000
 
 @dataclass(frozen=True, slots=True)
 class PointLoad:
-    """A load on one point: load [N], amplitude [N] of its oscillation or 0, frequency [Hz], phase [rad]; width [m]
-    across the path or None."""
+    """A load on one point.
+
+    load [N]; amplitude [N] of its oscillation, or 0; frequency [Hz]; phase [rad]; width [m] across the path or None.
+    """
 
     load: float
     amplitude: float = 0.0
@@ -27,8 +29,11 @@ class PointLoad:
         return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)  # round-off carries nothing
 
     def refined(self, slide: SlidePath, time, place, steps: int) -> tuple:
-        """(time, slide) with samples fine enough for the load as well: `steps` per period of it, its extremes, and the
-        instants at which the contact is lost or made. Missing where that is too many."""
+        """Samples of a slide, (time, slide), that are fine enough for the load as well.
+
+        There are `steps` to a period of the load; its extremes and the instants at which the contact is lost or made
+        are samples. Missing where that is too many.
+        """
         period, span = 1 / self.frequency, time[-1] - time[0]
         if span / period * steps + time.size > MOST_SAMPLES:
             raise Missing(f"the load makes {span / period:.3g} periods during the slide, more than {MOST_SAMPLES} "

@@ -1,4 +1,4 @@
-"""build(scene) -> Model: everything a scene means, made once; the last module that sees a Scene."""
+"""The model of a scene: everything that the scene means, made once; the last module that sees a Scene."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ class Model:
 
     @property
     def soft(self) -> str:
-        """What lets the patch slip part by part under one slide, as the scene writes it; empty where nothing."""
+        """The effect that lets the patch slip part by part under one slide, as the scene writes it; "" where none
+        does."""
         return self.patch.gives_way if self.patch is not None else ""
 
     @property
@@ -70,18 +71,18 @@ class Model:
 
     @property
     def speed(self) -> float:
-        """Size of the speeds to expect [m/s]."""
+        """Scale of the speeds to expect [m/s]."""
         return self.slide.peak_speed if self.rig is None else self.rig.speed
 
     @property
     def bonds(self) -> Bonds:
-        """Bonds of law 'nonlocal', the floor of the speed by default 1e-3 of the speeds to expect."""
+        """Bonds of law 'nonlocal'; the floor of the speed defaults to 1e-3 of the speeds to expect."""
         from .law import bonds_of
 
         return bonds_of(self.friction, self.speed, 0.0 if self.rig is None else 1e-12)
 
     def limits(self, load: float) -> tuple:
-        """(static, kinetic) friction force [N] of the first interface under a load [N]."""
+        """Static and kinetic friction force [N] of the first interface under a load [N]."""
         return self.rig.interfaces[0].limits(load)
 
 

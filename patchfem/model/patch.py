@@ -1,4 +1,5 @@
-"""The patch that a scene asks for: its two pieces, what presses them, what lets them give way. Nothing is solved."""
+"""The patch that a scene asks for: its two pieces, what presses them, what lets them slip in part. Nothing is
+solved."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tol
 
 @dataclass(frozen=True, slots=True)
 class OnePiece:
-    """One of the two pieces. height [m], coating included; coating None: bare."""
+    """One of the two pieces: height [m] with its coating, substrate, coating or None where it is bare."""
 
     height: float
     substrate: Material
@@ -29,11 +30,12 @@ class PatchModel:
     """Two pieces and what presses them.
 
     length, width, height [m], the last of a piece that names none; pairs: equal patches that share the load; plane:
-    "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface, None lets
+    "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface; None lets
     the tolerance choose where `chosen`, else length/AUTOMATIC_CELLS; mesh: file of the two pieces. load [N] or approach
     [m], the other None. offset [m] and line_moment [N m] of a load line; rotates: the upper piece is free to turn;
-    spring [N m/rad] and slide_spring [N/m, None rigid] of the holder. skin: asperities; strips: (count, roll [rad]);
-    shear: the pieces give way tangentially; gives_way: what lets the patch slip part by part, as the scene writes it.
+    spring [N m/rad] and slide_spring [N/m, None: rigid] of the holder. skin: asperities; strips: (count, roll [rad]);
+    shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by part, as the
+    scene writes it.
     """
 
     length: float
@@ -72,7 +74,7 @@ class PatchModel:
 
     @property
     def nominal_load(self) -> float:
-        """The load [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
+        """Load [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
         if self.load is not None:
             return self.load
         return self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)

@@ -18,8 +18,11 @@ def grid_of(patch: PatchModel, piece: OnePiece) -> TensorGrid:
 
 
 def bodies_of(patch: PatchModel) -> tuple:
-    """(lower piece, upper piece or None where it is alike): grids that are made, the tensor grid recognised in the
-    named mesh file, or its two pieces of any triangles and quads."""
+    """Meshes of the two pieces: (lower, upper or None where it is alike).
+
+    They are grids that are made, the tensor grid that is recognised in the named mesh file, or its two pieces of any
+    triangles and quads.
+    """
     if patch.mesh is None:
         return grid_of(patch, patch.lower), None if patch.alike else grid_of(patch, patch.upper)
     from ..mesh.files import read_grid, read_pieces

@@ -16,11 +16,12 @@ NOISE = 1e-10  # m: heights below it are digits
 
 
 def profile_gap(path: Path, x, asked: float | None, rough: bool) -> tuple:
-    """((m,) heights of the profile in a file at the nodes x (m,) [m], notes): levelled, without spikes, averaged over
-    the nodes' cells, from the lowest on, where flat pieces touch first.
+    """Heights (m,) [m] of a profile in a file at the nodes x (m,) [m], and notes for the user.
 
-    asked [m]: element size that decides what a profile may hold, None: that of the nodes; rough: asperities stand for
-    what is finer. PatchfemError where too much of it is finer than the mesh and no asperities stand for it.
+    The profile is levelled, freed of spikes and averaged over the nodes' cells. Heights count from the lowest, where
+    flat pieces touch first. asked [m]: element size that decides what a profile may hold, None: that of the nodes;
+    rough: asperities stand for what is finer. PatchfemError where too much of it is finer than the mesh and no
+    asperities stand for it.
     """
     stamp = path.stat().st_mtime_ns if path.exists() else 0
     size = float(np.diff(x).max())

@@ -51,12 +51,13 @@ class Rig:
 
     @property
     def speed(self) -> float:
-        """Size of the speeds to expect [m/s]: sets the default floor of the speed in the growth of bonds."""
+        """Scale of the speeds to expect [m/s]; it sets the default floor of the speed in the growth of bonds."""
         return peak_speed(self.drive, self.start)
 
     @property
     def stiffness(self) -> float:
-        """K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all rigid."""
+        """Stiffness K = mass omega_1^2 [N/m] of the first mode that is not rigid, without the bonded spring; 0: all are
+        rigid."""
         return self.mass * (2 * np.pi * self.own_frequency)**2 if self.own_frequency else 0.0
 
     @property

@@ -52,11 +52,11 @@ class SlidePath:
         return 4 * self.amplitude / self.speed if self.kind == "triangle" else None
 
     def samples(self, steps: int) -> tuple:
-        """(time, slide, first sample of the last cycle, drive omega): the path at `steps` per cycle.
+        """Samples of the slide at `steps` per cycle: (time, slide, first sample of the last cycle, drive omega).
 
         A constant slide, a dwell and a file count as one cycle. A triangle with a run-in first slides it, then goes
-        back. Starts, ends and reversals are samples; a file is straight between its rows, which are samples all.
-        Missing where the cycles take more than MOST_SAMPLES steps.
+        back. Starts, ends and reversals are samples. A file is straight between its rows, and all of its rows are
+        samples. Missing where the cycles take more than MOST_SAMPLES steps.
         """
         if self.kind == "constant":
             part = np.linspace(0, 1, steps + 1)
@@ -88,8 +88,12 @@ class SlidePath:
         return time, wave, max(0, number.size - 1 - steps), 2 * np.pi / period
 
     def steps(self, tolerance: float, pinned: int | None, length: float | None) -> int:
-        """Steps per cycle (of the whole slide for a constant one, a dwell, a file), even quarters so that reversals are
-        samples; length: of bonds [m] or None. A file counts as many cycles as its path has strokes there and back."""
+        """Steps per cycle that the tolerance asks for, or those that are pinned.
+
+        A constant slide, a dwell and a file count them over the whole slide. They are a multiple of four, so that
+        reversals are samples. length: of bonds [m] or None. A file counts as many cycles as its path has strokes there
+        and back.
+        """
         time, place = (None, None) if self.kind in ("sine", "triangle") else self._legs()
         legs = 0 if time is None or self.kind == "constant" else time.size - 1
         if pinned is not None:
@@ -103,7 +107,7 @@ class SlidePath:
         return 4 * ceil(max(cycles * min(max(base, 100), MOST), LEAST * legs) / 4)
 
     def _legs(self) -> tuple:
-        """(time, slide) of the corners of a slide of straight legs."""
+        """Corners (time, slide) of a slide of straight legs."""
         if self.corners is not None:
             return self.corners
         return np.array([0.0, self.amplitude / self.speed]), np.array([0.0, self.amplitude])
@@ -124,7 +128,7 @@ def slide_asked(scene) -> SlidePath:
 
 
 def _dwell_corners(slide) -> tuple:
-    """(time, slide) of the ends of the legs of a dwell; a leg without duration is left out."""
+    """Ends (time, slide) of the legs of a dwell; a leg without duration is left out."""
     length = np.array([slide.distance, 0.0, slide.distance_after or 0.0])
     span = np.array([slide.distance / slide.speed, slide.hold, length[2] / slide.speed])
     kept = span > 0
@@ -142,10 +146,10 @@ def _read(path, stamp):
 
 
 def _cut(time, slide, steps: int, across=None) -> tuple:
-    """The corners with straight samples between them: half the steps by path, half evenly over the legs that move;
-    across: lateral slide at the corners.
+    """Corners with straight samples between them: half the steps by path, half evenly over the legs that move.
 
-    A rest is REST steps however long it is: growth at rest (2.10) is exact in a step of any duration.
+    across: lateral slide at the corners. A rest is REST steps however long it is, because growth at rest (2.10) is
+    exact in a step of any duration.
     """
     path = _lengths(slide, across)
     share = path / path.sum() / 2 + 1 / (2 * np.count_nonzero(path))

@@ -11,8 +11,11 @@ from ..scene.lines import key_lines
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Source:
-    """The scene behind a model. text: as read; resolved: TOML in SI with every default; effects: what it names;
-    remarks: sentences on keys that nothing uses."""
+    """Origin of a model: path and text of the scene, with what messages need.
+
+    text: as read; resolved: TOML in SI with every default; effects: what the scene names; remarks: sentences on keys
+    that nothing uses.
+    """
 
     path: Path
     title: str
@@ -30,7 +33,7 @@ class Source:
 
 @contextmanager
 def placed(source: Source) -> Iterator[None]:
-    """Put file and line before every PatchfemError that names the key at fault and leaves the block."""
+    """Put file and line before every PatchfemError that names the key at fault, as it leaves the block."""
     try:
         yield
     except PatchfemError as error:

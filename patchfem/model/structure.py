@@ -34,7 +34,7 @@ def modes_of(scene) -> ModalBasis:
 
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
-    """The basis with a face per strip where modes yaw a patch in strips: strip at y slides by slide - y yaw."""
+    """The basis with one face per strip, where modes yaw a patch in strips: the strip at y slides by slide - y yaw."""
     if not yaws(scene):
         return found
     count, width = scene.contact.strips.count, scene.contact.width
@@ -126,7 +126,8 @@ def frequencies(scene, modes: ModalBasis) -> np.ndarray:
 
 
 def first_of(scene) -> tuple:
-    """(frequency [Hz], mass [kg]) of the first mode that is not rigid, without the bonded spring; 0 where all are.
+    """Frequency [Hz] and mass [kg] of the first mode that is not rigid, without the bonded spring; 0 where all are
+    rigid.
 
     mass: structure.moving_mass, or the modal mass at the output; where that mode leaves the output at rest, the mass of
     all coordinates. Masses and files have their modes in ascending order.
@@ -147,7 +148,7 @@ def first_of(scene) -> tuple:
 
 
 def start_of(scene, modes: ModalBasis):
-    """core.Start of a scene that does not begin at rest, else None."""
+    """Start of a scene that does not begin at rest, else None."""
     start, travel = start_state(scene, modes), scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
@@ -162,8 +163,11 @@ def yaws(scene) -> bool:
 
 
 def strip_rows(basis: ModalBasis, offsets) -> np.ndarray:
-    """(s, n): slide of strips at offsets y (s,) [m] from the middle, slide - y yaw (yaw > 0 turns +x to +y, so a piece
-    at +y goes back); a moment about +z on the upper piece is sum y f of the friction f that resists."""
+    """Slide (s, n) of strips at offsets y (s,) [m] from the middle: slide - y yaw.
+
+    yaw > 0 turns +x to +y, so a piece at +y goes back. A moment about +z on the upper piece is sum y f of the friction
+    f that resists.
+    """
     yaw = np.zeros(basis.slide.size) if basis.yaw is None else basis.yaw
     return basis.slide - np.outer(offsets, yaw)
 

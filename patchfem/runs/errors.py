@@ -1,4 +1,4 @@
-"""The one estimate of the errors of a run: coarser runs of the same model, and what their changes say.
+"""Errors of a run from coarser runs of the same model: one estimate for every engine.
 
 An engine names its ladder: rungs in which a run is coarser, in time, in space, in modes or in its sum over bonds. Every
 rung says which runs it takes and how their measures become an error. A run that several rungs take is made once.
@@ -12,9 +12,11 @@ from ..response.errors import change
 
 
 class Rung(NamedTuple):
-    """One way of being coarser. runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the
-    run beside, *values of the runs) -> error by measure; beside: the variant that they are compared with, None: the
-    run itself."""
+    """One way in which a run can be coarser.
+
+    runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the run beside, *values of the
+    runs) -> error by measure; beside: the variant that they are compared with, None: the run itself.
+    """
 
     runs: tuple
     rule: Callable
@@ -22,10 +24,10 @@ class Rung(NamedTuple):
 
 
 def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
-    """([error by measure name, ...] one per rung, seconds of the coarser runs).
+    """Errors by measure name, one dict per rung, and the seconds of the coarser runs.
 
-    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: Rungs; made:
-    variant -> run of those that are made already, filled.
+    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: Rungs; made: variant -> run, those
+    that are made already; it is filled.
     """
     begin, made = perf_counter(), {} if made is None else made
 
@@ -40,5 +42,5 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
 
 
 def space_rung(coarser, beside=None) -> Rung:
-    """The rung of a coarser mesh, fewer modes or narrower strips: their change is the error."""
+    """Rung of a coarser mesh, fewer modes or narrower strips, whose change is the error."""
     return Rung((coarser,), change, beside)

@@ -6,7 +6,7 @@ from ..friction.bonds.parameters import Bonds
 
 
 def element_fields(patch, found, states, length: float) -> tuple:
-    """(traction, irreversible local slip), both (f, m), of a Jenkins set in states [(slide, stretch), ...]."""
+    """Traction and irreversible local slip (f, m) of a Jenkins set in states [(slide, stretch), ...]."""
     m, weight = patch.x.size, patch.pieces.interface.weight
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
     for i, (slide, stretch) in enumerate(states):
@@ -19,7 +19,7 @@ def element_fields(patch, found, states, length: float) -> tuple:
 
 
 def point_fields(patch, law: Bonds, shear, states) -> tuple:
-    """(traction, irreversible local slip), both (f, m), of bond points in states [(slide, bonds (4, a)), ...]."""
+    """Traction and irreversible local slip (f, m) of bond points in states [(slide, bonds (4, a)), ...]."""
     m = patch.x.size
     index = np.arange(m) if shear is None else shear.points
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))

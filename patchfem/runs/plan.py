@@ -10,8 +10,11 @@ from ..model.source import placed
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """A model and what will be done with it. effects: names in the scene; steps: of the time loop, all passes;
-    seconds, bytes: estimates; chain: link -> stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences."""
+    """A model with the engine that will run it, its sizes and its cost.
+
+    effects: names in the scene; steps: of the time loop, all passes; seconds, bytes: estimates; chain: link ->
+    stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences.
+    """
 
     model: Model
     kind: str
@@ -88,7 +91,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
 
 def _bonds(model: Model) -> dict:
-    """The last link of the stiffness chain: bonds, or slip."""
+    """Last link of the stiffness chain: bonds, or slip."""
     f, load = model.friction, model.nominal_load
     if f is None or not load > 0:
         return {}

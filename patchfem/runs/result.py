@@ -1,4 +1,4 @@
-"""What a run found, and the parts of it that every kind of run shares."""
+"""The result of a run, with the parts that every kind of run shares."""
 
 from dataclasses import dataclass, replace
 
@@ -13,8 +13,11 @@ FRAMES = 16  # of the interface, in the last cycle
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Result:
-    """Everything a run found. measures: name -> Measure; response: kept histories or None; patch: the solved patch or
-    None; fields: (frame, x) arrays by name with `time`; seconds by part; extra: engine, steps, notes for the report."""
+    """Everything that a run found.
+
+    measures: name -> Measure; response: kept histories or None; patch: the solved patch or None; fields: (frame, x)
+    arrays by name with `time`; seconds by part; extra: engine, steps, notes for the report.
+    """
 
     plan: Plan
     outcome: Outcome
@@ -35,12 +38,12 @@ class Result:
 
 
 def worded(measures: dict, apart: str) -> dict:
-    """The measures with what each of them means; apart: what a number behind a name counts, interfaces or strips."""
+    """The measures with their meanings; apart: the thing that a number behind a name counts, interfaces or strips."""
     return {name: replace(m, text=meaning(name, apart)) for name, m in measures.items()}
 
 
 def meaning(name: str, apart: str = "interface") -> str:
-    """What a measure means, by its name in a summary: slip_amplitude_2 is that of the second interface."""
+    """Meaning of a measure by its name in a summary; slip_amplitude_2 is that of the second interface."""
     if name in STATIC:
         return STATIC[name].text
     from ..response.rows import of_first, row_of  # a static patch needs none of them
@@ -91,7 +94,7 @@ def without_errors(found: dict, estimate: bool) -> dict:
 
 
 def unripe(law, speed: float) -> list:
-    """The warning of a printed law whose bonds break before they are grown."""
+    """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
     from ..friction.bonds.parameters import ripening
 
     a = ripening(law, speed) if law.reading == "report" else 0.0
@@ -102,7 +105,7 @@ def unripe(law, speed: float) -> list:
 
 
 def creeping(law, outcome, found) -> list:
-    """The warning of a bounded motion whose middle moves on: Dahl's creep, not a property of the joint."""
+    """Warning of a bounded motion whose middle moves on, as a list: Dahl's creep, not a property of the joint."""
     drift = found.get("drift_per_cycle")
     if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []

@@ -1,4 +1,4 @@
-"""The page where the pillars meet: plan(scene) says what would run, run(plan) runs it."""
+"""A run from its plan to its result: plan(scene) says what would run, run(plan) runs it."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -18,9 +18,10 @@ __all__ = ["Plan", "Result", "plan", "run"]
 def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
-    say: called with one line when the hub compiles; progress: with the done share of the main pass. per_point forces
-    the path of every interface point where one lumped point would do; estimate=False skips the re-runs and leaves
-    errors None; fresh condenses the pieces anew. NotConverged and Missing as named by the stages.
+    say: called with one line when compiled code has to be made; progress: called with the share of the main pass that
+    is done. per_point forces the path of every interface point where one lumped point would do; estimate=False skips
+    the coarser runs and leaves the errors None; fresh condenses the pieces anew. NotConverged and Missing as named by
+    the stages.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
     with placed(what.model.source):
@@ -66,7 +67,7 @@ def _unloaded(model: Model) -> bool:
 
 
 def _loose(result: Result) -> list:
-    """One warning per measure whose error exceeds tolerance * |value| + floor, all in one line."""
+    """Warnings of the measures whose error exceeds tolerance * |value| + floor, all in one line."""
     model = result.plan.model
     tolerance, asked, remedies = model.accuracy.tolerance, model.patch, []
     wide = [name for name, m in result.measures.items()

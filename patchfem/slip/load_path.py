@@ -12,12 +12,12 @@ AHEAD = 1e-9  # share of the rest of a leg at which the next contact set is look
 
 def load_path(state: SlipState, operators: Operators, steps, friction: float,
               follow: bool | None = None) -> tuple:
-    """The states at the end of each of `steps`, between which loads, motions and gap run straight.
+    """States of a pair at the end of each of `steps`, between which loads, motions and gap run straight.
 
-    follow (None: for alike pieces): an increment ends wherever a node enters or leaves the contact, so that it starts
-    its slip from there. Without it there is one increment to a step, and what an entering node moves before it touches
-    counts as slip: an error of the first order in the step. PatchfemError for `follow` with unlike pieces, else as
-    `advance`.
+    follow (None: for alike pieces): an increment ends wherever a node enters or leaves the contact, so that the node
+    starts its slip from there. Without it there is one increment to a step. What an entering node moves before it
+    touches then counts as slip, an error of the first order in the step. PatchfemError for `follow` with unlike pieces,
+    else as `advance`.
     """
     follow = operators.coupling is None if follow is None else follow
     if follow and operators.coupling is not None:
@@ -32,7 +32,7 @@ def load_path(state: SlipState, operators: Operators, steps, friction: float,
 
 
 def _between(state: SlipState, operators: Operators, step: Step):
-    """The step at a share of the leg from `state` to `step`."""
+    """The Step at a share of the way from `state` to `step`."""
     end = state.gap if step.gap is None else np.asarray(step.gap, float)
     moment = float(state.normal_force @ operators.x) - step.spring * state.rotation
 
@@ -48,7 +48,7 @@ def _between(state: SlipState, operators: Operators, step: Step):
 
 
 def _cuts(state: SlipState, operators: Operators, step: Step) -> list:
-    """Steps at which the contact set changes along a leg, in order, the end of the leg left out."""
+    """Steps at which the contact set changes on the way to `step`, in order, the end left out."""
     at = _between(state, operators, step)
     share, active, out = 0.0, state.active, []
     if step.load is None and not active.any():
@@ -71,7 +71,7 @@ def _cuts(state: SlipState, operators: Operators, step: Step) -> list:
 
 
 def _touch(first: Step, last: Step) -> float:
-    """Share of the leg at which pieces that are apart touch."""
+    """Share of the way after which pieces that are apart touch."""
     before, after = first.gap - first.approach, last.gap - last.approach
     if after.min() >= 0:
         return 1.0
@@ -80,7 +80,7 @@ def _touch(first: Step, last: Step) -> float:
 
 
 def _rates(operators: Operators, here: Step, end: Step, rest: float, active) -> tuple:
-    """Contact set just after a cut, its forces and openings there and their change over the leg, both (m,)."""
+    """Contact set just after a cut, and how forces and openings (m,) change over the rest of the way."""
     x, kept = operators.x, operators.inverse("normal")
 
     def loads(step):

@@ -1,13 +1,14 @@
 """Partial slip under a tangential force: Coulomb friction node by node on the condensed interface, with its history.
 
-State of a node: the slip s it has made (upper - lower, Mindlin's memory). Under new loads, with the slide q of the
-holders, normal forces f, shear forces t (resistance to slip > 0) and the gap g (tilt included),
+The state of a node is the slip s it has made (upper - lower, Mindlin's memory). Under new loads, with the slide q of
+the holders, normal forces f, shear forces t (resistance to slip > 0) and the gap g (tilt included),
 
     0 <= f, w = g + theta x - delta + C_nn f + C_nt t >= 0, f.w = 0;
     e = q - C_tt t - C_nt^T f - s, |t| <= mu f, e.t >= 0, e = 0 where |t| < mu f; s := s + e.
 
-An open node follows the pieces and so forgets. An increment is exact while no node enters or leaves the contact and
-no slip zone shrinks within it (any stroke at constant load and gap); `slip_path.load_path` cuts it where nodes enter.
+An open node follows the pieces and so forgets its slip. An increment is exact while no node enters or leaves the
+contact and no slip zone shrinks within it; that holds for any stroke at constant load and gap. `load_path` cuts an
+increment where nodes enter.
 """
 
 from dataclasses import dataclass, field
@@ -27,9 +28,12 @@ EVEN = 1e-12  # share of mu N within which a shear load counts as all that frict
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Operators:
-    """The pair for normal and shear forces. x (m,) [m]; normal, tangential (m, m) [m/N] as in `core.Compliance`;
-    coupling (m, m) [m/N]: closing undone per shear force, `substructure.joined`, None for alike pieces.
-    kept: inverses on the last contact set; no answer depends on them."""
+    """Compliance of a pair for normal and shear forces.
+
+    x: (m,) [m]; normal, tangential: (m, m) [m/N] as in `core.Compliance`; coupling: (m, m) [m/N], closing undone per
+    shear force as in `substructure.joined`, None for alike pieces; kept: inverses on the last contact set, which no
+    answer depends on.
+    """
 
     x: np.ndarray
     normal: np.ndarray
@@ -38,7 +42,7 @@ class Operators:
     kept: dict = field(default_factory=dict, repr=False)
 
     def inverse(self, name: str) -> Kept:
-        """The kept inverse of "normal", "tangential" or "both" (2m, 2m)."""
+        """The kept inverse of the operator "normal", "tangential" or "both" (2m, 2m)."""
         if name not in self.kept:
             full = getattr(self, name) if name != "both" else \
                 np.block([[self.normal, self.coupling], [self.coupling.T, self.tangential]])
@@ -47,8 +51,10 @@ class Operators:
 
 
 def operators_of(pieces: Compliance, coupling: np.ndarray | None = None) -> Operators:
-    """Operators of a pair; a coupling (m, m) [m/N] that is zero throughout is dropped. PatchfemError for a shape or a
-    value that cannot be."""
+    """Operators of a pair; a coupling (m, m) [m/N] that is zero throughout is dropped.
+
+    PatchfemError for a shape or a value that cannot be.
+    """
     if coupling is not None:
         coupling = frozen_array(coupling)
         if coupling.shape != pieces.normal.shape or not np.isfinite(coupling).all():
@@ -59,9 +65,11 @@ def operators_of(pieces: Compliance, coupling: np.ndarray | None = None) -> Oper
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Step:
-    """Loads at the end of one increment: load [N] (with moment [N m] about the middle the upper piece is free to
-    rotate, against spring [N m/rad]) or approach [m]; shear [N] or slide [m]; gap (m,) [m] with its tilt, None: the
-    last one."""
+    """Loads and motions at the end of one increment.
+
+    load [N], or approach [m]; moment [N m] about the middle: the upper piece is then free to rotate, against spring [N
+    m/rad]; shear [N] or slide [m]; gap: (m,) [m] with its tilt, None: the last one.
+    """
 
     load: float | None = None
     approach: float | None = None
@@ -74,9 +82,12 @@ class Step:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SlipState:
-    """A solved state. normal_force, shear_force (m,) [N]; slip (m,) [m] made so far; slipping (m,): -1, 0, 1 in the
-    last increment; gap (m,) [m] as given; approach, slide [m], rotation [rad] of the upper holder beyond the gap;
-    friction [1]; dissipated [J] since the start; iterations: sets tried; residuals: relative, each <= 1e-10."""
+    """A solved state of partial slip.
+
+    normal_force, shear_force: (m,) [N]; slip: (m,) [m] made so far; slipping: (m,) -1, 0 or 1 in the last increment;
+    gap: (m,) [m] as given; approach, slide [m] and rotation [rad] of the upper holder beyond the gap; friction [1];
+    dissipated [J] since the start; iterations: sets tried; residuals: relative, each <= 1e-10.
+    """
 
     normal_force: np.ndarray
     shear_force: np.ndarray
@@ -93,22 +104,22 @@ class SlipState:
 
     @property
     def load(self) -> float:
-        """Normal resultant [N]."""
+        """Resultant of the normal forces [N]."""
         return float(self.normal_force.sum())
 
     @property
     def shear(self) -> float:
-        """Shear resultant [N], resistance to slip > 0."""
+        """Resultant of the shear forces [N], resistance to slip > 0."""
         return float(self.shear_force.sum())
 
     @property
     def active(self) -> np.ndarray:
-        """(m,) bool: the contact set."""
+        """Contact set (m,) bool: the nodes that carry."""
         return self.normal_force > 0
 
 
 def start(operators: Operators, gap: np.ndarray, slide: float = 0.0) -> SlipState:
-    """The pieces at rest, apart by a hair at their nearest node, no slip made; gap (m,) [m] with its tilt."""
+    """The pieces at rest, a hair apart at their nearest node, before any slip; gap (m,) [m] with its tilt."""
     gap = np.asarray(gap, float)
     if gap.shape != operators.x.shape or not (np.isfinite(gap).all() and np.isfinite(slide)):
         raise PatchfemError(f"contact: the gap must be {operators.x.shape} finite heights and the slide finite")
@@ -123,10 +134,10 @@ def _state(normal, shear, slip, sign, gap, approach, rotation, slide, friction, 
 
 
 def advance(state: SlipState, operators: Operators, step: Step, friction: float) -> SlipState:
-    """The state after one increment to the loads of `step`, friction mu >= 0.
+    """Advance the state by one increment to the loads of `step`, with the coefficient of friction mu >= 0.
 
-    PatchfemError for a step without a meaning and, under `shear`, for gross slip, |shear| > mu N (at mu N itself the
-    slide is the least with every node slipping). NotConverged where a residual exceeds 1e-10 or, for unlike pieces,
+    PatchfemError for a step without a meaning and, under `shear`, for gross slip, |shear| > mu N; at mu N itself the
+    slide is the least with every node slipping. NotConverged where a residual exceeds 1e-10 or, for unlike pieces,
     where mu times the coupling allows several answers.
     """
     _meant(step, operators, friction)
@@ -179,7 +190,7 @@ def _held(shear: float | None, most: float) -> None:
 
 
 def _parted(state, gap, step, friction) -> SlipState:
-    """No contact: nothing is carried and every node follows the holder."""
+    """State without contact: nothing is carried and every node follows the holder."""
     _held(step.shear, 0.0)
     slide = state.slide if step.slide is None else step.slide
     approach = float(gap.min()) if step.approach is None else step.approach
@@ -195,7 +206,7 @@ def _target(gap, step) -> tuple:
 
 
 def _alike(state, operators, gap, step, friction) -> tuple:
-    """Pressure first, then the shear under its limits."""
+    """State of alike pieces: pressure first, then the shear under its limits."""
     lowered, target = _target(gap, step)
     try:
         normal, motion, count = press_forces(operators.inverse("normal"), operators.x, lowered, target, state.active,
@@ -247,8 +258,8 @@ def slip_residuals(operators: Operators, slip, gap, normal, shear, approach: flo
                    step: Step, friction: float) -> dict:
     """Relative residuals of an increment from the slip (m,) before it, by the definition alone.
 
-    Those of `unilateral.residuals`, shear_balance, cone (|t| over mu f), stick (motion e of nodes below the cone) and
-    direction (e against t on the cone), both relative to the slide that friction can bend in.
+    Keys: those of `unilateral.residuals`; shear_balance; cone (|t| over mu f); stick (motion e of nodes below the cone)
+    and direction (e against t on the cone), both relative to the slide that friction can bend in.
     """
     x, touching = operators.x, normal > 0
     bent, made = operators.tangential @ shear, slip

@@ -1,9 +1,9 @@
 """Active sets of partial slip: which node is open, sticks or slips, on operators whose inverse follows the set.
 
-Slip increment of node i: e_i = q - s_i - (C_tt t)_i - (C_nt^T f)_i with s the slip it has already made. Coulomb:
-|t_i| <= mu f_i, e_i = 0 where the node sticks, e_i t_i >= 0 and |t_i| = mu f_i where it slips. Here C_nt = 0: pressure
-first, then the shear, a convex program; a set that is visited twice hands over to a slower method that ends.
-`slip_unlike` solves both together.
+Slip increment of node i: e_i = q - s_i - (C_tt t)_i - (C_nt^T f)_i, with s the slip it has already made. Coulomb: |t_i|
+<= mu f_i, e_i = 0 where the node sticks, e_i t_i >= 0 and |t_i| = mu f_i where it slips. Here C_nt = 0, so pressure
+comes first, then the shear, a convex program. A set that is visited twice hands over to a slower method that ends.
+`unlike` solves pressure and shear together.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ MOST = 100  # sets tried before the slower method
 
 
 class Kept:
-    """Block of a symmetric positive definite operator on a set of nodes, and its inverse, kept from call to call.
+    """Inverse of a symmetric positive definite operator on a set of nodes, kept from call to call.
 
     A few nodes more or less cost a low-rank update, O(n^2) each; the same set costs nothing.
     """
@@ -29,7 +29,7 @@ class Kept:
         self.block = self.inverse = np.zeros((0, 0))
 
     def on(self, index: np.ndarray) -> tuple:
-        """(block, inverse), each (n, n), of the operator on the sorted nodes `index` (n,)."""
+        """Block of the operator on the sorted nodes `index` (n,) and its inverse, (n, n) each."""
         if not np.array_equal(index, self.index):
             gone = np.isin(self.index, index, invert=True)
             new = np.setdiff1d(index, self.index, assume_unique=True)
@@ -67,12 +67,13 @@ class Kept:
 
 
 def rigid_columns(x, count: int) -> np.ndarray:
-    """(m, count): motions (), (approach,) or (approach, -rotation)."""
+    """Rigid motions (m, count) of the upper holder: none, approach, or approach and minus rotation."""
     return np.stack([np.ones(x.size), x], axis=1)[:, :count]
 
 
 def press_forces(kept: Kept, x, gap, target, active, spring: float = 0.0) -> tuple:
-    """Normal forces (m,), motions and sets tried as `unilateral.solve_forces`, on an inverse that follows the set."""
+    """Normal forces (m,) [N], motions and sets tried, as `unilateral.solve_forces`, on an inverse that follows the
+    set."""
     rigid = rigid_columns(x, target.size)
     active = active.copy() if active.sum() >= max(1, target.size) else np.zeros(0, bool)
     seen = set()
@@ -114,10 +115,10 @@ def _sole(kept, index, gap, rigid, target, spring):
 # ---- the shear alone, normal forces given
 
 def bounded_shear(kept: Kept, index, reference, limit, sign, total=None, slide=None) -> tuple:
-    """Shear forces (n,), slide and signs of the slipping nodes of a contact set under known limits mu f.
+    """Shear forces of a contact set under known limits mu f, with the slide and the signs of the slipping nodes.
 
-    index (n,) nodes, reference (n,) s + C_nt^T f [m], limit (n,) > 0 [N], sign (n,) of a neighbouring answer in
-    -1, 0, 1; either `total` [N], smaller in size than sum(limit), or `slide` [m]. Also returns the sets tried.
+    index: (n,) nodes; reference: (n,) s + C_nt^T f [m]; limit: (n,) > 0 [N]; sign: (n,) -1, 0, 1 of a neighbouring
+    answer; either `total` [N], smaller in size than sum(limit), or `slide` [m]. Also returns the sets tried.
     """
     block, inverse = kept.on(index)
     sign, seen = sign.copy(), set()
@@ -139,7 +140,8 @@ def bounded_shear(kept: Kept, index, reference, limit, sign, total=None, slide=N
 
 
 def _stroke(block, inverse, zero, one, reference, limit, sign, total, slide):
-    """Forces of the sticking nodes and the slide for given signs, by the smaller of both systems, refined once."""
+    """Forces of the sticking nodes and the slide for given signs, by the smaller of the two linear systems, refined
+    once."""
     slips = sign != 0
     stuck = ~slips
     fixed = sign[slips] * limit[slips]
@@ -175,7 +177,10 @@ def _stroke(block, inverse, zero, one, reference, limit, sign, total, slide):
 
 
 def _one_by_one(block, reference, limit, total, slide) -> tuple:
-    """The convex program min t.C t/2 + t.(s - q) in the box, one node at a time: the energy falls, so it ends."""
+    """Slower method: the convex program min t.C t/2 + t.(s - q) in the box, one node at a time.
+
+    The energy falls at every step, so it ends.
+    """
     n = limit.size
     force = np.zeros(n) if total is None else total / limit.sum() * limit
     sign = np.zeros(n, np.int8)

@@ -1,13 +1,14 @@
-"""Partial slip of the patch under one rigid slide q of the holders: the pieces' shear compliance made cheap.
+"""Partial slip of the patch under one rigid slide q of the holders: two cheap forms of the pieces' shear compliance.
 
-Point i feels the local slide q - sum_j C_ij f_j. Two reductions, both of the contact set only:
+Point i feels the local slide q - sum_j C_ij f_j. Both forms hold for the contact set only:
 
-* Points that yield at a fixed force D_i (Coulomb, elastic-plastic at constant load and tilt) are together exactly a
-  set of parallel Jenkins elements, because the inverse of C has off-diagonals <= 0 and row sums > 0, so slip zones
-  only grow within a stroke (Masing). Corner nodes of bilinear cells can have a small negative row sum: such a node
-  holds on until its neighbours have slipped, which costs 1e-9 of the friction limit at 201 nodes, 4e-8 at 401 (six
-  such nodes with 1.4 % of the load: leaving them out would cost that).
-* Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight: a few carry the resultant.
+* Points that yield at a fixed force D_i (Coulomb, or elastic-plastic at constant load and tilt) are together exactly a
+set of parallel Jenkins elements. The inverse of C has off-diagonals <= 0 and row sums > 0, so slip zones only grow
+within a stroke (Masing). Corner nodes of bilinear cells can have a small negative row sum; such a node holds on until
+its neighbours have slipped. That costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401. Leaving such nodes out
+would cost their load, 1.4 % for the six of that patch.
+
+* Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight. A few modes carry the resultant.
 """
 
 from dataclasses import dataclass
@@ -22,11 +23,12 @@ SHEAR_MODES = 8  # modes a shear reduction starts from
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JenkinsSet:
-    """Parallel elements: stiffness (t,) [N/m], yield slide (t,) [m]; sum stiffness*yield_slide = friction limit.
+    """Parallel Jenkins elements: springs that slip at a yield slide.
 
-    points: (a,) nodes of the contact set, limit: (a,) their yield forces [N]; share (a, t) [N/m]: the force of a point
-    is share @ stretch for any history. reluctant: nodes that at first carry the wrong sign. error: largest error of
-    the resultant over the histories it was `merged` for, relative to the friction limit.
+    stiffness: (t,) [N/m]; yield_slide: (t,) [m]; sum stiffness * yield_slide = friction limit. points: (a,) nodes of
+    the contact set; limit: (a,) their yield forces [N]; share: (a, t) [N/m], the force of a point is share @ stretch
+    for any history. reluctant: nodes that at first carry the wrong sign. error: largest error of the resultant over the
+    histories it was `merged` for, relative to the friction limit.
     """
 
     stiffness: np.ndarray
@@ -40,9 +42,12 @@ class JenkinsSet:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ShearModes:
-    """points: (a,) indices of the contact set; shape: (a, r) slide of a point per unit mode coordinate;
-    stiffness: (r,) [N/m] of the coordinates; backbone_error: worst error of the resultant [1] against 64 modes, or four
-    times as many as are kept."""
+    """The most compliant shear modes of the pieces.
+
+    points: (a,) indices of the contact set; shape: (a, r) slide of a point per unit mode coordinate; stiffness: (r,)
+    [N/m] of the coordinates; backbone_error: worst error of the resultant [1] against 64 modes, or four times as many
+    as are kept.
+    """
 
     points: np.ndarray
     shape: np.ndarray
@@ -53,7 +58,7 @@ class ShearModes:
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
     """Exact parallel elements of points that yield at `limit` (m,) [N] behind the compliance (m, m) [m/N].
 
-    `local_length` [m]: bond length of the elastic-plastic law (3.12), local stiffness limit/length in series; 0 for
+    local_length [m]: bond length of the elastic-plastic law (3.12), a local stiffness limit/length in series; 0 for
     Coulomb points. PatchfemError when no point carries load.
     """
     limit = np.asarray(limit, float)
@@ -97,12 +102,15 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
 def merged(group: JenkinsSet, tolerance: float, nested: bool = True) -> JenkinsSet:
     """The fewest elements whose resultant stays within `tolerance` (relative to the friction limit) of `group`.
 
-    Neighbours in yield slide become one of their total stiffness and mean yield slide, so the friction limit, the
-    initial stiffness and the limit of every point stay exact. The virgin stroke of a merged run of elements then lies
-    above theirs by one hump of height h at the mean. Masing: a history with turning points adds d(q_1) - 2 d(z_1) +
-    2 d(z_2) - ... at falling strokes z, with d the sum of the humps. One hump gives at most 2h, whatever the history;
-    a loop without loops inside 2 max(h); turning points inside one another, one for each hump, reach 2 sum(h), and no
-    more. `nested` keeps the last within the tolerance, without it the one before. PatchfemError unless tolerance > 0.
+    Neighbours in yield slide become one element of their total stiffness and mean yield slide, so the friction limit,
+    the initial stiffness and the limit of every point stay exact. The virgin stroke of a merged run of elements then
+    lies above theirs by one hump of height h at the mean. By Masing a history with turning points adds d(q_1) - 2
+    d(z_1) + 2 d(z_2) - ... at falling strokes z, with d the sum of the humps. One hump gives at most 2h, whatever the
+    history. A cycle without a smaller cycle inside gives at most 2 max(h). Turning points inside one another, one for
+    each hump, give at most 2 sum(h).
+
+    nested: keep the last of these bounds within the tolerance; without it the one before. PatchfemError unless
+    tolerance > 0.
     """
     if not tolerance > 0:
         raise PatchfemError(f"accuracy.tolerance: merging elements wants a tolerance > 0, got {tolerance}")
@@ -119,7 +127,7 @@ def merged(group: JenkinsSet, tolerance: float, nested: bool = True) -> JenkinsS
 
 
 def _humps(stiffness, reach) -> np.ndarray:
-    """(t, t + 1): largest error [N] of the virgin stroke of elements i to j - 1 as one; inf where j <= i."""
+    """Largest error [N] of the virgin stroke of elements i to j - 1 as one, (t, t + 1); inf where j <= i."""
     count = reach.size
     stiff = np.concatenate([[0.0], np.cumsum(stiffness)])
     bound = np.concatenate([[0.0], np.cumsum(stiffness * reach)])
@@ -160,8 +168,8 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
                 weakening: float = 1.0) -> ShearModes:
     """The `count` most compliant modes of D^1/2 C D^1/2 for points whose bonds have the stiffness limit/bond_length.
 
-    tangential (m, m) [m/N], limit D (m,) [N], bond_length [m]; weakening = static over kinetic friction.
-    PatchfemError where a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
+    tangential: (m, m) [m/N]; limit: D (m,) [N]; bond_length [m]; weakening: static over kinetic friction. PatchfemError
+    where a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
     """
     index = np.flatnonzero(limit > 0)
     root = np.sqrt(limit[index])
@@ -191,7 +199,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
 
 def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int, tolerance: float,
                  weakening: float = 1.0, most: int = 64) -> ShearModes:
-    """`shear_modes` with the fewest modes, doubled from `count` up to `most`, whose backbone error meets `tolerance`.
+    """The fewest `shear_modes` whose backbone error meets `tolerance`, doubled from `count` up to `most`.
 
     A soft skin spreads the compliance over many modes; the pieces alone need eight.
     """
@@ -222,17 +230,17 @@ def _backbone(limit, shape, values, length, slides) -> np.ndarray:
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
-    """dT/d(slide) [N/m] with every node of the contact set sticking; active (m,) bool."""
+    """Tangential stiffness dT/d(slide) [N/m] with every node of the contact set sticking; active (m,) bool."""
     index = np.flatnonzero(active)
     return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
 
 
 def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:
-    """-dM/d(rotation) [N m/rad] about x = 0 at fixed approach and fixed contact set; x (m,) [m]."""
+    """Rotational stiffness -dM/d(rotation) [N m/rad] about x = 0 at fixed approach and contact set; x (m,) [m]."""
     index = np.flatnonzero(active)
     return float(np.linalg.solve(normal[np.ix_(index, index)], x[index]) @ x[index])
 
 
 def normal_stiffness(normal: np.ndarray, active: np.ndarray) -> float:
-    """dN/d(approach) [N/m] at fixed rotation and fixed contact set."""
+    """Normal stiffness dN/d(approach) [N/m] at fixed rotation and contact set."""
     return tangential_stiffness(normal, active)

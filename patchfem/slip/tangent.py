@@ -1,4 +1,4 @@
-"""The stiffness of a solved patch against its three holder motions, contact set and slip zones as they are."""
+"""Stiffness of a solved patch against the three motions of its holder, with contact set and slip zones as they are."""
 
 from dataclasses import dataclass
 
@@ -11,34 +11,39 @@ from .partial_slip import Operators
 
 @dataclass(frozen=True, eq=False, slots=True)
 class OperatingTangent:
-    """matrix (3, 3): change of shear T [N], load N [N], moment M [N m] (rows) per slide [m], approach [m], rotation
-    [rad] > 0 that opens +x (columns). Without slip (T, N, -M) against these motions is symmetric; slipping nodes carry
-    mu dN and make it unsymmetric in T only for alike pieces."""
+    """Tangent of a solved patch.
+
+    matrix: (3, 3) change of shear T [N], load N [N] and moment M [N m] (rows) per slide [m], approach [m] and rotation
+    [rad] > 0 that opens +x (columns). Without slip (T, N, -M) against these motions is symmetric. Slipping nodes carry
+    mu dN, which makes it unsymmetric in T only for alike pieces.
+    """
 
     matrix: np.ndarray
 
     @property
     def tangential(self) -> float:
-        """K_t = dT/d(slide) [N/m] at held approach and rotation."""
+        """Tangential stiffness K_t = dT/d(slide) [N/m] at held approach and rotation."""
         return float(self.matrix[0, 0])
 
     @property
     def normal(self) -> float:
-        """K_n = dN/d(approach) [N/m] at held slide and rotation."""
+        """Normal stiffness K_n = dN/d(approach) [N/m] at held slide and rotation."""
         return float(self.matrix[1, 1])
 
     @property
     def rotational(self) -> float:
-        """-dM/d(rotation) [N m/rad] > 0: the moment that resists the rotation, at held approach and slide."""
+        """Rotational stiffness -dM/d(rotation) [N m/rad] > 0 at held approach and slide: the moment that resists the
+        rotation."""
         return float(-self.matrix[2, 2])
 
 
 def operating_tangent(operators: Operators, active, slipping=None, friction: float = 0.0, skin_normal=None,
                       skin_tangential=None) -> OperatingTangent:
-    """Tangent of a state: active (m,) bool contact set, slipping (m,) -1, 0, 1 (None: all stick), friction mu.
+    """Tangent of a state of contact and slip.
 
-    skin_normal, skin_tangential (m,) [N/m] > 0: tangent stiffness of each node's asperities in series, None: rigid.
-    No contact gives zeros. PatchfemError for a skin without stiffness, NotConverged where slip makes it singular.
+    active: (m,) bool contact set; slipping: (m,) -1, 0, 1, None where all stick; friction: mu; skin_normal,
+    skin_tangential: (m,) [N/m] > 0, tangent stiffness of each node's asperities in series, None where rigid. No contact
+    gives zeros. PatchfemError for a skin without stiffness, NotConverged where slip makes the tangent singular.
     """
     index = np.flatnonzero(active)
     sign = np.zeros(index.size) if slipping is None else np.asarray(slipping, float)[index]

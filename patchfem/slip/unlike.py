@@ -1,8 +1,9 @@
 """Partial slip of unlike pieces: shear opens and closes the gap, so pressure and shear are found together.
 
-Newton on the sets open, stick, slip of `slip_sets`; where it comes back to a set it has seen, a part of the increment
-is solved first, and last the normal and the shear problem take turns. Friction makes the system unsymmetric: once mu
-times the coupling is so strong that its determinant is not positive, the answer is not the only one and is refused.
+Newton's method works on the sets open, stick and slip of `sets`. Where it comes back to a set it has seen, a part of
+the increment is solved first; at last the normal and the shear problem take turns. Friction makes the system
+unsymmetric. Once mu times the coupling is so strong that its determinant is not positive, the answer is not the only
+one and is refused.
 """
 
 import numpy as np
@@ -13,12 +14,13 @@ from .sets import MOST, ROUND, Kept, bounded_shear, press_forces, rigid_columns
 
 
 def coupled_forces(both: Kept, x, leg, reference, friction: float, spring: float, active, sign) -> tuple:
-    """(f, t, motions, slide, signs, sets tried) of unlike pieces by Newton on the sets open, stick, slip.
+    """Forces of unlike pieces by Newton's method on the sets open, stick and slip.
 
-    both: operator (2m, 2m) of normal and shear forces; leg(share): (gap, target, total, slide) of the increment from 0
-    to 1, gap and target as in `solve_forces`, total [N] or slide [m] None; reference (m,) slip made; active, sign (m,)
-    of the answer at 0. Where |total| is all that friction allows every node slips and the slide is the least that does
-    it. NotConverged by name where more than one answer is possible.
+    Returns (f, t, motions, slide, signs, sets tried). both: operator (2m, 2m) of normal and shear forces; leg(share):
+    (gap, target, total, slide) of the increment from 0 to 1, gap and target as in `solve_forces`, total [N] or slide
+    [m] None; reference: (m,) slip made; active, sign: (m,) of the answer at 0. Where |total| is all that friction
+    allows every node slips, and the slide is the least that does it. NotConverged by name where more than one answer is
+    possible.
     """
     share, step, count = 0.0, 1.0, 0
     while step >= 1 / 64:  # sets that are visited twice: come nearer by a part of the increment
@@ -36,7 +38,7 @@ def coupled_forces(both: Kept, x, leg, reference, friction: float, spring: float
 
 
 def _locked(total, target, friction: float) -> int:
-    """+-1 where a shear load is all that friction allows."""
+    """Sign of a shear load that is all that friction allows, else 0."""
     full = total is not None and target.size > 0 and abs(total) >= friction * target[0] * (1 - 1e-12)
     return int(np.sign(total)) if full else 0
 
@@ -90,7 +92,8 @@ _UNSETTLED = "contact: stick and slip of the unlike pieces did not settle" + _ST
 
 
 def _newton(both, index, gap, reference, rigid, friction, target, spring, total, slide, sign):
-    """One linear problem: w = 0 on the set, e = 0 where it sticks, t = sign mu f where it slips; None if singular."""
+    """Solve one linear problem: w = 0 on the set, e = 0 where it sticks, t = sign mu f where it slips; None if
+    singular."""
     m, n = gap.size, index.size
     pair = np.concatenate([index, m + index])
     block, inverse = both.on(pair)
@@ -154,8 +157,10 @@ def _newton(both, index, gap, reference, rigid, friction, target, spring, total,
 
 
 def _alternate(both, x, gap, target, total, slide, reference, friction, spring) -> tuple:
-    """Normal problem under the last shear and shear problem under the last pressure in turn: a contraction while
-    friction times coupling is small."""
+    """Normal problem under the last shear and shear problem under the last pressure, in turn.
+
+    That is a contraction while friction times coupling is small.
+    """
     m = x.size
     normal, tangential = Kept(both.full[:m, :m]), Kept(both.full[m:, m:])
     coupling, locked = both.full[:m, m:], _locked(total, target, friction)

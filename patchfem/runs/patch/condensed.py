@@ -16,12 +16,12 @@ LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Pair:
-    """Two pieces condensed to their interface; everything about them that no load and no shape changes.
+    """Two pieces condensed to their interface; nothing of it depends on a load or a shape.
 
-    grid, piece: the lower piece, upper_grid, upper: the other one, the same objects where the pieces are alike;
-    TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all pairs together; closing
-    (m, m): normal closing per shear force on the interface [m/N], zero for like pieces. joint: the Mortar of pieces
-    whose interface nodes do not match, else None; rise (m,): gap [m] that rounded interfaces leave by themselves.
+    grid, piece: the lower piece; upper_grid, upper: the other one, the same objects where the pieces are alike;
+    TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all pairs together; closing: (m,
+    m) normal closing per shear force on the interface [m/N], zero for alike pieces. joint: the Mortar of pieces whose
+    interface nodes do not match, else None; rise: (m,) gap [m] that rounded interfaces leave by themselves.
     """
 
     grid: object
@@ -40,7 +40,7 @@ class Pair:
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
     def forces(self, nodal) -> tuple:
-        """(on the lower, on the upper piece): nodal forces (..., m) of the interface carried to each piece's nodes."""
+        """Nodal forces (..., m) of the interface carried to the nodes of the lower and of the upper piece."""
         if self.joint is None:
             return nodal, nodal
         return self.joint.forces(nodal)
@@ -56,7 +56,7 @@ def finite_elements(body, layers: Layers):
 
 
 def compliance_of(body, piece, fresh: bool) -> tuple:
-    """(nn, tt, nt) of one piece; that of a large one from the cache of operators unless `fresh`."""
+    """Compliances (nn, tt, nt) of one piece; those of a large one come from the cache on disk unless `fresh`."""
     condense, large = interface_compliance, body.x.size >= LEAST_CACHED
     if not isinstance(body, TensorGrid):
         from ...elasticity.substructure import condense

@@ -23,7 +23,7 @@ DECISIVE = ("pressure_peak", "contact_fraction", "normal_stiffness", "rotation")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Base:
-    """What the coarsest grids are made from: the layout of their columns, the growth of their rows."""
+    """Recipe of the coarsest grids: the layout of their columns and the growth of their rows."""
 
     layout: Layout
     growth: float = GROWTH
@@ -34,11 +34,12 @@ class Base:
 
 
 def solve_graded(asked, tolerance: float, fresh: bool = False) -> tuple:
-    """(Patch, on the mesh with cells twice as long, four times as long) where every decisive measure has the tolerance.
+    """Press a patch on a mesh whose decisive measures have the tolerance, and on two coarser ones.
 
-    Three meshes tell by how much their cells must shrink: they are halved, or all three are made anew where less is
-    enough. A measure that the largest affordable mesh would not bring to the tolerance, the singular peak of a step
-    say, asks for nothing; a warning of the run names it.
+    Returns the Patch on that mesh, with cells twice as long and four times as long. Three meshes tell by how much their
+    cells must shrink. They are halved, or all three are made anew where less is enough. A measure that the largest
+    affordable mesh would not bring to the tolerance, such as the singular peak of a step, asks for nothing; a warning
+    of the run names it.
     """
     base = _affordable(asked, _base(asked, tolerance))
     series = _series(asked, base, fresh)
@@ -76,7 +77,7 @@ def _on(asked, grids, fresh: bool = False) -> Patch:
 
 
 def _share(tolerance: float, series) -> float:
-    """By how much the cells must shrink for the decisive measures that can get the tolerance; 1 where none asks."""
+    """Factor by which the cells must shrink for the decisive measures that can get the tolerance; 1 where none asks."""
     if series[0].pressure.outcome is Outcome.NO_CONTACT:
         return 1.0
     found, reach, out = measures(*series), _reach(_own(series[0])), 1.0
@@ -90,13 +91,13 @@ def _share(tolerance: float, series) -> float:
 
 
 def _affordable(asked, base: Base) -> Base:
-    """The base, its cells longer where splitting them twice would already take too much work."""
+    """The base, with longer cells where splitting them twice would already take too much work."""
     grids = _grids(asked, columns(base.layout), base.growth)
     return base.shrunk(max(1.0, 4 * _reach(grids)))
 
 
 def _reach(grids) -> float:
-    """The share by which the cells of a patch can shrink at most before its grids grow too large.
+    """Factor by which the cells of a patch can shrink at most before its grids grow too large.
 
     The work of condensing falls on columns rows^3 and columns^2 rows^2, so it grows by the fourth power.
     """
@@ -120,7 +121,10 @@ def _base(asked, tolerance: float) -> Base:
 
 
 def _layout(length: float, span, places, tolerance: float) -> Layout:
-    """Coarsest columns: an edge of the contact is known to about half a cell of the finest, a quarter as long."""
+    """Layout of the coarsest columns, with the finest cells where the contact ends.
+
+    An edge of the contact is known to about half a cell of the finest mesh, which is a quarter as long.
+    """
     wide = span[1] - span[0]
     if len(places) > MOST_PLACES:
         return Layout(length, (), span, length / 64, length / 64, length / 64, 0.0)
@@ -130,8 +134,11 @@ def _layout(length: float, span, places, tolerance: float) -> Layout:
 
 
 def _loaded(patch: Patch) -> tuple | None:
-    """(span of the loaded interval, places where it ends or a corner is loaded, largest cell at such an end), None
-    where nothing touches. Of a smooth skin the part that bears a thousandth of the largest pressure counts."""
+    """Extent of the loaded interval: (its span, places where it ends or a corner is loaded, largest cell at such an
+    end).
+
+    None where nothing touches. Of a smooth skin the part that bears a thousandth of the largest pressure counts.
+    """
     x, sigma = patch.x, patch.pressure.sigma_n
     if not (sigma > 0).any():
         return None

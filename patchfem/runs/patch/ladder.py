@@ -6,7 +6,7 @@ from .press import solve
 
 
 def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """(Patch of a `PatchModel` on its mesh, on a mesh twice and four times as coarse), None where none is wanted.
+    """A patch on its mesh and on meshes twice and four times as coarse, None for those that are not wanted.
 
     A static patch whose element size is neither pinned nor decided by a profile gets the mesh that `tolerance` asks
     for. A mesh of any cells has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense

@@ -20,8 +20,11 @@ BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
 def plane_band(asked, patch: Patch) -> list:
-    """One sentence on the model error of the plane state, from the mesh of `patch`; none for a piece far wider than
-    tall in plane strain or far taller than wide in plane stress. Between the two no mesh narrows the band."""
+    """A sentence on the model error of the plane state, from the mesh of `patch`, as a list.
+
+    There is none for a piece far wider than tall in plane strain or far taller than wide in plane stress. Between the
+    two no mesh narrows the band.
+    """
     pair, ratio = patch.pair, asked.width / asked.height
     if ratio >= CLEAR if asked.plane == "strain" else ratio <= 1 / CLEAR:
         return []
@@ -38,8 +41,10 @@ def plane_band(asked, patch: Patch) -> list:
 
 
 def strip_error(asked, patch: Patch, found: dict) -> dict:
-    """Measures `found` with what the number of strips adds to their errors: the change to half as many on the mesh of
-    `patch`, three times what second order leaves of it."""
+    """Measures `found` with what the number of strips adds to their errors.
+
+    That is the change to half as many strips on the mesh of `patch`, three times what second order leaves of it.
+    """
     count, roll = asked.strips
     if count < 2:
         return found
@@ -49,12 +54,13 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
 
 
 def remainder(last: float, before: float, nested: bool = False) -> float:
-    """What is still to come after the changes `before` and `last` of a value under two halvings of the mesh.
+    """Rest of a converging series: what is still to come after the changes `before` and `last` under two halvings of
+    the mesh.
 
-    A geometric series whose ratio is taken from them, no worse than 1.5 (1.3 where the changes grow) and no better than
-    2.5; second order, a ratio of 4, is believed where every cell was halved (`nested`), the changes have one sign and
-    their ratio is below 6. A last change that is small by chance, its parts against one another, counts as what the
-    first one leaves.
+    The series is geometric. Its ratio is taken from the changes, no worse than 1.5 (1.3 where the changes grow) and no
+    better than 2.5. Second order, a ratio of 4, is believed where every cell was halved (`nested`), the changes have
+    one sign and their ratio is below 6. A last change may be small by chance, its parts against one another; it counts
+    as what the first one leaves.
     """
     best = SECOND if nested and last * before > 0 and abs(before) < LUCKY * abs(last) else DOUBTFUL
     before = abs(before)
@@ -64,8 +70,11 @@ def remainder(last: float, before: float, nested: bool = False) -> float:
 
 
 def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -> dict:
-    """name -> Measure; the error is three times what the changes between the three meshes leave to come (`remainder`)
-    and what the snapping of the contact edges to nodes costs, at least what no change between meshes shows."""
+    """Static measures of a patch by name, each with its error.
+
+    The error is three times what the changes between the three meshes leave to come (`remainder`) and what the snapping
+    of the contact edges to nodes costs; it is at least what no change between meshes shows.
+    """
     mine = values(fine)
     floors = _floors(fine)
     if coarse is None:
@@ -88,15 +97,18 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
 
 
 def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
-    """name -> power of the cell length with which the error of a measure falls, from 1/2 to 2; 1 where unknown."""
+    """Power of the cell length with which the error of each measure falls, by name, from 1/2 to 2; 1 where unknown."""
     changes = {name: np.abs(pair) for name, pair in _changes(fine, coarse, coarsest).items()}
     return {name: float(np.clip(np.log2(before / last), 0.5, 2.0)) if last > 0 and before > 0 else 1.0
             for name, (last, before) in changes.items()}
 
 
 def _changes(fine: Patch, coarse: Patch, coarsest: Patch | None) -> dict:
-    """name -> (change from the coarse mesh to the fine one, from the coarsest to the coarse one), less a quarter of
-    what the contact edges leave open on both meshes; the second 0 without a coarsest mesh."""
+    """Changes of each measure, by name: from the coarse mesh to the fine one and from the coarsest to the coarse one.
+
+    They are taken less a quarter of what the contact edges leave open on both meshes; the second is 0 without a
+    coarsest mesh.
+    """
     found = [values(patch) for patch in (fine, coarse, coarsest) if patch is not None]
     snaps = [_snap(patch, value) for patch, value in zip((fine, coarse, coarsest), found, strict=False)]
     out = {}
@@ -109,8 +121,10 @@ def _changes(fine: Patch, coarse: Patch, coarsest: Patch | None) -> dict:
 
 
 def _snap(patch: Patch, mine: dict) -> dict:
-    """What a contact edge between two nodes leaves open, in the measures that count nodes; nothing for a smooth skin,
-    whose pressure has no edge."""
+    """Uncertainty of the measures that count nodes: what a contact edge between two nodes leaves open.
+
+    There is none for a smooth skin, whose pressure has no edge.
+    """
     cell, length = _cell(patch), patch.pieces.interface.length
     if not cell or patch.skin is not None:
         return {}
@@ -136,14 +150,17 @@ def _cell(patch: Patch) -> float:
 
 
 def _floors(fine: Patch) -> dict:
-    """name -> floor of its error: that of its row, one cell of the mesh for the share in contact."""
+    """Floor of the error of each measure, by name: that of its row, one cell of the mesh for the share in contact."""
     cell = max(_cell(fine), np.diff(fine.x).min()) / fine.pieces.interface.length
     return {name: row.floor for name, row in TABLE.items()} | {"contact_fraction": cell}
 
 
 def _least(patch: Patch, mine: dict) -> dict:
-    """Errors that three meshes may agree to hide: a contact of few nodes, the layer at a loaded corner of a coating
-    thinner than the cells there, round-off."""
+    """Errors that three meshes may agree to hide.
+
+    They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, and
+    round-off.
+    """
     length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
     count = max(int(patch.active.sum()), 1)
     aside = cell / (2 * count**2) if count <= FEW else 0.0

@@ -16,14 +16,14 @@ RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not ma
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patch:
-    """One solved patch; forces, areas and stiffnesses are of all pairs together.
+    """A solved patch; forces, areas and stiffnesses are of all pairs together.
 
     pieces: compliance of the pieces and of their skin, linearised at the operating point where the skin is smooth;
-    giving: (m, m) [m/N] the tangential part that the scene names: of the skin, the pieces' with [contact.shear], the
-    same on every entry of a holder's spring; gap
-    (m,) [m] of the unloaded surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in
-    strips, whose means over the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None
-    where it is rigid in shear; notes: sentences for the warnings.
+    giving: (m, m) [m/N] the tangential compliance that lets the patch slip in part: of the skin, of the pieces with
+    [contact.shear], and of the holder's spring, which is the same on every entry; gap: (m,) [m] of the unloaded
+    surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in strips, whose means over
+    the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it is rigid in
+    shear; notes: sentences for the warnings.
     """
 
     pair: Pair
@@ -39,12 +39,12 @@ class Patch:
 
     @property
     def x(self) -> np.ndarray:
-        """(m,) places of the interface nodes [m]."""
+        """Places of the interface nodes (m,) [m]."""
         return self.pieces.interface.x
 
     @property
     def active(self) -> np.ndarray:
-        """(m,) bool: the contact set."""
+        """Contact set (m,) bool: the nodes that carry."""
         return self.pressure.sigma_n > 0
 
 
@@ -79,7 +79,8 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
 
 
 def _under(asked, pieces: Compliance, gap) -> tuple:
-    """(Compliance with its skin, Pressure, skin, strips) under the load, or the approach with the rotation held."""
+    """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
+    strips)."""
     strips = skin = None
     angle, moment, spring = asked.gap.angle, asked.moment, asked.spring
     if asked.strips is not None:
@@ -101,8 +102,11 @@ def _under(asked, pieces: Compliance, gap) -> tuple:
 
 
 def _closed_by(asked, pieces: Compliance, gap) -> tuple:
-    """As `_under` for an approach of a piece that turns: the load at which it is reached, since the approach grows with
-    the load. Where a load a millionth of what flat pieces would take is too much, nothing touches."""
+    """The pair under an approach with the rotation free; returns as `_under`.
+
+    The load at which the approach is reached is searched, since the approach grows with the load. Where a load a
+    millionth of what flat pieces would take is too much, nothing touches.
+    """
     distance, tried = asked.approach, []
 
     def short(log_load: float) -> float:

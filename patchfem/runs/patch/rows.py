@@ -1,4 +1,4 @@
-"""What a pressed patch is measured by: unit, least floor and meaning of every static measure."""
+"""Static measures of a pressed patch: unit, least floor and meaning of each."""
 
 from ...core import Row
 

@@ -30,13 +30,17 @@ def mean_stiffness(asked, pressure: float) -> float:
 
 
 def borne(pressure) -> np.ndarray:
-    """Pressure (..., m) [Pa] of a smooth skin without the nodes below BEARING of the largest: the law never ends, but
-    what it leaves there is less than the balance of the load is solved to, and further out less than any number."""
+    """Pressure (..., m) [Pa] of a smooth skin, zero at the nodes below BEARING of the largest.
+
+    The law never ends, but what it leaves there is less than the balance of the load is solved to, and further out less
+    than any number.
+    """
     return np.where(pressure > BEARING * pressure.max(), pressure, 0.0)
 
 
 def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
-    """(Compliance with the skin linearised at the operating point, Pressure, SkinState) of a smooth skin.
+    """Press a pair through a smooth skin: (Compliance with the skin linearised at the operating point, Pressure,
+    SkinState).
 
     The gap of the Pressure is the separation of the mean planes, below zero where the skin is crushed.
     """

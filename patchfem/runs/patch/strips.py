@@ -9,7 +9,8 @@ from .skin import borne
 
 
 def in_strips(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
-    """(Compliance of all strips, Pressure of their means over the width, skin or None, StripsState).
+    """Press a pair in strips: (Compliance of all strips, Pressure of their means over the width, skin or None,
+    StripsState).
 
     The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
     """
@@ -40,7 +41,10 @@ def skin_of(asked):
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
-    """-dM/d(rotation) [N m/rad] of all strips at fixed approach and contact set; c (m, m) [m/N], weight (m,) of one."""
+    """Rotational stiffness -dM/d(rotation) [N m/rad] of all strips at fixed approach and contact set.
+
+    c: (m, m) [m/N] and weight: (m,) [m2] of one strip.
+    """
     from ...slip import shear_modes
 
     out = 0.0
@@ -54,8 +58,11 @@ def rotational_stiffness(state, c, x, weight) -> float:
 
 
 def strip_values(patch, peak_of) -> dict:
-    """name -> value of what strips change: peak of any strip, share of the area, stiffnesses, and the lateral place of
-    the pressure with its roll moment. peak_of: largest pressure of one strip from (x, pressure)."""
+    """Values of the measures that strips change, by name.
+
+    These are the peak of any strip, the share of the area, the stiffnesses, and the lateral place of the pressure with
+    its roll moment. peak_of: largest pressure of one strip from (x, pressure).
+    """
     state, pieces = patch.strips, patch.pair.compliance
     count = len(state.offsets)
     weight = pieces.interface.weight / count

@@ -57,7 +57,7 @@ def peak_pressure(x, sigma) -> float:
 
 
 def values(patch: Patch) -> dict:
-    """name -> value of every static measure; loaded_fraction: the mean over the largest pressure."""
+    """Value of every static measure by name; loaded_fraction is the mean over the largest pressure."""
     x, weight, p = patch.x, patch.pieces.interface.weight, patch.pressure
     area = weight.sum()
     peak = peak_pressure(x, p.sigma_n)
@@ -78,7 +78,10 @@ def values(patch: Patch) -> dict:
 
 
 def shear_stiffness(patch: Patch) -> float:
-    """dT/d(slide) [N/m] in stick at held approach and rotation; unlike pieces with the closing that shear causes."""
+    """Tangential stiffness dT/d(slide) [N/m] in stick at held approach and rotation.
+
+    That of unlike pieces includes the closing that shear causes.
+    """
     if not patch.pair.closing.any():
         return tangential_stiffness(patch.pieces.tangential, patch.active)
     from ...slip.partial_slip import operators_of

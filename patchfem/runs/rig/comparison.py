@@ -1,4 +1,4 @@
-"""The report's own and other comparison methods under a scene: their steps as a run, with the warnings they deserve."""
+"""The report's own and other comparison methods as engines of a rig, with the warnings that they deserve."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -101,7 +101,7 @@ def _integrated(model, numerics, laws):
 
 
 def _with_interfaces(response, modes):
-    """With slides, slide_rates and forces (k, i) of every interface where there are several."""
+    """The response with slides, slide_rates and forces (k, i) of every interface, where there are several."""
     extra = {name: response.extra[name] for name in ("residual", "iterations")}
     if len(modes.interfaces) > 1:
         faces = modes.interfaces.T
@@ -130,7 +130,7 @@ def _cut(response, part):
 
 
 def _cycles(response, n: int) -> tuple:
-    """(extremes (c, 2), phasors (c,)) of the output, the partial cycle first."""
+    """Extremes (c, 2) and phasors (c,) of the output per cycle, the partial cycle first."""
     edges = np.arange(response.time.size - 1, 0, -n)[::-1]
     edges = np.concatenate([[0], edges]) if edges[0] else edges
     dt, low_high, phasors = response.time[1] - response.time[0], [], []

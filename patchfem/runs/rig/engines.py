@@ -1,6 +1,6 @@
-"""The engines of a rig as records: what each refuses, how it solves, in what a run of it can be coarser, what it costs.
+"""The engines of a rig as records: what each refuses, how it solves, how a run of it can be coarser, what it costs.
 
-`choose` in `numerics` takes the engine that the scene names, or the first that does not refuse.
+`engine_of` takes the engine that the scene names, or the first that does not refuse.
 """
 
 from collections.abc import Callable
@@ -23,9 +23,12 @@ class Variant(NamedTuple):
 
 
 class Engine(NamedTuple):
-    """refuses(model) -> None, or the PatchfemError that says why and what to do; solve: "module function" of this
-    folder, function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch) and
-    in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays."""
+    """One engine of a rig.
+
+    refuses(model) -> None, or the PatchfemError that says why and what to do; solve: "module function" of this folder,
+    function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch) and
+    in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays.
+    """
 
     name: str
     refuses: Callable
@@ -64,7 +67,7 @@ def no_closed_form(model: Model, steady: bool = False) -> str:
 
 
 def set_valued(model: Model, numerics) -> bool:
-    """Whether a march meets Coulomb's law as it stands: without the give of pieces, skin or holder."""
+    """Whether a march meets Coulomb's law as it stands, without a compliance of pieces, skin or holder in series."""
     laws, patch = [one.numbers.law for one in model.rig.interfaces], model.patch
     gives = patch is not None and bool(patch.gives_way or patch.slide_spring)
     return numerics.engine == "march" and not gives and any(has(law, "set-valued") for law in laws)
@@ -114,15 +117,17 @@ def _no_rungs(*_) -> list:
 
 
 def sampled(values: dict) -> dict:
-    """Errors of measures that are read off 400 samples a cycle."""
+    """Errors of the measures that are read off 400 samples a cycle."""
     loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
     return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
             else 1e-9 * abs(value) for name, value in values.items()}
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The mesh, where the loads of strips or the limit of an averaged law come from it. Strips that slide apart are
-    read off 400 samples a cycle besides, by the trapezoidal rule."""
+    """Rungs of the exact engine: the mesh, where the loads of strips or the limit of an averaged law come from it.
+
+    Strips that slide apart are read off 400 samples a cycle besides, by the trapezoidal rule.
+    """
     averaged = model.friction is not None and has(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
     samples = [Rung((), sampled)] if model.rig.strips_slide_apart else []
@@ -135,8 +140,11 @@ def _fewer(numerics, share: int):
 
 
 def _march_in_time(model: Model, numerics, patch) -> list:
-    """Half and a quarter of the steps. Of set-valued friction three neighbouring step counts besides: where in a step a
-    slide reverses is chance, so its error does not fall evenly; three halves of the largest change count."""
+    """Rungs of the march in time: half and a quarter of the steps.
+
+    Of set-valued friction three neighbouring step counts stand besides. Where in a step a slide reverses is chance, so
+    its error does not fall evenly; three halves of the largest change count.
+    """
     halves = [Variant(_fewer(numerics, share), patch) for share in (2, 4)]
     if not set_valued(model, numerics):
         return [Rung(tuple(halves), lambda *values: step_error(*values, numerics.steps))]
@@ -154,7 +162,7 @@ def _march_in_time(model: Model, numerics, patch) -> list:
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The mesh and the number of shear modes, both at a quarter of the steps."""
+    """Rungs of the march in space: the mesh and the number of shear modes, both at a quarter of the steps."""
     few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
     quarter = Variant(few, patch)
     if coarse is not None and (varies or model.soft):
@@ -166,7 +174,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """What the balance leaves, and what half the harmonics change."""
+    """Rungs of the harmonic balance: the residual that it leaves, and the change at half the harmonics."""
     return [Rung((), lambda fine: solution.errors)]
 
 

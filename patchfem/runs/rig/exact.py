@@ -1,4 +1,4 @@
-"""The exact engine under a scene: Coulomb friction from event to event, one mode by its own fast engine."""
+"""The exact engine of a rig: Coulomb friction from event to event, one mode by its own fast engine."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -43,7 +43,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def forces_of(model, patch) -> tuple:
-    """(static, kinetic) friction [N] of every interface (i,)."""
+    """Static and kinetic friction [N] of every interface, (i,) each."""
     rig, share = model.rig, 1.0
     if rig.strips_slide_apart:
         return tuple(np.array(column) for column in zip(*(model.limits(n) for n in strip_loads(patch))))
@@ -62,7 +62,8 @@ def forces_of(model, patch) -> tuple:
 
 
 def _over_strips(done, patch):
-    """An EventRun of strips as that of the patch: loops from the samples of the window, both sides of every event."""
+    """A run of strips as a run of the patch: loops from the samples of the window and from both sides of every
+    event."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
     window = as_one(done.window, loads, offsets)
     gaps = np.diff(window.time)
@@ -90,8 +91,10 @@ def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
 
 
 def _values(model, numerics, patch, drive, done) -> tuple:
-    """(measures, whether nothing slipped) of the window of an event-driven run: what the events tell comes before what
-    the samples tell."""
+    """Measures of the window of an event-driven run, and whether nothing slipped.
+
+    What the events tell comes before what the samples tell.
+    """
     window, apart, known = done.window, model.rig.strips_slide_apart, {}
     extremes, ledger, loop = done.amplitudes[-min(numerics.window, len(done.amplitudes)):], None, None
     span = window.time[-1] - window.time[0]
@@ -118,8 +121,10 @@ def _values(model, numerics, patch, drive, done) -> tuple:
 
 
 def _loop(done, drive, span: float, apart: bool) -> tuple | None:
-    """(slide, first harmonics of slide and force, work per cycle [J]) by the quadrature of the run; None where its
-    window holds no whole cycle. apart: of every strip, as a yaw works besides the mean slide."""
+    """Loop of a run by its own quadrature: (slide, first harmonics of slide and force, work per cycle [J]).
+
+    None where the window holds no whole cycle. apart: loops of every strip, because a yaw works besides the mean slide.
+    """
     if not whole(span, drive):
         return None
     time, weight, slide, rate, force = done.loop
@@ -140,7 +145,7 @@ def _whole(done):
 
 
 def _levels(model, numerics, patch, forces, progress, say) -> tuple:
-    """(EventRun of all levels one after the other, their Levels, slips as `rig_levels.onset` asks)."""
+    """Run of all levels one after the other: (EventRun, its Levels, slips as `levels.onset` asks)."""
     rig = model.rig
     drive, cycles, states, parts, levels = rig.drive, rig.level_cycles, [rig.start], [], []
 

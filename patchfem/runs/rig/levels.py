@@ -9,13 +9,15 @@ MOST = 40  # halvings of the bracket of an onset
 
 
 def ends(rig) -> tuple:
-    """Cycles after which the levels of a rig's drive end; () without levels."""
+    """Cycles after which the levels of a drive end; () without levels."""
     return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
 
 
 def rows(sizes, marks, values, held: float | None) -> tuple:
-    """A Level per size [m s-2] and Mark of a march; values(mark) -> its measures; held [m]: slip amplitude below which
-    a level sticks, None where nothing rubs."""
+    """A Level for each size [m s-2] and Mark of a march.
+
+    values(mark) -> its measures; held [m]: slip amplitude below which a level sticks, None where nothing rubs.
+    """
     out = []
     for size, mark in zip(sizes, marks):
         found = values(mark)
@@ -25,7 +27,7 @@ def rows(sizes, marks, values, held: float | None) -> tuple:
 
 
 def with_errors(fine, half, quarter, steps: int) -> tuple:
-    """The levels with the error of the time step, as `response.errors.step_error` has it."""
+    """The levels with the error of the time step as `response.errors.step_error` has it."""
     from ...response.errors import step_error
 
     return tuple(replace(a, errors=step_error(a.values, b.values, c.values, steps))
@@ -33,7 +35,7 @@ def with_errors(fine, half, quarter, steps: int) -> tuple:
 
 
 def onset(levels, slips, tolerance: float) -> tuple | None:
-    """(onset [m s-2], half its bracket) by halving between the last level that held and the first that slips.
+    """Onset of slip [m s-2] and half its bracket, by halving between the last level that held and the first that slips.
 
     slips(number of the level that held or -1, level) -> bool runs one more level from the state that it left.
     """

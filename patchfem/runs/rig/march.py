@@ -36,7 +36,7 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 class _Read:
-    """A finished march read off: measures, outcome, levels."""
+    """The measures, outcome and levels of a finished march."""
 
     def __init__(self, model, numerics, patch, contact):
         self.model, self.numerics, self.patch, self.contact, rig = model, numerics, patch, contact, model.rig
@@ -81,7 +81,7 @@ class _Read:
         return found | (other_measures(part.window, drive, self.numerics.steps) if others else {})
 
     def _loop(self, part) -> tuple | None:
-        """The loop of the first interface, or of all strips; the others have their own."""
+        """Loop of the first interface, or of all strips; the others have their own."""
         w, drive = part.window, self.model.rig.drive
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
@@ -92,7 +92,7 @@ class _Read:
         return sampled_loop(w, drive, work, step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j)
 
     def _levels(self, done) -> tuple:
-        """(Level per level of the drive, slips as `levels.onset` asks)."""
+        """Levels of the drive, and slips as `levels.onset` asks."""
         from ...dynamics.march import march as hub
 
         rig, numerics = self.model.rig, self.numerics

@@ -55,8 +55,10 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
 
 
 def unique_steps(model: Model) -> int:
-    """Least even number of steps per cycle at which a step of bonds that weaken with speed has one solution alone:
-    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, k_t = mu_s N/eps_0, M the mass that the interface moves; 0 for other laws."""
+    """Least even number of steps per cycle at which a step of weakening bonds has one solution alone; 0 for other laws.
+
+    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1 with k_t = mu_s N/eps_0 and M the mass that the interface moves.
+    """
     f, modes = model.friction, model.rig.modes
     if f is None or not has(f.law, "bonds") or f.slip_growth is None or not f.kinetic or f.kinetic >= f.static:
         return 0
@@ -76,7 +78,7 @@ def quadrature_of(model: Model, numerics: Numerics):
 
 
 def list_cost(model: Model, numerics: Numerics) -> tuple:
-    """(expected strips, seconds) of a shared list of bonds."""
+    """Expected strips and seconds of a shared list of bonds."""
     found = quadrature_of(model, numerics)
     steps = numerics.cycles * numerics.steps
     strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
@@ -84,7 +86,7 @@ def list_cost(model: Model, numerics: Numerics) -> tuple:
 
 
 def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
-    """Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
+    """Raise Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = model.friction
     if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
         return

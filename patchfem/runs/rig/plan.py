@@ -15,7 +15,7 @@ def chain(rig) -> dict:
 
 
 def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
-    """(engine, steps of all passes, seconds) of a coupled run."""
+    """Engine, steps of all passes and seconds of a coupled run."""
     numerics, rig, f, soft = choose(model, per_point), model.rig, model.friction, bool(model.soft)
     if numerics.engine == "exact":
         each = 1e-4 if unknowns["modes"] == 1 else 4e-4 + 1e-4 * unknowns["modes"]

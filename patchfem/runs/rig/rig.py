@@ -80,7 +80,7 @@ def _said(model, patch, raw, outcome, found) -> list:
 
 
 def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
-    """(Solution of the chosen engine, its numerics, measures with errors on the engine's ladder of coarser runs).
+    """Solution of the chosen engine, its numerics, and its measures with errors on the engine's ladder of coarser runs.
 
     Steps that the scene does not pin are halved until the error of the displacement is met.
     """

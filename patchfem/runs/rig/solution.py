@@ -1,4 +1,4 @@
-"""What an engine gives back, and the last cycles as the measures see them."""
+"""The solution that an engine gives back, and the last cycles as the measures see them."""
 
 from dataclasses import dataclass, field
 
@@ -59,8 +59,11 @@ def seen(model, patch, window, extremes, book: dict, steps: int, **more) -> Seen
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:
-    """The loop of equally spaced samples by the trapezoidal rule, as `Seen` takes it; None where the window holds no
-    whole cycle. force: its first harmonic where it is known better."""
+    """Loop of equally spaced samples by the trapezoidal rule, as `Seen` takes it; None where the window holds no whole
+    cycle.
+
+    force: its first harmonic where it is known better.
+    """
     if not whole(window.time[-1] - window.time[0], drive):
         return None
     weight, omega = np.full(window.time.size, 1.0), omega_of(drive)

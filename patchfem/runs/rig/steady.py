@@ -1,4 +1,4 @@
-"""method = "harmonic": the steady motion of a scene found directly, and its curve over frequency or level.
+"""The engine `harmonic`: the steady motion of a scene found directly, and its curve over frequency or level.
 
 Coulomb interfaces by shooting on the map of their events, other laws by harmonic balance. What is found is a motion
 that repeats with the drive; its regime, multipliers and stability are named.
@@ -51,7 +51,7 @@ class _Events:
         self.forces = forces_of(model, patch)
 
     def found(self, drive, start=None):
-        """dynamics.steady_events.Steady."""
+        """Steady motion by shooting, from `start` on."""
         from ...dynamics.events.steady_events import steady
 
         return steady(self.modes, drive, *self.forces, start=start)
@@ -71,7 +71,7 @@ class _Events:
         return raw, {name: abs(v) * (1e-9 + found.residual) for name, v in raw.values.items()}, extra
 
     def curve(self, drive) -> tuple:
-        """(curve as arrays by name, the sine of its largest amplitude, None: the motion there is the only one)."""
+        """Curve as arrays by name, and the sine of its largest amplitude; None: the motion there is the only one."""
         drives = drives_of(drive, POINTS)
         if self.modes.omega.size == 1 and len(self.modes.interfaces) == 1:
             curve = self._single(drives)

@@ -1,0 +1,51 @@
+"""The patch of parallel elements as a problem of `switched`, for integrators of others: nothing of patchfem."""
+
+from math import pi, sin
+
+import numpy as np
+
+
+class Patch:
+    """Modes under a sine with parallel elastic-plastic elements: between two reversals of the slide the force is a
+    function of the slide, so the reversals are the only events; a yield is a bend that the step control has to see."""
+
+    def __init__(self, omega, zeta, slide, base, mass, drive, drive_omega, stiffness, yields):
+        self.stiff, self.damp = np.array(omega)**2, 2 * np.array(zeta) * np.array(omega)
+        self.row, self.base, self.mass = np.array(slide), np.array(base), mass
+        self.drive, self.omega, self.period = drive, drive_omega, 2 * pi / drive_omega
+        self.k, self.yields = np.array(stiffness), np.array(yields)
+        self.stretch, self.at = np.zeros(self.k.size), 0.0
+
+    def start(self):
+        """(phase, state z..., v...); the base moves against +x first."""
+        return (1 if self.row @ self.base * self.drive < 0 else -1), np.zeros(2 * self.row.size)
+
+    def stretches(self, q):
+        """Stretch of all elements at the slide q since the last reversal."""
+        return np.minimum(np.maximum(self.stretch + (q - self.at), -self.yields), self.yields)
+
+    def rhs(self, phase):
+        """dy/dt."""
+        n, pull, push = self.row.size, self.base * self.drive, self.row / self.mass
+
+        def free(t, y):
+            force = self.k @ self.stretches(self.row @ y[:n])
+            return np.concatenate([y[n:], -pull * sin(self.omega * t) - self.stiff * y[:n] - self.damp * y[n:]
+                                   - push * force])
+
+        return free
+
+    def event(self, phase):
+        """Positive until the slide reverses."""
+        n = self.row.size
+        return lambda t, y: phase * (self.row @ y[n:])
+
+    def switch(self, phase, t, y):
+        """(phase, state) after a reversal."""
+        q = float(self.row @ y[:self.row.size])
+        self.stretch, self.at = self.stretches(q), q
+        return -phase, np.array(y)
+
+    def slide(self, y):
+        """Slide of the interface from the states (k, n)."""
+        return y[:, :self.row.size] @ self.row
