@@ -3,6 +3,8 @@
 The first word is not a capital unless it is a name; a default that follows from other keys stands in the sentence.
 """
 
+from ..effects import LAW_KEYS
+
 MEANINGS = {
     "Tables": {"title": "a line of text that stands over the results"},
     "Material": {
@@ -85,7 +87,7 @@ MEANINGS = {
         "rest_activation": "activation temperature of the growth at rest; 0 unless given",
         "slip_activation": "activation temperature of the growth in slip; 0 unless given",
     },
-    "Friction": {
+    "Friction": LAW_KEYS | {
         "law": "the law of friction",
         "static": "coefficient of static friction mu_s",
         "kinetic": "coefficient of kinetic friction mu_k, at most static; static unless given",
