@@ -296,8 +296,8 @@ def _guarded(words: list) -> int:
         return 130
     try:
         if words and words[0] in NOT_BUILT:
-            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, fit, mesh, "
-                          "export, view")
+            raise Refused(f"patchfem {words[0]}: not yet built; built are check, plan, run, cost, fit, "
+                          "mesh, export, view")
         app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return 0

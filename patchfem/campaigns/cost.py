@@ -1,4 +1,4 @@
-"""What accuracy costs in time: a scene run again and again with one knob turned, each run timed against its error."""
+"""Cost of accuracy in time: a scene run again and again with one knob turned, each run timed against its error."""
 
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -18,8 +18,11 @@ MOST_STEPS = 12800
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cost:
-    """One run of a curve. value: of the knob in SI, None where the tolerance chose; seconds of the whole run; values:
-    measure -> value; errors: measure -> distance to the best run, of the best run its own estimate."""
+    """One run of a cost curve.
+
+    value: of the knob in SI, None where the tolerance chose; seconds of the whole run; values: measure -> value;
+    errors: measure -> distance to the best run, of the best run its own estimate.
+    """
 
     label: str
     value: float | None
@@ -78,7 +81,7 @@ def _beside(one: Cost, best: Cost) -> Cost:
 
 
 def _turned(model: Model, knob: str):
-    """(label, value, (model, halvings of the file)) for every value of a knob, coarse to fine."""
+    """Settings of a knob, coarse to fine: (label, value, (model, halvings of the file))."""
     if knob == "element_size" and model.patch.mesh is not None:
         for level in range(3):
             yield f"file split {2**level} x", float(2**-level), (model, level)
@@ -150,8 +153,10 @@ def turned_by(runs: list) -> list:
 
 
 def cheapest(runs: list, tolerance: float) -> dict:
-    """measure -> label of the quickest run within the tolerance that no finer one leaves again, None where no run is:
-    a coarse run that is right by chance does not count."""
+    """Label of the quickest run within the tolerance, by measure; None where no run is.
+
+    A coarse run that is right by chance does not count: no finer run may leave the tolerance again.
+    """
     out = {}
     for name in turned_by(runs):
         good = []

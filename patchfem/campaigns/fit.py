@@ -1,4 +1,4 @@
-"""A measured friction loop identified: scene values whose bench force, along the measured motion, fits the measured."""
+"""Identification of a measured friction loop: scene values whose bench force follows the measured one."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,9 +23,12 @@ LOAD_UNITS = {"time": KINDS["time"], "displacement": KINDS["length"],
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fitted:
-    """free: the ranges; found: the fit in their order; model (k,): fitted reading at the rows of `loop`; held (k,);
-    rms and held_rms (None where no row is held) in the unit of the reading; step_error: largest change of the model
-    when its steps are halved; sets: the --set strings that make the scene fitted; warnings: sentences."""
+    """A fitted loop.
+
+    free: the ranges; found: the fit in their order; model: (k,) fitted reading at the rows of `loop`; held: (k,); rms
+    and held_rms (None where no row is held) in the unit of the reading; step_error: largest change of the model when
+    its steps are halved; sets: the --set strings that make the scene fitted; warnings: sentences.
+    """
 
     scene: Scene
     loop: Loop
@@ -91,7 +94,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
 
 
 def _refined(bench, residual, wanted, scene, say) -> tuple:
-    """(fit, change of the model when its steps are halved); steps are halved until they change the fit too little."""
+    """The fit, and the change of the model when its steps are halved; steps are halved until they change the fit too
+    little."""
     low, high = [one.low for one in wanted], [one.high for one in wanted]
     start, starts, before, agreed = _own_values(scene, wanted), 3, (0, 0, ""), 0
     while True:
@@ -121,7 +125,7 @@ def _counted(found: Fit, before: tuple) -> Fit:
 
 
 def _own_values(scene: Scene, wanted: list) -> list:
-    """What the scene itself says, or the middle of the range; held inside the range."""
+    """Starting values: what the scene itself says, or the middle of the range; held inside the range."""
     out = []
     for one in wanted:
         value = scene
@@ -135,7 +139,7 @@ def _own_values(scene: Scene, wanted: list) -> list:
 
 
 def _doubts(loop: Loop, miss, held, rms: float, step_error: float, scene: Scene) -> list:
-    """Sentences where the rows are no sample of the model with independent noise."""
+    """Warnings where the rows are no sample of the model with independent noise."""
     out, peak = [], float(np.abs(loop.reading).max())
     inside = miss[~held] - miss[~held].mean()
     if rms > 1e-6 * peak and inside.size > 20:

@@ -35,7 +35,7 @@ class BenchModel:
         self.patch, self.moving = None, any(key.startswith("contact.") for key in named)
 
     def __call__(self, values) -> np.ndarray:
-        """(k,) reading at the rows; PatchfemError where the values make no scene."""
+        """Reading (k,) at the rows; PatchfemError where the values make no scene."""
         model = build(self.scene_at(values))
         self.made += 1
         with placed(model.source):

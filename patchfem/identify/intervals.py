@@ -16,7 +16,10 @@ SHARP = 1e-9  # of the range: intervals below it are at round-off, and linear
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Answer:
-    """ends (n, 2), methods, open_ends (n, 2), correlation (n, n), sensitivity (n,), unknown (d, n); as in `Fit`."""
+    """Intervals of a fit: ends (n, 2), methods, open_ends (n, 2), correlation (n, n), sensitivity (n,), unknown (d, n).
+
+    They mean what they mean in `Fit`.
+    """
 
     ends: np.ndarray
     methods: tuple
@@ -27,7 +30,7 @@ class Answer:
 
 
 def nothing(n: int) -> Answer:
-    """An Answer that was not asked for."""
+    """Intervals that were not asked for, all NaN."""
     nan = np.full((n, n), np.nan)
     return Answer(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
                   np.zeros((0, n)))
@@ -75,7 +78,8 @@ def intervals(model: Counted, u, cost: float, descend: Callable) -> Answer:
 
 
 def _covariance(jac, size) -> tuple:
-    """((f, f) inverse of J^T J over the directions that the rows see, (d, f) unit directions they do not, scaled)."""
+    """Inverse (f, f) of J^T J over the directions that the rows see, and the unit directions (d, f) that they do not
+    see."""
     if not size.size:
         return np.zeros((0, 0)), np.zeros((0, 0))
     _, s, vt = np.linalg.svd(jac / size, full_matrices=True)
@@ -95,7 +99,7 @@ def _correlation(spread, lost) -> np.ndarray:
 
 
 def _directions(model: Counted, u, n: int, inner, null, size) -> np.ndarray:
-    """(d, n) unknown directions as relative changes of the values, the largest 1."""
+    """Unknown directions (d, n) as relative changes of the values, the largest 1."""
     values, slope = model.space.values(u), model.space.slope(u)
     out = np.zeros((len(null), n))
     for row, one in zip(out, null):
@@ -108,7 +112,8 @@ def _directions(model: Counted, u, n: int, inner, null, size) -> np.ndarray:
 
 
 def _is_linear(model, u, cost, i, half, spread, growth, inner) -> bool:
-    """Whether the sum of squares at both ends, the others following the linear answer, grows as the linear one."""
+    """Whether the sum of squares grows at both ends of an interval as the linear answer says, the other values
+    following it."""
     if half < SHARP:
         return True
     for sign in (-1.0, 1.0):
@@ -123,8 +128,11 @@ def _is_linear(model, u, cost, i, half, spread, growth, inner) -> bool:
 
 
 def _profile(model, u, cost, i, sign, half, growth, others, descend) -> tuple:
-    """(end in the cube, whether it is only the bound): where the sum of squares, least over the others, has grown by
-    the share `growth`. The root of the growth is nearly linear, so a secant inside a bracket finds it."""
+    """End of an interval in the cube by the profile of the sum of squares, and whether it is only the bound.
+
+    There the sum of squares, least over the other values, has grown by the share `growth`. The root of the growth is
+    nearly linear, so a secant inside a bracket finds it.
+    """
     room = u[i] if sign < 0 else 1 - u[i]
     if room <= 0:
         return u[i], True

@@ -22,13 +22,14 @@ NEAR = 1e-3  # of the range: a value this close to a bound is tried on it
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
-    """values (n,); intervals (n, 2): 95 %, NaN where the rows do not determine a value; methods (n,):
-    "linear", "profile" or "none"; open_ends (n, 2): an end that is only the bound. correlation (n, n), NaN likewise.
+    """A least-squares answer.
 
-    rms: root mean square of the residual; sensitivity (n,): rms change of the residual per range of a value;
-    at_bound (n,): "low", "high" or ""; unknown (d, n): directions of relative change (of change over range where a
-    value is 0) that leave the residual as it is; failures and reason: evaluations that failed, and the first cause;
-    agreed: descents that ended at the same sum of squares.
+    values: (n,); intervals: (n, 2) of 95 %, NaN where the rows do not determine a value; methods: (n,) "linear",
+    "profile" or "none"; open_ends: (n, 2) whether an end is only the bound; correlation: (n, n), NaN likewise; rms:
+    root mean square of the residual; sensitivity: (n,) rms change of the residual per range of a value; at_bound: (n,)
+    "low", "high" or ""; unknown: (d, n) directions of relative change (of change over range where a value is 0) that
+    leave the residual as it is; failures and reason: evaluations that failed, and the first cause; agreed: descents
+    that ended at the same sum of squares.
     """
 
     values: np.ndarray
@@ -48,7 +49,7 @@ class Fit:
 
 
 def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: bool = True) -> Fit:
-    """Values within [low, high] (n,) that minimise the sum of squares of residual(values (n,)) -> (r,).
+    """Minimise the sum of squares of residual(values (n,)) -> (r,) within [low, high] (n,).
 
     log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
     `start` alone where it works; bars=False leaves the intervals NaN and looks for no bound or unknown. A residual that
@@ -86,7 +87,7 @@ def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome:
 
 
 def _starts(model: Counted, own, count: int) -> list:
-    """The own start, where it works, then the best of a set that fills the cube."""
+    """Starting points: the own start where it works, then the best of a set that fills the cube."""
     n = model.space.low.size
     if count == 1 and own is not None and model(own) is not None:
         return [own]
@@ -104,7 +105,7 @@ def _starts(model: Counted, own, count: int) -> list:
 
 
 def descend(model: Counted, u, free) -> tuple:
-    """(u, sum of squares, whether it settled) from u, moving the coordinates `free` alone."""
+    """Descend from u, moving the coordinates `free` alone: (u, sum of squares, whether it settled)."""
     u, free = np.array(u, float), list(free)
     here = model(u)
     if not free or here is None:
@@ -132,7 +133,7 @@ def descend(model: Counted, u, free) -> tuple:
 
 
 def _onto_bounds(model: Counted, u, cost: float) -> tuple:
-    """Values pressed against a bound are put on it and the others settled once more, where that is no worse."""
+    """Put values that press against a bound on it and settle the others once more, where that is no worse."""
     r = model(u)
     pull = model.jacobian(u, range(u.size)).T @ r
     near = [i for i in range(u.size) if (u[i] < NEAR and pull[i] > 0) or (u[i] > 1 - NEAR and pull[i] < 0)]

@@ -12,14 +12,15 @@ STEP = 1e-5  # of the range, in difference quotients
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Space:
-    """Bounds low < high and whether each is searched in logarithms, all (n,); u in [0, 1]^n."""
+    """A box of values as the unit cube u in [0, 1]^n: bounds low < high, and whether each is searched in logarithms,
+    all (n,)."""
 
     low: np.ndarray
     high: np.ndarray
     log: np.ndarray
 
     def values(self, u) -> np.ndarray:
-        """(n,) values at u (n,); the ends of the cube are the bounds to the last bit."""
+        """Values (n,) at u (n,); the ends of the cube are the bounds to the last bit."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
         for i, part in enumerate(u):
@@ -28,7 +29,7 @@ class Space:
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def unit(self, values) -> np.ndarray:
-        """u (n,) of values (n,), held inside the cube."""
+        """Point u (n,) of values (n,), held inside the cube."""
         out = np.empty(len(values))
         for i, value in enumerate(values):
             a, b = self.low[i], self.high[i]
@@ -36,7 +37,7 @@ class Space:
         return np.clip(out, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """d value/d u (n,)."""
+        """Slopes d value/d u (n,)."""
         values = self.values(u)
         return np.array([v * np.log(b / a) if own else b - a
                          for v, a, b, own in zip(values, self.low, self.high, self.log)])
@@ -57,7 +58,7 @@ def space(low, high, log=None) -> Space:
 
 
 class Counted:
-    """residual(values (n,)) -> (r,) over the cube: counts evaluations and failures, remembers the last one.
+    """A residual(values (n,)) -> (r,) over the cube that counts evaluations and failures and remembers the last one.
 
     A failure is a PatchfemError (but not Missing, which is passed on), an arithmetic error, or a residual that is not
     finite; `reason` keeps the first.
@@ -100,7 +101,8 @@ class Counted:
         return np.full(self.rows, 1e3 * max(self.largest, 1e-300)) if out is None else out
 
     def jacobian(self, u, free) -> np.ndarray:
-        """(r, f) central differences along the coordinates `free` (f,); one-sided at a bound and beside a failure."""
+        """Jacobian (r, f) by central differences along the coordinates `free` (f,); one-sided at a bound and beside a
+        failure."""
         here, columns = self(u), []
         for i in free:
             points = {}
@@ -128,8 +130,10 @@ def _quotient(here, points: dict) -> np.ndarray:
 
 
 def spread_points(count: int, n: int) -> np.ndarray:
-    """(count, n) points of the unit cube that fill it evenly and are the same every time (additive recurrence on the
-    root of x^(n + 1) = x + 1; Roberts 2018)."""
+    """Points (count, n) of the unit cube that fill it evenly and are the same every time.
+
+    An additive recurrence on the root of x^(n + 1) = x + 1 (Roberts 2018).
+    """
     root = 2.0
     for _ in range(60):
         root = (1 + root)**(1 / (n + 1))

@@ -1,4 +1,4 @@
-"""What a fit did not determine, as sentences with the names of the values."""
+"""Sentences on what a fit did not determine, with the names of the values."""
 
 import numpy as np
 

@@ -17,8 +17,11 @@ _WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Columns:
-    """values: name -> (k,) in SI; labels: name -> k texts of a column that `units` does not know; rows: k, row i stands
-    in line i + 2."""
+    """Columns of a table that was read.
+
+    values: name -> (k,) in SI; labels: name -> k texts of a column that `units` does not know; rows: k; row i stands in
+    line i + 2.
+    """
 
     values: dict
     labels: dict
@@ -27,11 +30,12 @@ class Columns:
 
 def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, remedy: str = "",
                  labels: bool = False) -> Columns:
-    """A table with a header like `header`. units: column -> unit -> factor to SI ("" as unit: may stand without one);
-    wanted: columns that must be there; what: what the table holds, remedy: what to do where there is no file.
+    """Read a comma-separated table whose header looks like `header`.
 
-    Columns that `units` does not know may stand without a unit, or with one where `labels` says so: they are kept as
-    text. PatchfemError names file and line, Missing where there is no file.
+    units: column -> unit -> factor to SI ("" as unit: the column may stand without one); wanted: columns that must be
+    there; what: a name for the contents, remedy: what to do where there is no file. Columns that `units` does not know
+    may stand without a unit, or with one where `labels` says so; they are kept as text. PatchfemError names file and
+    line, Missing where there is no file.
     """
     path = Path(path)
     lines = _text(path, what, remedy).split("\n")
@@ -64,7 +68,7 @@ def _text(path: Path, what: str, remedy: str) -> str:
 
 
 def _header(path, line: str, units: Mapping, wanted: tuple, header: str, labels: bool) -> tuple:
-    """(names as they stand, factor of each column of numbers)."""
+    """Names of the columns as they stand, and the factor of each column of numbers."""
     asked = f"a header like `{header}` is wanted, not '{line.strip()[:80]}'"
     found = [_HEAD.fullmatch(cell) for cell in line.split(",")]
     if not all(found):

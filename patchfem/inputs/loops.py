@@ -15,8 +15,11 @@ HEADER = "time [s],displacement [um],force [N]"
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Loop:
-    """time (k,) [s] or None; displacement (k,) [m], 0 in the first row; reading (k,): `quantity` "force" [N] or
-    "friction_ratio" [1]; labels: name -> k texts of the other columns, such as `run` or `frequency [Hz]`."""
+    """A measured friction loop.
+
+    time: (k,) [s] or None; displacement: (k,) [m], 0 in the first row; reading: (k,), `quantity` says "force" [N] or
+    "friction_ratio" [1]; labels: name -> k texts of the other columns, such as `run` or `frequency [Hz]`.
+    """
 
     path: Path
     time: np.ndarray | None
@@ -26,7 +29,7 @@ class Loop:
     labels: dict
 
     def rows_of(self, hold: str) -> np.ndarray:
-        """(k,) whether a row's label is among those of `column=value,value`; numbers are compared as numbers.
+        """Rows (k,) bool whose label is among those of `column=value,value`; numbers are compared as numbers.
 
         PatchfemError for a column that is not there and for a value that no row has.
         """
@@ -49,9 +52,9 @@ class Loop:
 
 
 def read_loop(path, units: Mapping = UNITS) -> Loop:
-    """The Loop of a CSV whose header is like `time [s],displacement [um],force [N]`; time may be absent, a column
-    friction_ratio stands in for force. The displacement is counted from its first row.
+    """Read a friction loop from a CSV whose header is like `time [s],displacement [um],force [N]`.
 
+    time may be absent; a column friction_ratio stands in for force. The displacement is counted from its first row.
     PatchfemError names file and line of a mistake, Missing where there is no file.
     """
     path = Path(path)

@@ -1,5 +1,7 @@
-"""A prescribed slide from a table: time, displacement and, for two directions, lateral; straight between the rows.
-Other columns are not used."""
+"""A prescribed slide from a table: time, displacement and, for two directions, lateral displacement.
+
+The slide is straight between the rows. Other columns are not used.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,13 +17,13 @@ BESIDE = {"force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665}
 
 
 def read_path(path, units: Mapping = UNITS) -> tuple:
-    """(time (k,) [s], displacement (k,) [m]) of a CSV whose header is like `time [s],displacement [um]`; and lateral
-    (k,) [m], the displacement across, where that column stands too.
+    """Read a slide from a CSV whose header is like `time [s],displacement [um]`: time (k,) [s] and displacement (k,)
+    [m].
 
-    units: column -> unit -> factor to SI. At least two rows, time strictly rising; the first row is 0 in every
-    column, where the pieces were pressed, and the path leaves it. A measured loop may be given as it is: its force,
-    friction_ratio and columns without a unit are passed over. PatchfemError names file and line, Missing where there is
-    no file.
+    Where a column lateral stands too, (k,) [m], the displacement across, is returned third. units: column -> unit ->
+    factor to SI. There must be two rows or more with strictly rising time; the first row is 0 in every column, where
+    the pieces were pressed, and the path leaves it. A measured loop may be given as it is: its force, friction_ratio
+    and columns without a unit are passed over. PatchfemError names file and line, Missing where there is no file.
     """
     path = Path(path)
     found = read_columns(path, {**BESIDE, **units}, ("time", "displacement"), "time [s],displacement [um]", "a path",
@@ -42,7 +44,7 @@ def _check(path, time, *places) -> None:
 
 
 def rising(path, time) -> None:
-    """PatchfemError at the first row whose time [s] does not follow the one before."""
+    """Raise PatchfemError at the first row whose time [s] does not follow the one before."""
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         k = back[0]

@@ -17,7 +17,7 @@ KINDS = {"acceleration": 12, "force": 13}  # data types of a universal file
 
 
 def read_signal(path, name: str) -> tuple:
-    """(time (k,) [s] from 0, value (k,) in SI) of a drive; name: acceleration or force.
+    """Read a recorded drive: time (k,) [s] from 0 and value (k,) in SI; name: acceleration or force.
 
     CSV with a header like `time [s],acceleration [g]`, or .uff/.unv with one time response of that kind. The signal is
     taken from its first row on. PatchfemError names file and line, Missing where there is no file.

@@ -1,4 +1,4 @@
-"""Two pieces as any mesh of triangles and quads: what a tagged mesh must be before it is used, checked by name.
+"""Two pieces as any mesh of triangles and quads, and the checks that a tagged mesh must pass before it is used.
 
 Both pieces are turned so that y is the depth below the interface; x is 0 in the middle of the interface.
 """
@@ -20,8 +20,11 @@ EDGES = ("upper_interface", "lower_interface", "upper_far", "lower_far")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Tagged:
-    """A tagged mesh as its file gives it. points (N, 2 or 3) [m]; triangles (t, 3), quads (q, 4): node numbers;
-    names: (t + q,) tag of every cell, triangles first; nodes: edge tag -> node numbers; how: how this format tags."""
+    """A tagged mesh as its file gives it.
+
+    points: (N, 2 or 3) [m]; triangles: (t, 3), quads: (q, 4) node numbers; names: (t + q,) tag of every cell, triangles
+    first; nodes: edge tag -> node numbers; how: how this format tags, for messages.
+    """
 
     points: np.ndarray
     triangles: np.ndarray
@@ -33,8 +36,11 @@ class Tagged:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PieceMesh:
-    """One piece. points: (N, 2) as x and depth >= 0 [m]; triangles (t, 3), quads (q, 4), counter-clockwise in them;
-    is_coating: (t + q,), triangles first; interface: (m,) node numbers by rising x; far: (f,) node numbers."""
+    """One piece as a mesh of triangles and quads.
+
+    points: (N, 2) as x and depth >= 0 [m]; triangles: (t, 3), quads: (q, 4), counter-clockwise in them; is_coating: (t
+    + q,), triangles first; interface: (m,) node numbers by rising x; far: (f,) node numbers.
+    """
 
     points: np.ndarray
     triangles: np.ndarray
@@ -45,12 +51,12 @@ class PieceMesh:
 
     @property
     def x(self) -> np.ndarray:
-        """(m,) places of the interface nodes [m]."""
+        """Places of the interface nodes (m,) [m]."""
         return self.points[self.interface, 0]
 
     @property
     def rise(self) -> np.ndarray:
-        """(m,) distance of the interface nodes from y = 0 [m], >= 0: what rounded edges add to the gap."""
+        """Distance of the interface nodes from y = 0 (m,) [m], >= 0: what rounded edges add to the gap."""
         return self.points[self.interface, 1]
 
     @property
@@ -69,11 +75,11 @@ class PieceMesh:
         return float(self.areas()[self.is_coating].sum() / self.length)
 
     def areas(self) -> np.ndarray:
-        """(t + q,) areas of the cells [m2], triangles first."""
+        """Areas of the cells (t + q,) [m2], triangles first."""
         return np.concatenate([_areas(self.points[self.triangles]), _areas(self.points[self.quads])])
 
     def tributary(self) -> np.ndarray:
-        """(m,) length of interface that belongs to each node [m]; sums to the length."""
+        """Length of interface that belongs to each node (m,) [m]; the lengths sum to that of the interface."""
         half = np.diff(self.x) / 2
         return np.append(half, 0.0) + np.insert(half, 0, 0.0)
 
@@ -174,7 +180,7 @@ def _areas(corner) -> np.ndarray:
 
 
 def _upright(points, cells, where) -> np.ndarray:
-    """The cells counter-clockwise; PatchfemError for one that is twisted, not convex or has no area."""
+    """The cells, counter-clockwise; PatchfemError for one that is twisted, not convex or has no area."""
     clockwise = _areas(points[cells]) < 0
     cells = np.where(clockwise[:, None], cells[:, ::-1], cells)
     side = np.roll(points[cells], -1, axis=1) - points[cells]
@@ -189,8 +195,10 @@ def _upright(points, cells, where) -> np.ndarray:
 
 
 def _interface(points, nodes, side: str, where) -> np.ndarray:
-    """The interface nodes by rising x; PatchfemError unless they lie on y = 0 or fall off it gently, apart, and
-    nothing lies beyond y = 0."""
+    """The interface nodes by rising x.
+
+    PatchfemError unless they lie on y = 0 or fall off it gently, stand apart, and nothing lies beyond y = 0.
+    """
     name = f"{side}_interface"
     if nodes.size < 3:
         raise PatchfemError(f"{where}: {name} holds {nodes.size} nodes; three or more are needed")
@@ -222,7 +230,8 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
 
 
 def _joined(mesh: PieceMesh, side: str, where) -> None:
-    """PatchfemError unless the cells meet edge to edge, in one part, and the interface runs along their border."""
+    """Raise PatchfemError unless the cells meet edge to edge, in one part, and the interface runs along their
+    border."""
     ends, owner = cell_edges(mesh)
     count = len(mesh.points)
     near = cKDTree(mesh.points).query_pairs(CLOSE * mesh.length, output_type="ndarray")
@@ -253,7 +262,7 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
 
 
 def cell_edges(mesh: PieceMesh) -> tuple:
-    """(e, 2) edges of all cells, counter-clockwise, and (e,) the cell of each; triangles first."""
+    """Edges (e, 2) of all cells, counter-clockwise, and the cell (e,) of each; triangles first."""
     found, owner, first = [], [], 0
     for cells in (mesh.triangles, mesh.quads):
         found.append(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2))
@@ -263,7 +272,7 @@ def cell_edges(mesh: PieceMesh) -> tuple:
 
 
 def _hanging(mesh: PieceMesh, border, side: str, where) -> None:
-    """PatchfemError for a node of the border inside another border edge: cells that do not meet edge to edge."""
+    """Raise PatchfemError for a node of the border inside another border edge: cells that do not meet edge to edge."""
     nodes = np.unique(border)
     a, b = mesh.points[border[:, 0]], mesh.points[border[:, 1]]
     size = np.hypot(*(b - a).T)
@@ -288,7 +297,7 @@ def _centred(mesh: PieceMesh, x) -> PieceMesh:
 
 
 def halved(mesh: PieceMesh) -> PieceMesh:
-    """The same piece with every edge halved and every cell in four, for error estimates."""
+    """Refine a piece for error estimates: every edge halved, every cell in four."""
     ends, _ = cell_edges(mesh)
     count, turn = len(mesh.points), 3 * len(mesh.triangles)
     pairs, number = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)

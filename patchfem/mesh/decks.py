@@ -20,7 +20,10 @@ UNV_GROUPS = {2429: 2, 2430: 2, 2432: 2, 2435: 4, 2452: 4, 2467: 4, 2477: 4}
 
 
 def read_inp(text: str) -> Tagged:
-    """A flat deck: *NODE, *ELEMENT, *NSET, *ELSET (GENERATE too). PatchfemError or ValueError for what it cannot be."""
+    """Read a flat Abaqus or CalculiX deck: *NODE, *ELEMENT, *NSET, *ELSET (GENERATE too).
+
+    PatchfemError or ValueError for what it cannot be.
+    """
     nodes, elements, sets = {}, {}, {"NSET": {}, "ELSET": {}}
     for keyword, given, lines in _inp_blocks(text):
         if keyword in ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
@@ -92,7 +95,8 @@ def _inp_members(given: dict, lines, known: dict, nodes: dict, elements: dict) -
 
 
 def read_unv(text: str) -> Tagged:
-    """Nodes (2411, 781, 15), elements (2412, 780), groups (2467 and its kin), length unit (164)."""
+    """Read a universal file: nodes (2411, 781, 15), elements (2412, 780), groups (2467 and its kin), length unit
+    (164)."""
     nodes, elements, sets, unit = {}, {}, ({}, {}), 1.0
     for number, lines in _unv_datasets(text):
         if number in (2411, 781):
@@ -162,7 +166,7 @@ def _gather(sets: dict, name: str | None, members: list) -> None:
 
 
 def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, how: str) -> Tagged:
-    """Numbers of the file turned into places; -1 for a number that the file does not define."""
+    """The mesh with node numbers of the file turned into places; -1 for a number that the file does not define."""
     place = {number: k for k, number in enumerate(nodes)}
     sizes = {len(where) for where in nodes.values()}
     if sizes - {2} and sizes - {3}:

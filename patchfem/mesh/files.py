@@ -1,8 +1,7 @@
-"""The tagged mesh of a pair in and out of files: the one module of patchfem/mesh that touches meshio.
+"""The tagged mesh of a pair in and out of files; no other module of patchfem/mesh touches meshio.
 
-Cells are tagged upper_substrate, upper_coating, lower_substrate, lower_coating; edges upper_interface,
-lower_interface, upper_far, lower_far. The lower piece lies at y <= 0, the upper one at y >= 0, and each has
-interface nodes of its own.
+Cells are tagged upper_substrate, upper_coating, lower_substrate, lower_coating; edges upper_interface, lower_interface,
+upper_far, lower_far. The lower piece lies at y <= 0, the upper one at y >= 0, and each has interface nodes of its own.
 """
 
 from contextlib import redirect_stderr, redirect_stdout
@@ -64,10 +63,10 @@ def write_mesh(lower, path: Path, upper=None) -> None:
 
 
 def read_pieces(path: Path) -> PairMesh:
-    """Both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv.
+    """Read both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv.
 
-    The interfaces need the same ends, their nodes between may differ (`PairMesh.matching`). PatchfemError names what is
-    missing or wrong, `mesh.anymesh.pieces` lists it.
+    The interfaces need the same ends; their nodes between may differ (`PairMesh.matching`). PatchfemError names what is
+    missing or wrong, as `mesh.anymesh.pieces` lists it.
     """
     path = Path(path)
     if not path.is_file():
@@ -117,7 +116,7 @@ def _tagged(path: Path, mesh) -> Tagged:
 
 
 def _load(path: Path, known: tuple = (".msh",)):
-    """meshio's mesh of a file; what meshio prints is kept from stdout, and it may call sys.exit."""
+    """Read a file by meshio; what meshio prints is kept from stdout, and its sys.exit is caught."""
     import meshio
 
     if not path.is_file():
@@ -136,7 +135,7 @@ def _load(path: Path, known: tuple = (".msh",)):
 
 
 def _plausible(path: Path) -> None:
-    """PatchfemError when a section announces more entries than the file has bytes for."""
+    """Raise PatchfemError when a section announces more entries than the file has bytes for."""
     content = path.read_bytes()
     for section, least in ((b"$Nodes", 6), (b"$Elements", 4)):
         at = content.find(section)
@@ -148,7 +147,7 @@ def _plausible(path: Path) -> None:
 
 
 def _quads(path: Path, mesh) -> tuple:
-    """(cells (t, 4), name of the tag of each cell (t,)); PatchfemError for other cells, bad ids and missing tags."""
+    """Quads (t, 4) of a mesh and the tag of each (t,); PatchfemError for other cells, bad ids and missing tags."""
     names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
     cells, labels, edges = [], [], set()
     for block, physical in zip(mesh.cells, mesh.cell_data.get("gmsh:physical", [])):
@@ -176,10 +175,10 @@ def _quads(path: Path, mesh) -> tuple:
 
 
 def read_grid(path: Path) -> TensorGrid:
-    """The tensor grid behind a tagged .msh of two alike pieces, as `patchfem mesh` writes them.
+    """Recognise the tensor grid behind a tagged .msh of two alike pieces, as `patchfem mesh` writes them.
 
     PatchfemError names what is missing or wrong: tags, node ids, twisted cells, pieces that are unlike or shifted, a
-    mesh that is no tensor grid (not yet built).
+    mesh that is no tensor grid.
     """
     path = Path(path)
     mesh = _load(path)

@@ -39,7 +39,7 @@ class Layout:
 
 
 def columns(layout: Layout, times: int = 1) -> np.ndarray:
-    """(k,) columns [m] of a layout, each of its cells split into `times`; an even number of cells.
+    """Columns (k,) [m] of a layout, each of its cells split into `times`; an even number of cells.
 
     Columns stand at equal steps of the integral of 1/size, so neighbouring cells differ by about the slope at most.
     """

@@ -8,7 +8,8 @@ from .tensor import TensorGrid
 
 
 def as_piece(body) -> PieceMesh:
-    """A tensor grid as a piece of quads, node j*ny + i in column j and row i; any other piece as it is."""
+    """A body as a piece: a tensor grid as one of quads, node j*ny + i in column j and row i; any other piece as it
+    is."""
     if not isinstance(body, TensorGrid):
         return body
     nx, ny = body.x.size, body.depth.size
@@ -21,9 +22,10 @@ def as_piece(body) -> PieceMesh:
 
 
 def blocks(lower, upper) -> tuple:
-    """(points (N, 2) [m], [(kind, cells, names)]): kind triangle, quad or line, a name for every cell; lower first.
+    """Points (N, 2) [m] of a pair and its cells as [(kind, cells, names)]; lower piece first.
 
-    lower, upper: TensorGrid or PieceMesh. The lower piece lies at y <= 0. Cells are counter-clockwise.
+    kind: triangle, quad or line; names: one for every cell. lower, upper: TensorGrid or PieceMesh. The lower piece lies
+    at y <= 0. Cells are counter-clockwise.
     """
     points, found, shift = [], {"triangle": [], "quad": [], "line": []}, 0
     for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):

@@ -16,11 +16,11 @@ NEAR, GROWTH = 16, 0.1  # fine cells around the ends of the flat, growth of thei
 
 def rounded_pair(length: float, height: float, coating: float, radius: float, fine: float, coarse: float, *,
                  flat: float | None = None, quads: bool = False) -> PairMesh:
-    """Pieces of `length` and `height` [m], coating included (0: none), the upper the mirror image of the lower.
+    """Mesh two alike pieces with rounded edges by Gmsh, the upper the mirror image of the lower.
 
-    flat: half width of the flat [m], [length/2 - radius]: beyond it the profile is a circle of `radius` [m]; cells of
-    `fine` [m] at its ends grow to `coarse`; quads: recombined, a few triangles stay. Missing without a working Gmsh;
-    PatchfemError for sizes that do not fit.
+    length, height [m], coating [m] included (0: none). flat: half width of the flat [m], [length/2 - radius]; beyond it
+    the profile is a circle of `radius` [m]. Cells of `fine` [m] at its ends grow to `coarse`. quads: cells are
+    recombined, a few triangles stay. Missing without a working Gmsh; PatchfemError for sizes that do not fit.
     """
     flat = length / 2 - radius if flat is None else flat
     reach = length / 2 - flat
@@ -56,7 +56,7 @@ def _gmsh():
 
 
 def _draw(model, half: float, height: float, coating: float, radius: float, flat: float) -> None:
-    """Upper piece with its groups: per layer the flat between two arcs, each cut where it becomes steep."""
+    """Draw the upper piece with its groups: per layer the flat between two arcs, each cut where it becomes steep."""
     geo = model.geo
     steep = min(half, flat + radius * sin(atan(0.97 * STEEP)))  # chords of the arc stay below
     stations = [-half, *([-steep] if steep < half else []), -flat, flat, *([steep] if steep < half else []), half]

@@ -18,7 +18,11 @@ COATING_ROWS = 4  # least number of rows through a coating
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TensorGrid:
-    """x: (nx,) columns [m], 0 in the middle; depth: (ny,) rows [m], 0 at the interface; coating_rows: rows of cells."""
+    """A graded tensor grid of one piece.
+
+    x: (nx,) columns [m], 0 in the middle; depth: (ny,) rows [m], 0 at the interface; coating_rows: rows of cells in the
+    coating.
+    """
 
     x: np.ndarray
     depth: np.ndarray
@@ -40,7 +44,7 @@ class TensorGrid:
         return float(self.depth[self.coating_rows])
 
     def tributary(self) -> np.ndarray:
-        """(nx,) length of interface that belongs to each node [m]; sums to the length."""
+        """Length of interface that belongs to each node (nx,) [m]; the lengths sum to that of the interface."""
         cells = np.diff(self.x)
         out = np.zeros(self.x.size)
         out[:-1] += cells / 2
@@ -48,7 +52,7 @@ class TensorGrid:
         return out
 
     def cell_is_coating(self) -> np.ndarray:
-        """(nx - 1, ny - 1) bool, cells column by column."""
+        """Whether each cell is coating, (nx - 1, ny - 1) bool, column by column."""
         row = np.arange(self.depth.size - 1) < self.coating_rows
         return np.broadcast_to(row, (self.x.size - 1, row.size))
 
@@ -75,9 +79,9 @@ def graded_rows(start: float, total: float, growth: float = GROWTH, least: int =
 
 def graded_depth(height: float, first: float, coating: float = 0.0, growth: float = GROWTH,
                  least: int = COATING_ROWS) -> tuple:
-    """((ny,) depths [m], rows in the coating): rows from about `first` on, at least `least` of them in the coating.
+    """Depths (ny,) [m] and the number of rows in the coating: rows from about `first` [m] on.
 
-    PatchfemError when the coating fills the height.
+    At least `least` rows lie in the coating. PatchfemError when the coating fills the height.
     """
     if coating >= height:
         raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in {height:.6g} m")
@@ -107,8 +111,11 @@ def graded_grid(length: float, height: float, element_size: float, coating: floa
 
 
 def coarser(grid: TensorGrid) -> TensorGrid:
-    """The same piece with its cells merged two by two in both directions, an odd number of them as evenly as it goes: a
-    single thin row left over at a face would be better there than what it stands for."""
+    """Coarsen a grid: its cells merged two by two in both directions.
+
+    An odd number of cells is merged as evenly as it goes. A single thin row left over at a face would make the coarse
+    grid finer there than elsewhere.
+    """
     nx, coat = grid.x.size - 1, grid.coating_rows
     if nx % 2:
         x = np.linspace(grid.x[0], grid.x[-1], nx // 2 + 2)
@@ -125,14 +132,14 @@ def _every_second(levels) -> np.ndarray:
 
 
 def finer(grid: TensorGrid) -> TensorGrid:
-    """The same piece with every cell split in two in both directions, so that the grading goes on smoothly."""
+    """Refine a grid: every cell split in two in both directions, so that the grading goes on smoothly."""
     coat = grid.coating_rows
     coated, under = _split(grid.depth[:coat + 1]), _split(grid.depth[coat:])
     return TensorGrid(frozen_array(_split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat)
 
 
 def _split(levels) -> np.ndarray:
-    """Levels with one more inside each cell, nearer to the shorter neighbour: a geometric series stays one."""
+    """Levels with one more inside each cell, nearer to the shorter neighbour, so that a geometric series stays one."""
     if levels.size < 2:
         return levels
     cells = np.diff(levels)

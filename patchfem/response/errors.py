@@ -1,9 +1,10 @@
-"""Errors of the measures of a run, from coarser runs of the same scene.
+"""Errors of the measures of a march from coarser runs of the same scene.
 
-The step of a march meets reversals and sticks at irregular places, so its error falls like the square of the step on
-the whole but not at every halving: one difference can vanish by chance, so two are taken, and below 400 steps per cycle
-both count double. On 30 random scenes (two laws, one and two modes, 20 to 200 cycles) at 400 steps the estimate held
-the true error of every amplitude, acceleration peak and loop area, at a median of six times that error.
+The step of a march meets reversals and sticks at irregular places. So its error falls like the square of the step on
+the whole but not at every halving, and one difference can vanish by chance. Therefore two differences are taken, and
+below 400 steps per cycle both count double. On 30 random scenes (two laws, one and two modes, 20 to 200 cycles) at 400
+steps the estimate held the true error of every amplitude, acceleration peak and loop area, at a median of six times
+that error.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ from .rows import row_of
 
 
 def change(fine: dict, coarse: dict) -> dict:
-    """|difference| of the measures that both runs have; a phase is compared modulo pi."""
+    """Difference |fine - coarse| of the measures that both runs have; a phase is compared modulo pi."""
     out = {}
     for name in fine.keys() & coarse.keys():
         gap = abs(fine[name] - coarse[name])
@@ -36,8 +37,10 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
 
 
 def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
-    """name -> Measure whose error is the sum of the given errors, plus `least` of the value; a measure that a coarser
-    run does not have is as uncertain as it is large."""
+    """Measures by name whose error is the sum of the given errors, plus `least` of the value.
+
+    A measure that a coarser run does not have is as uncertain as it is large.
+    """
     out = {}
     for name, value in values.items():
         known = [part.get(name, abs(value)) for part in errors]

@@ -13,10 +13,10 @@ MOST = 100_000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Events:
-    """The last events of a run, at most MOST of them, in order; count: how many there were.
+    """The last events of a run in order, at most MOST of them.
 
-    time (k,) [s]; interface (k,), from 1, 0 for a border of the drive; kind (k,) as MEANINGS, up: towards positive
-    slip; slide (k,) [m]; source: a sentence on where they come from.
+    count: how many there were; time: (k,) [s]; interface: (k,), from 1, 0 for a border of the drive; kind: (k,) as
+    MEANINGS, up: towards positive slip; slide: (k,) [m]; source: a sentence on where they come from.
     """
 
     time: np.ndarray
@@ -37,11 +37,11 @@ def table(rows, count: int | None = None, source: str = "") -> Events:
 
 
 def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
-    """Events seen in samples: stop and release where the slip speed passes 1e-2 of its peak in the cycle, reversals
-    where it changes sign without a stop between samples.
+    """Events seen in samples.
 
-    time (k,) [s]; slips, slides (k, i) irreversible and whole motion [m]; held [m]: a cycle that slips less sticks;
-    borders [s] of the drive.
+    A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal where it changes sign
+    without a stop between samples. time: (k,) [s]; slips, slides: (k, i) irreversible and whole motion [m]; held [m]: a
+    cycle that slips less sticks; borders [s] of the drive.
     """
     rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
@@ -51,7 +51,8 @@ def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) 
 
 
 def states(time, slip, period: float, held: float = 0.0) -> tuple:
-    """((k - 1,) speed over its peak in the cycle, (k - 1,) +1, -1 slipping, 0 sticking) between the samples."""
+    """State between the samples: (k - 1,) speed over its peak in the cycle, and (k - 1,) +1, -1 slipping, 0
+    sticking."""
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
     cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
@@ -83,10 +84,10 @@ def _one(time, slip, slide, period: float, held: float, number: int) -> list:
 
 
 def sticks(events: Events, begin: float, end: float, moves) -> list:
-    """[(from, to)] [s] within [begin, end] between events while the first interface sticks; of several sets of stuck
-    interfaces those of the one that lasts longest.
+    """Stick intervals [(from, to)] [s] of the first interface within [begin, end], between events.
 
-    moves (i,): whether an interface without any event slips all the time.
+    Of several sets of stuck interfaces those of the one that lasts longest are taken. moves: (i,) whether an interface
+    without any event slips all the time.
     """
     count = len(moves)
     sliding = [bool(m) for m in moves]

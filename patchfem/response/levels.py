@@ -11,8 +11,11 @@ KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_a
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Level:
-    """The end of one level: drive [m s-2], whether nothing slipped, whether the last two windows agree, measures by
-    name and, where known, their errors."""
+    """The end of one level of the drive.
+
+    drive: acceleration [m s-2]; stuck: nothing slipped; values: measures by name; errors: theirs, as far as they are
+    known.
+    """
 
     drive: float
     stuck: bool
@@ -21,8 +24,10 @@ class Level:
 
 
 def bracket(levels) -> tuple | None:
-    """(number of the last level that still held, of the first that slips) on the way up; -1 for the start; None where
-    none slips."""
+    """Numbers of the last level that still held and of the first that slips, on the way up; None where none slips.
+
+    -1 stands for the start.
+    """
     for k, level in enumerate(levels):
         if not level.stuck:
             return k - 1, k
@@ -32,8 +37,11 @@ def bracket(levels) -> tuple | None:
 
 
 def jump(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
-    """(drive of the level after it, factor, distance of the two levels) of the largest change of a measure between
-    neighbouring levels, up or down, over what the drive itself changed; None with fewer than two levels that move."""
+    """Largest change of a measure between neighbouring levels, up or down, over what the drive itself changed.
+
+    Returns (drive of the level after it, factor, distance of the two levels); None with fewer than two levels that
+    move.
+    """
     found = []
     for a, b in pairwise(levels):
         if min(a.drive, b.drive, a.values[name], b.values[name]) > 0 and not (a.stuck or b.stuck):
@@ -43,8 +51,10 @@ def jump(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
 
 
 def hysteresis(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
-    """(largest difference of a measure at one drive passed upwards and downwards, its error); None where no drive is
-    passed both ways."""
+    """Hysteresis of a measure between the upward and the downward series of levels, and its error.
+
+    It is the largest difference at one drive that is passed both ways; None where no drive is.
+    """
     drives = np.array([level.drive for level in levels])
     top = int(np.argmax(drives))
     back = {round(level.drive, 9): level for level in levels[top + 1:]}

@@ -11,7 +11,10 @@ ROUND = 1e-13  # of the largest coordinate
 
 
 def energy_balance(book: dict) -> float:
-    """|work in - stored - dissipated| / (integral |power in| + peak stored) [1]; 0 for a run without energy."""
+    """Relative gap of the energy balance of a run [1]; 0 for a run without energy.
+
+    |work in - stored - dissipated| / (integral |power in| + peak stored).
+    """
     scale = book["power"] + book["peak_stored"]
     miss = book["work_in"] - book["stored"] - book["friction"] - book["viscous"]
     return abs(miss) / scale if scale > 0 else 0.0
@@ -23,8 +26,10 @@ def harmonic(time, weight, values, omega) -> complex:
 
 
 def step_harmonic(time, means, omega) -> complex:
-    """First Fourier coefficient of a force whose mean (k - 1,) over each step between `time` (k,) is known: exact for
-    a force that is constant in each step, so a jump at a sample costs nothing."""
+    """First Fourier coefficient of a force whose mean (k - 1,) over each step between `time` (k,) is known.
+
+    It is exact for a force that is constant in each step, so a jump at a sample costs nothing.
+    """
     turn = np.exp(-1j * omega * time)
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
 
@@ -75,7 +80,7 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
 
 
 def slip_noise(window: Response) -> float:
-    """Range [m] below which slip is the last digit of the coordinates."""
+    """Range [m] below which slip is no more than the last digit of the coordinates."""
     return ROUND * float(np.abs(window.modal).max(initial=0.0))
 
 
@@ -91,12 +96,12 @@ def ledger_measures(ledger) -> dict:
 
 
 def work_check(work, pairs, jumps: bool = False) -> float:
-    """The energy book against the run's own samples: |trapezoid of the forces over the slides - work|, over the work
-    that went to and fro [1]; it falls with the square of the step.
+    """Relative gap between the energy book and the run's own samples [1]; it falls with the square of the step.
 
-    work (k,) [J]: running sum of the book; pairs: (slide (k,) [m], force (k,) [N]) of every direction. jumps: whether
-    the force jumps where the slide starts or turns; the sample there holds the force before the jump, so the force
-    after it is taken from the work of the step that follows.
+    |trapezoid of the forces over the slides - work| over the work that went to and fro. work: (k,) [J] running sum of
+    the book; pairs: (slide (k,) [m], force (k,) [N]) of every direction. jumps: whether the force jumps where the slide
+    starts or turns. The sample there holds the force before the jump, so the force after it is taken from the work of
+    the step that follows.
     """
     parts = np.diff(work)
     power, total = np.abs(parts).sum(), 0.0
@@ -170,9 +175,9 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
 
 
 def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> Outcome:
-    """steady, transient or grows from the amplitudes of successive windows.
+    """Class of a motion by the amplitudes of successive windows: steady, transient or grows.
 
-    steady: the last change stays below the tolerance and so does what a geometric tail would still add. Without a
+    steady: the last change stays below the tolerance, and so does what a geometric tail would still add. Without a
     shrinking change the motion grows when it still rises; anything else is transient.
     """
     a = np.asarray(amplitudes, float)
@@ -190,19 +195,21 @@ def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> Outcome:
 
 
 def tail(three) -> complex | None:
-    """What a geometric tail through three equally spaced values still adds to the last one (Aitken); None where the
-    changes do not shrink. Complex values carry a beat: its ratio is complex."""
+    """Rest of a geometric series through three equally spaced values: what it still adds to the last one (Aitken).
+
+    None where the changes do not shrink. Complex values carry a beat: its ratio is complex.
+    """
     before, change = three[1] - three[0], three[2] - three[1]
     ratio = change / before if before != 0 else 0.0
     return change * ratio / (1 - ratio) if abs(ratio) < 0.9995 else None
 
 
 def steady_amplitude(amplitudes, phasors) -> tuple:
-    """(steady amplitude, its error) by extrapolation, (None, None) where there is no bounded tail to be seen.
+    """Steady amplitude by extrapolation, and its error; (None, None) where no bounded tail can be seen.
 
     amplitudes, phasors: (w,) of the last cycle of successive windows; the phasor is the drive-frequency part of the
     motion. What is left of a decaying free motion turns and shrinks by one complex factor per window, so the phasors
-    are extrapolated (Aitken); the waveform, amplitude over |phasor|, settles with the size of that factor. The error is
+    are extrapolated (Aitken). The waveform, amplitude over |phasor|, settles with the size of that factor. The error is
     six times the spread of the last estimates plus twice what the waveform still changes; where it is as large as what
     was added there is no estimate.
     """
@@ -226,13 +233,13 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
 
 
 def window_ends(extremes, phasors, window: int) -> tuple:
-    """(amplitudes, phasors) of the last cycle of each window; extremes (c, 2), phasors (c,) per cycle."""
+    """Amplitudes and phasors of the last cycle of each window; extremes (c, 2), phasors (c,) per cycle."""
     pick = np.arange(len(phasors) - 1, -1, -window)[::-1]
     return (extremes[pick, 1] - extremes[pick, 0]) / 2, phasors[pick]
 
 
 def _rises(a) -> bool:
-    """Whether the last windows rise one after the other, by steps alike: noise does not."""
+    """Whether the last windows rise one after the other by like steps, as noise does not."""
     steps = np.diff(a[-6:])
     if a.size < 4 or steps.min() <= 0:
         return False

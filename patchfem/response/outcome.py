@@ -8,7 +8,7 @@ from .measures import classify
 
 
 def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0) -> tuple:
-    """(outcome, measures with the steady estimate where there is one).
+    """Outcome of a run, and its measures with the steady estimate where there is one.
 
     Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`). A
     release or a step is steady once it is at rest: its amplitude below the tolerance of the largest; else the same
@@ -46,8 +46,10 @@ def changing_note(outcome: Outcome, drive) -> list:
 
 
 def steady_of(drive, amplitudes, phasors) -> tuple:
-    """`response.measures.steady_amplitude` under a drive that ends as a sine, (None, None) under any other: a released
-    or struck rig comes to rest, whatever the tail of its amplitudes looks like."""
+    """Steady amplitude and its error under a drive that ends as a sine, (None, None) under any other.
+
+    A released or struck rig comes to rest, whatever the tail of its amplitudes looks like.
+    """
     from .measures import steady_amplitude
 
     return steady_amplitude(amplitudes, phasors) if sinusoidal(drive) else (None, None)

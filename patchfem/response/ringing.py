@@ -1,6 +1,6 @@
-"""What rings while an interface sticks: a decaying sinusoid beside the forced sine and a constant.
+"""Ringing of a rig while an interface sticks: a decaying sinusoid beside the forced sine and a constant.
 
-The frequency and decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra 1973); up to three
+The frequency and decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra 1973). Up to three
 sinusoids are fitted together and the one with the most energy is kept.
 """
 
@@ -66,8 +66,11 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
 
 
 def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
-    """({ring_frequency [Hz], ring_damping [1]}, their errors): medians over the sticks [(begin, end)] [s] of a signal;
-    ({}, {}) where nothing rings. The error is twice what the spread leaves of the median, and that of a fit."""
+    """Frequency [Hz] and damping ratio [1] of what rings in a signal, and their errors: medians over the sticks.
+
+    Returns ({ring_frequency, ring_damping}, their errors); ({}, {}) where nothing rings. sticks: [(begin, end)] [s].
+    The error is twice what the spread leaves of the median, and that of a fit.
+    """
     size = float(np.abs(value).max(initial=0.0))
     found = []
     for begin, end in sticks[-MOST_STICKS:]:
@@ -87,7 +90,7 @@ def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
 
 
 def _even(time, value) -> tuple:
-    """Samples at equal steps, times from 0: the ones that stand beside them (both sides of an event) left out."""
+    """Samples at equal steps, times from 0; the ones that stand beside them (both sides of an event) are left out."""
     if time.size < 3:
         return time, value
     step = float(np.median(np.diff(time)))
@@ -116,7 +119,8 @@ def _columns(time, forced, poles) -> np.ndarray:
 
 
 def _apart(columns, value) -> tuple:
-    """(what columns (k, c) leave of value (k,), orthonormal basis of the columns that count, their numbers (c,))."""
+    """Rest of a projection: (what columns (k, c) leave of value (k,), orthonormal basis of those that count, their
+    numbers)."""
     u, sizes, turned = np.linalg.svd(columns, full_matrices=False)
     u = u[:, sizes > 1e-12 * sizes[0]]
     inside = u.T @ value
@@ -124,7 +128,7 @@ def _apart(columns, value) -> tuple:
 
 
 def _share(time, value, forced, poles) -> tuple:
-    """(what is left over (k,), the sinusoids [(k,)])."""
+    """Part of each sinusoid: (what is left over (k,), the sinusoids [(k,)])."""
     columns, n = _columns(time, forced, poles), forced.shape[1]
     left, _, numbers = _apart(columns, value)
     return left, [columns[:, n + 2 * k:n + 2 * k + 2] @ numbers[n + 2 * k:n + 2 * k + 2]
@@ -132,8 +136,10 @@ def _share(time, value, forced, poles) -> tuple:
 
 
 def _grown(time, value, forced, rest) -> tuple | None:
-    """(poles (2 r,) frequency [rad/s] and decay [1/s] in turn, their standard errors), one sinusoid after the other
-    while each halves what is left."""
+    """Poles (2 r,) frequency [rad/s] and decay [1/s] in turn, and their standard errors.
+
+    One sinusoid is added after the other while each halves what is left.
+    """
     scale = last = np.sqrt(np.mean(rest**2))
     best = None
     for _ in range(MOST_TERMS):
@@ -159,7 +165,7 @@ def _highest(time, rest) -> float:
 
 
 def _starts(time, value, forced, poles, rest) -> list:
-    """Starting values: around the highest line of what is left, the best of them by projection, with two decays."""
+    """Starting values around the highest line of what is left: the best of them by projection, with two decays."""
     span, top = time[-1], _highest(time, rest)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
     sizes = [np.sum(_share(time, value, forced, np.append(poles, (own, 0.5 / span)))[0]**2) for own in near]
@@ -168,8 +174,10 @@ def _starts(time, value, forced, poles, rest) -> list:
 
 
 def _refined(time, value, forced, poles) -> tuple:
-    """(poles, their standard errors, rms of what is left) by Levenberg and Marquardt on the projected residual, with
-    the Jacobian of Kaufman (1975)."""
+    """Refined poles, their standard errors and the rms of what is left.
+
+    Levenberg and Marquardt's method on the projected residual, with the Jacobian of Kaufman (1975).
+    """
     scale, damping = np.abs(poles) + 1 / time[-1], 1e-3
     left, slopes = _slopes(time, value, forced, poles, scale)
     for _ in range(60):
@@ -190,7 +198,7 @@ def _refined(time, value, forced, poles) -> tuple:
 
 
 def _slopes(time, value, forced, poles, scale) -> tuple:
-    """(projected residual (k,), its derivative by poles/scale (k, 2 r))."""
+    """Projected residual (k,) and its derivative by poles/scale (k, 2 r)."""
     columns, n = _columns(time, forced, poles), forced.shape[1]
     left, basis, numbers = _apart(columns, value)
     out = []

@@ -110,15 +110,16 @@ ROWS = (
     Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
     Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
     Row("onset_level", "m s-2", 0.0,
-        "level of the drive at which the interface starts to slip, halved between two levels"),
+        "level of the drive at which the interface starts to slip, found by halving between two levels"),
     Row("jump_level", "m s-2", 0.0, "level after the largest jump of the amplitude between two levels"),
-    Row("level_hysteresis", "m", 0.0, "largest difference of the amplitude at one level passed upwards and downwards"),
+    Row("level_hysteresis", "m", 0.0,
+        "hysteresis: largest difference of the amplitude between rising and falling levels, at one level"),
 )
 TABLE = {row.name: row for row in ROWS}
 
 
 def measures_of(seen: Seen) -> dict:
-    """name -> value of every row that the run has: the engine's own value before the one read off the samples."""
+    """Value by name of every row that the run has; the engine's own value comes before the one read off the samples."""
     out = {}
     for row in ROWS:
         value = seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
@@ -128,7 +129,7 @@ def measures_of(seen: Seen) -> dict:
 
 
 def of_first(name: str) -> str:
-    """The name of a measure without the number of its interface: slip_amplitude_2 is slip_amplitude."""
+    """Name of a measure without the number of its interface: slip_amplitude_2 becomes slip_amplitude."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
 

@@ -12,7 +12,7 @@ SOURCE = "located by the event engine"
 
 
 def slips_of(response) -> tuple:
-    """(irreversible motion (k, i), whole motion (k, i)) [m] of every interface."""
+    """Irreversible and whole motion (k, i) [m] of every interface."""
     extra = response.extra
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
@@ -49,9 +49,11 @@ def moving(window, drive, log=None, held: float = 0.0) -> list:
 
 
 def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
-    """(ring_frequency and ring_damping by name, their errors) over the sticks of the window, from the acceleration at
-    the output; ({}, {}) where nothing rings, where the drive has no frequency of its own (sweep, recorded), or where
-    the samples do not resolve the fastest mode."""
+    """Ringing over the sticks of the window: (ring_frequency and ring_damping by name, their errors).
+
+    It is read off the acceleration at the output. ({}, {}) where nothing rings, where the drive has no frequency of its
+    own (sweep, recorded), or where the samples do not resolve the fastest mode.
+    """
     if not drive.segments or window.time.size < 8:
         return {}, {}
     if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
@@ -67,7 +69,7 @@ def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
 
 
 def with_own(measures: dict, own: dict | None) -> dict:
-    """Measures with what the run itself leaves open of them added to their errors."""
+    """Measures with the uncertainty that the run itself leaves added to their errors."""
     return {name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
             for name, m in measures.items()}
 

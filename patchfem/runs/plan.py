@@ -113,7 +113,7 @@ def _verdict(model: Model, groups: dict, size: int, said: list) -> list:
         out.append(f"run will refuse: about {size / 1e9:.3g} GB are needed, {free_bytes() / 1e9:.3g} GB are free")
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
-        out.append(f"the pieces' own shear gives way by about {groups['slip_length']:.2g} m before the patch slips")
+        out.append(f"the pieces shear elastically by about {groups['slip_length']:.2g} m before the patch slips")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
         out.append(f"{model.soft} by tangential modes of all nodes, as the load changes with the motion; half as many "
                    "check them")

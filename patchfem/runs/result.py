@@ -100,8 +100,8 @@ def unripe(law, speed: float) -> list:
     a = ripening(law, speed) if law.reading == "report" else 0.0
     if a <= 0.3:
         return []
-    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit 0.3): as printed, "
-            "friction then falls below 2.18-2.21; lower friction.slip_growth, or use reading = \"stretch\""]
+    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit 0.3), so friction as "
+            "printed falls below 2.18-2.21; lower friction.slip_growth, or use reading = \"stretch\""]
 
 
 def creeping(law, outcome, found) -> list:

@@ -43,8 +43,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; lower "
                             "contact.element_size")
         if patch.pair.coupling > 0.02 and model.kind != "patch":
-            warnings.append("the pieces are unlike: what shear does to the normal closing, and the load to the slide, "
-                            f"is left out; it is {patch.pair.coupling:.2g} of what shear does to the slide")
+            warnings.append("the pieces are unlike: the coupling between shear and normal closing is left out; it "
+                            f"is {patch.pair.coupling:.2g} of the tangential compliance")
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = _static(what, patch, coarse, seconds, warnings)
@@ -77,7 +77,7 @@ def _loose(result: Result) -> list:
     if asked is not None and asked.mesh is not None:
         remedies.append("split the elements of contact.mesh")
     elif asked is not None and asked.chosen:
-        remedies.append("the mesh that the tolerance chose reaches no further, their errors stand")
+        remedies.append("the mesh is the finest that the tolerance may choose, so these errors stay")
     elif asked is not None:
         remedies.append("lower contact.element_size")
     finer = "harmonics" if result.extra.get("engine") == "harmonic" else "steps_per_cycle"

@@ -133,7 +133,7 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
 
 
 def _numbers(data, key, where, *shapes) -> np.ndarray:
-    """data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
+    """Array data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
     value = np.asarray(data[key])
     if value.dtype.kind not in "iufb":
         raise PatchfemError(f"{where}: {key} holds no real numbers")

@@ -30,7 +30,7 @@ def omega_of(drive) -> float:
 
 
 def peak_speed(drive, start: Start | None = None) -> float:
-    """Size of the speeds to expect [m/s]: largest acceleration over omega, or what the start has; > 0 or 0."""
+    """Scale of the speeds to expect [m/s]: largest acceleration over omega, or what the start has; > 0 or 0."""
     omega = omega_of(drive)
     out = largest(drive) / omega
     if start is not None:

@@ -31,17 +31,17 @@ class Piecewise:
 
 
 def step(size: float, period: float, moving: bool = True) -> Piecewise:
-    """A constant `size` [m s-2] from t = 0."""
+    """A step drive: a constant `size` [m s-2] from t = 0."""
     return Piecewise((Segment(0.0, size),), period, moving)
 
 
 def release(period: float) -> Piecewise:
-    """No drive at all: free motion from what the start gives."""
+    """No drive at all: free motion from the given start."""
     return Piecewise((Segment(0.0),), period, False)
 
 
 def levels(accelerations, omega: float, cycles: float, moving: bool = True) -> Piecewise:
-    """A sine whose amplitude [m s-2] changes every `cycles` cycles, its phase going on (as the report tests)."""
+    """A sine drive whose amplitude [m s-2] changes every `cycles` cycles, its phase going on (as the report tests)."""
     period = 2 * np.pi / omega
     parts = [Segment(k * cycles * period, 0.0, float(a), omega, 2 * np.pi * (k * cycles % 1.0))
              for k, a in enumerate(accelerations)]
@@ -66,12 +66,12 @@ class Sweep:
 
     @property
     def segments(self) -> tuple:
-        """None: the response to a chirp has no elementary form."""
+        """Empty: the response to a chirp has no elementary form."""
         return ()
 
     @property
     def period(self) -> float:
-        """Of the frequency at the end [s]."""
+        """Period of the frequency at the end [s]."""
         return 1 / self.high
 
     def frequency(self, t):
@@ -80,7 +80,7 @@ class Sweep:
         return self.low * (self.high / self.low)**part if self.logarithmic else self.low + (self.high - self.low) * part
 
     def phase(self, t):
-        """2 pi int_0^t f dt [rad]."""
+        """Phase 2 pi int_0^t f dt [rad]."""
         t = np.asarray(t, float)
         inside = np.minimum(t, self.duration)
         if self.logarithmic and self.high != self.low:
@@ -113,7 +113,7 @@ class Recorded:
 
     @property
     def segments(self) -> tuple:
-        """None: a recorded signal is marched."""
+        """Empty: a recorded signal is marched."""
         return ()
 
     def values(self, t):

@@ -25,7 +25,10 @@ FLAT = 1e-9  # relative residual at which nothing is left
 
 
 class Fit:
-    """The separable least squares. omega (q,) [rad/s]; data (q, p) complex; power (p,): derivatives measured."""
+    """A separable least-squares problem.
+
+    omega: (q,) [rad/s]; data: (q, p) complex; power: (p,) derivatives that were measured.
+    """
 
     def __init__(self, omega, data, power):
         self.omega, self.top = omega, omega.max()
@@ -50,7 +53,7 @@ class Fit:
         return np.vstack([values.real, values.imag])
 
     def columns(self, theta):
-        """(2q, n + 2) real design for theta = (ln w_r ..., ln zeta_r ...), its derivatives and the column scales."""
+        """Real design (2q, n + 2) for theta = (ln w_r ..., ln zeta_r ...), its derivatives and the column scales."""
         w, z = np.exp(np.split(theta, 2))
         s = self.omega[:, None]
         base = (self.weight * self.lift)[:, None]
@@ -63,7 +66,8 @@ class Fit:
         return design / scale, self._real(d_w) / scale[:w.size], self._real(d_z) / scale[:w.size], scale
 
     def solve(self, theta):
-        """(residual (2q, p), coefficients (n + 2, p), Q, derivatives of the columns, column scales) at theta."""
+        """Linear solve at theta: (residual (2q, p), coefficients (n + 2, p), Q, derivatives of the columns, column
+        scales)."""
         design, d_w, d_z, scale = self.columns(theta)
         q, r = np.linalg.qr(design)
         coefficients = np.linalg.lstsq(r, q.T @ self.target, rcond=1e-13)[0]
@@ -82,7 +86,7 @@ class Fit:
         return np.stack(out, axis=1)
 
     def refine(self, theta, close=1e-6):
-        """theta at the least squares to the relative change `close`, and its residual sum."""
+        """The least squares theta to the relative change `close`, and its residual sum."""
         n = theta.size // 2
         low = np.concatenate([np.full(n, np.log(self.omega.min() / 2)), np.full(n, np.log(1e-7))])
         high = np.concatenate([np.full(n, np.log(self.top * 2)), np.full(n, np.log(0.9))])
@@ -92,7 +96,7 @@ class Fit:
         return found.x, 2 * found.cost
 
     def left(self, theta):
-        """What the modes of theta leave (q, p), weighted."""
+        """Rest of the responses without the modes of theta (q, p), weighted."""
         rest = self.solve(theta)[0]
         half = len(self.omega)
         return rest[:half] + 1j * rest[half:]
@@ -105,16 +109,16 @@ class Fit:
         return (design[:half] + 1j * design[half:])[:, :, None] * coefficients[None, :n]
 
     def residues(self, theta):
-        """(A (n, p), L (p,), U (p,)) in the units of the receptance."""
+        """Residues A (n, p), L (p,) and U (p,) in the units of the receptance."""
         _, coefficients, _, _, scale = self.solve(theta)
         found = coefficients / scale[:, None] * self.size
         return found[:-2], found[-2] * self.top**2, found[-1]
 
 
 def poles(omega, data, power) -> tuple:
-    """(w (n,) [rad/s], zeta (n,), Fit, theta): modes of responses data (q, p) at omega (q,) [rad/s], ascending.
+    """Modes of responses data (q, p) at omega (q,) [rad/s], ascending: (w (n,) [rad/s], zeta (n,), Fit, theta).
 
-    power (p,): derivatives of displacement measured (0, 1, 2). PatchfemError where there is no mode.
+    power: (p,) derivatives of displacement that were measured (0, 1, 2). PatchfemError where there is no mode.
     """
     fit = Fit(omega, data, power)
     theta, cost = np.zeros(0), np.sum(fit.residual(np.zeros(0))**2)
@@ -143,7 +147,7 @@ def _with(theta, w, zeta):
 
 
 def _polished(fit, theta, cost):
-    """theta to the last digits, with weights after the noise: variance a^2 + b^2 level^2 fitted to what is left."""
+    """Theta to the last digits, with weights after the noise: variance a^2 + b^2 level^2 fitted to what is left."""
     if not theta.size:
         return theta
     if np.sqrt(cost) > FLAT * fit.norm:
@@ -158,7 +162,8 @@ def _polished(fit, theta, cost):
 
 
 def _pruned(fit, theta):
-    """theta without modes that make up less of the responses around their own frequency than 5 times what is left."""
+    """Theta without the modes that make up less of the responses around their own frequency than 5 times what is
+    left."""
     while theta.size > 2:
         w, weight = np.exp(np.split(theta, 2)[0]), fit.weight[:, None]
         rest = np.sqrt(np.mean(np.abs(fit.left(theta) / weight)**2, axis=1))
@@ -175,8 +180,10 @@ def _pruned(fit, theta):
 
 
 def _starts(fit, theta):
-    """(w, zeta) at the largest peaks of what is left, as it is and in proportion to the responses; the damping from
-    their width at half the height."""
+    """Starting values (w, zeta) at the largest peaks of what is left, as it is and in proportion to the responses.
+
+    The damping comes from their width at half the height.
+    """
     rest, omega = fit.left(theta), fit.omega
     size = np.maximum(np.sqrt(np.sum(np.abs(rest)**2, axis=1)), 1e-300)
     alike = np.real(np.sum(rest[:-1] * rest[1:].conj(), axis=1)) / (size[:-1] * size[1:])

@@ -54,7 +54,8 @@ def basis(M, K, C=None, *, faces=None, output=None, base=None, force=None, names
 
 
 def split(D, omega) -> tuple:
-    """(zeta (n,), damping (n, n) or None) of D (n, n) [1/s]: None where D = diag(2 zeta omega) says it all."""
+    """Damping ratios (n,) and the damping matrix (n, n) of D (n, n) [1/s]; None where D = diag(2 zeta omega) says it
+    all."""
     own = np.diag(D)
     zeta = np.divide(own, 2 * omega, out=np.zeros_like(own), where=omega > 0)
     alone = not (D - np.diag(own)).any() and not own[omega == 0].any()
@@ -62,7 +63,8 @@ def split(D, omega) -> tuple:
 
 
 def decouple(rows) -> tuple:
-    """(omega (n,), V (n, n)) of the stiffness rows^T rows over unit mass, rows (s, n) [1/s], ascending.
+    """Frequencies omega (n,) and shapes V (n, n) of the stiffness rows^T rows over unit mass, rows (s, n) [1/s],
+    ascending.
 
     By singular values: omega is right to round-off of the largest omega, not of its square.
     """
@@ -168,7 +170,8 @@ def _row(row, n, name) -> np.ndarray:
 
 
 def _signs(phi, output) -> np.ndarray:
-    """+-1 per shape: the output moves in its positive sense, or the largest entry does where it is a node."""
+    """Sign +-1 per shape: the output moves in its positive sense, or the largest entry does where the output is a
+    node."""
     there = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
     size = np.abs(output) @ np.abs(phi)

@@ -1,4 +1,4 @@
-"""Where a rig slides, is watched and is driven, as nodes and directions of measured modes: "12:+x", "12:+x, 13:-x"."""
+"""Places where a rig slides, is watched and is driven, as nodes and directions of measured modes: "12:+x, 13:-x"."""
 
 import re
 from dataclasses import dataclass, field
@@ -13,8 +13,11 @@ _PLACE = re.compile(r"(\d+):([+-]?)(r?[xyz])")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Shapes:
-    """n measured modes. frequency (n,) [Hz], zeta (n,); motion: (node, axis 0..5) -> (n,) for unit modal mass
-    [kg^-1/2, rotations per m]; notes: sentences for the user."""
+    """Measured modes, n of them.
+
+    frequency: (n,) [Hz]; zeta: (n,); motion: (node, axis 0..5) -> (n,) for unit modal mass [kg^-1/2, rotations per m];
+    notes: sentences for the user.
+    """
 
     frequency: np.ndarray
     zeta: np.ndarray

@@ -6,7 +6,7 @@ from ..core import ModalBasis, PatchfemError
 
 
 def receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
-    """Motion per force (k, o, i) [m/N] at angular frequencies omega (k,) [rad/s] between modal rows (o, n), (i, n).
+    """Motion per force (k, o, i) [m/N] at angular frequencies omega (k,) [rad/s] between modal rows (o, n) and (i, n).
 
     H = rows_out (diag(omega_r^2) - omega^2 + i omega D)^-1 rows_in^T / mass. PatchfemError where it is infinite: on an
     undamped resonance, or at 0 with a rigid mode.

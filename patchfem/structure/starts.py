@@ -6,7 +6,7 @@ from ..core import ModalBasis, PatchfemError, Start, frozen_array
 
 
 def at_rest(basis: ModalBasis) -> Start:
-    """Nothing moved, nothing moving."""
+    """Start at rest: nothing is displaced and nothing moves."""
     zero = frozen_array(np.zeros(basis.omega.size))
     return Start(zero, zero)
 
@@ -30,7 +30,7 @@ def _coordinates(basis: ModalBasis, values) -> np.ndarray:
 
 
 def released(basis: ModalBasis, displacement: float) -> Start:
-    """At rest with the output moved by `displacement` [m], in the shape that a static force at the output gives.
+    """Start at rest with the output moved by `displacement` [m], in the shape that a static force at the output gives.
 
     One mode: it alone. Several: z_i proportional to output_i / omega_i^2; where rigid modes move the output, a force
     moves them alone, z_i proportional to output_i. PatchfemError where no mode moves the output.
@@ -50,5 +50,6 @@ def released(basis: ModalBasis, displacement: float) -> Start:
 
 
 def base_step(basis: ModalBasis, displacement: float) -> Start:
-    """The instant after the base has jumped by `displacement` [m]: what it carries stays where it was, z = -X base."""
+    """Start in the instant after the base has jumped by `displacement` [m]: what it carries stays where it was, z = -X
+    base."""
     return Start(frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size)))

@@ -1,4 +1,4 @@
-"""How much of a trace is too fine for the elements: the share of its height in short waves."""
+"""Part of a trace that is too fine for the elements: the share of its height in short waves."""
 
 import numpy as np
 
@@ -11,11 +11,12 @@ _MOST = 1 << 20  # samples of an evened trace
 
 
 def spectrum(profile: Profile) -> tuple:
-    """(wavelength (k,) [m] falling from twice the length, mean square (k,) [m2]) of the levelled trace.
+    """Spectrum of the levelled trace: wavelength (k,) [m], falling from twice the length, and mean square (k,) [m2].
 
-    The cosines of half a wave and its multiples over the trace: its mirror image goes on without a jump, so the ends
-    put no false short waves in, as those of a Fourier series do. The mean squares add up to that of the trace (exactly,
-    by the trapezoidal rule). Uneven samples are first read off at an even step. PatchfemError for missing heights.
+    The waves are the cosines of half a wave and its multiples over the trace. The mirror image of the trace goes on
+    without a jump, so the ends put no false short waves in, as those of a Fourier series do. The mean squares add up to
+    that of the trace, exactly by the trapezoidal rule. Uneven samples are first read off at an even step. PatchfemError
+    for missing heights.
     """
     from scipy.fft import dct
 
@@ -51,7 +52,7 @@ def element_for(profile: Profile, kept: float) -> float:
 
 
 def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | None:
-    """The sentence for a scene whose elements [m] are too long for the trace, None where `limit` is kept.
+    """Sentence for a scene whose elements [m] are too long for the trace, None where `limit` is kept.
 
     It is the refusal of a scene without [contact.asperities], and a warning of `plan`.
     """
@@ -82,6 +83,6 @@ def _element(waves, power, kept: float) -> float:
 
 
 def _two_digits(length: float) -> float:
-    """Rounded down to two digits, so that the suggestion itself passes."""
+    """A length rounded down to two digits, so that the suggestion itself passes."""
     unit = 10.0 ** (np.floor(np.log10(length)) - 1)
     return float(np.floor(length / unit * (1 + 1e-12)) * unit)

@@ -45,11 +45,12 @@ def on_nodes(profile: Profile, x: np.ndarray) -> np.ndarray:
     """Gap contribution (m,) [m] of a trace in the coordinate of the patch (`placed`) at its nodes x (m,) [m].
 
     The heights count as gap, as written: a larger z is more open. Each node takes the mean of the trace, straight lines
-    between samples, over its tributary length (half the way to its neighbours), integrated exactly, so that waves
-    shorter than an element do not pass for long ones: a wave of two elements enters with 64 % of its height, of four
-    with 90 %, of one with nothing. The mean is carried from the middle of the tributary length to the node along the
-    slope of the neighbouring means, so that straight profiles are exact on any nodes and smooth ones to second order
-    (h^2 z''/24 inside even nodes). Beyond the trace it goes on flat, over half an element at most.
+    between samples, over its tributary length (half the way to its neighbours). The mean is integrated exactly, so that
+    waves shorter than an element do not pass for long ones: a wave of two elements enters with 64 % of its height, of
+    four with 90 %, of one with nothing. The mean is carried from the middle of the tributary length to the node along
+    the slope of the neighbouring means, so that straight profiles are exact on any nodes and smooth ones to second
+    order (h^2 z''/24 inside even nodes). Beyond the trace it goes on flat, over half an element at most.
+
     PatchfemError for missing heights and a trace that does not cover the patch.
     """
     x = _nodes(x)

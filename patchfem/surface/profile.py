@@ -1,4 +1,4 @@
-"""One measured or made trace of heights, and what every trace goes through first: levelling and cleaning."""
+"""One measured or made trace of heights, and the levelling and cleaning that every trace goes through first."""
 
 from dataclasses import dataclass, replace
 
@@ -13,9 +13,11 @@ _BLOCK = 1 << 17  # windows sorted at a time
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m]; straight lines between them.
+    """A trace of heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m]; straight lines between
+    them.
 
-    source: what a message calls it. notes: what was done to it on the way, one sentence each, for the warnings.
+    source: a name of the trace for messages; notes: what was done to it on the way, one sentence each, for the
+    warnings.
     """
 
     x: np.ndarray
@@ -25,17 +27,17 @@ class Profile:
 
     @property
     def missing(self) -> np.ndarray:
-        """(n,) bool: where no height was measured."""
+        """Whether no height was measured, (n,) bool."""
         return np.isnan(self.z)
 
     @property
     def length(self) -> float:
-        """From the first to the last sample [m]."""
+        """Distance from the first to the last sample [m]."""
         return float(self.x[-1] - self.x[0])
 
 
 def level(profile: Profile) -> Profile:
-    """Minus the least-squares line of its measured samples, which all count alike."""
+    """Level a trace: subtract the least-squares line of its measured samples, which all count alike."""
     there = ~profile.missing
     x, z = profile.x, profile.z
     if there.sum() < 2:
@@ -46,10 +48,11 @@ def level(profile: Profile) -> Profile:
 
 
 def cleaned(profile: Profile, longest: float) -> Profile:
-    """Without spikes (`spikes`) and missing heights: straight lines stand in their place, missing ends are cut off.
+    """Clean a trace of spikes (`spikes`) and missing heights.
 
-    longest: what a line may bridge [m], from one good sample to the next, such as two elements. The notes tell the
-    counts. PatchfemError where a run is longer or fewer than two heights are left.
+    Straight lines stand in their place; missing ends are cut off. longest: the distance that a line may bridge [m],
+    from one good sample to the next, such as two elements. The notes tell the counts. PatchfemError where a run is
+    longer or fewer than two heights are left.
     """
     lost = profile.missing
     peaked = spikes(profile)
@@ -84,11 +87,11 @@ def _counts(profile: Profile, lost, peaked, widest: float):
 
 
 def spikes(profile: Profile) -> np.ndarray:
-    """(n,) bool: heights more than SPIKE robust standard deviations off the median of the WINDOW samples around them.
+    """Spikes of a trace, (n,) bool: heights more than SPIKE robust standard deviations off the median around them.
 
-    The standard deviation is 1.4826 times the largest of: the median deviation inside the window, its median over all
-    windows, and the smallest step between two heights (coarse digits). A feature of more than half the window stays.
-    Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
+    The median is that of WINDOW samples. The standard deviation is 1.4826 times the largest of: the median deviation
+    inside the window, its median over all windows, and the smallest step between two heights (coarse digits). A feature
+    of more than half the window stays. Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
     """
     out, there = np.zeros(profile.x.size, bool), np.flatnonzero(~profile.missing)
     if there.size < WINDOW:

@@ -10,9 +10,10 @@ SHORTEST = 1e-9  # [m]
 
 
 def checked(path, x, z, at, factors: tuple) -> Profile:
-    """The trace of samples x, z (n,) in the units of a file, with their factors to metres; at (n,): their lines.
+    """Turn samples of a file into a trace in order of growing x, one height per place; the notes tell what that took.
 
-    In order of growing x, one per place; the notes tell what that took. PatchfemError names line and value.
+    x, z: (n,) in the units of the file, with their factors to metres; at: (n,) their lines. PatchfemError names line
+    and value.
     """
     if np.isfinite(z).sum() < 2:
         raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
@@ -35,7 +36,7 @@ def checked(path, x, z, at, factors: tuple) -> Profile:
 
 
 def _evened(path, x, factor: float) -> tuple:
-    """x without the rounding of its printed digits, where even spacing explains every one of them.
+    """Places x without the rounding of their printed digits, where even spacing explains every one of them.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
     """
@@ -56,7 +57,7 @@ def _evened(path, x, factor: float) -> tuple:
 
 
 def _single(path, x, z, at, factor: float) -> tuple:
-    """x strictly growing: neighbours at one place become their mean."""
+    """Places x strictly growing: neighbours at one place become their mean."""
     step = np.diff(x)
     same = 1e-6 * (x[-1] - x[0]) / x.size
     if (step < -same).any():

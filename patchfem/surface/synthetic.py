@@ -7,7 +7,7 @@ from .profile import Profile
 
 
 def sine(x: np.ndarray, amplitude: float, wavelength: float, phase: float = 0.0) -> Profile:
-    """amplitude sin(2 pi x / wavelength + phase) at x (n,) [m]; lengths [m], phase [rad]."""
+    """A sine, amplitude sin(2 pi x / wavelength + phase), at x (n,) [m]; lengths [m], phase [rad]."""
     return waves(x, [amplitude], [wavelength], [phase])
 
 

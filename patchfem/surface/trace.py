@@ -95,7 +95,7 @@ def _encoding(path, data: bytes) -> str:
 
 
 def _header(path, lines) -> tuple:
-    """(header, its line number): the first line that is no comment, or a comment that is two columns with units."""
+    """First line that is no comment, or a comment that is two columns with units, and its line number."""
     for number, line in enumerate(lines, 1):
         text = line.strip()
         if len(text) > WIDEST and not text.startswith(_COMMENT):
@@ -115,7 +115,7 @@ def _is_header(text: str) -> bool:
 
 
 def _split(text: str) -> tuple:
-    """(cells without the empty ones at the end, what stands between them: None for blanks)."""
+    """Cells of a line without the empty ones at the end, and the delimiter between them, None for blanks."""
     delimiter = next((sign for sign in ";,\t" if sign in text), None)
     cells = [cell.strip().strip('"').strip() for cell in (text.split(delimiter) if delimiter else _CELL.findall(text))]
     while cells and not cells[-1]:
@@ -124,7 +124,7 @@ def _split(text: str) -> tuple:
 
 
 def _columns(path, number: int, header: str, units: Mapping) -> tuple:
-    """((place of x, of z), delimiter, (factor of x, of z))."""
+    """Meaning of the header: (place of x, of z), delimiter, (factor of x, of z)."""
     cells, delimiter = _split(header)
     at = f"{path}:{number}"
     if all(_NUMBER.fullmatch(cell) or _LOST.fullmatch(cell) for cell in cells):
@@ -157,7 +157,7 @@ def _column(at: str, cell: str, units: Mapping) -> tuple:
 
 
 def _samples(path, lines, number: int, order: tuple, delimiter) -> tuple:
-    """x and z in the file's units, z NaN where missing, and the line of each sample."""
+    """Samples x and z in the file's units, z NaN where missing, and the line of each."""
     x, z, at = array("d"), array("d"), array("q")
     first, second = order
     for count, line in enumerate(lines, number + 1):
@@ -180,7 +180,7 @@ def _samples(path, lines, number: int, order: tuple, delimiter) -> tuple:
 
 
 def _row(at: str, line: str, order: tuple, delimiter) -> tuple | None:
-    """(x, z) of a line that is not simply two numbers, None for a comment or a blank line."""
+    """Numbers (x, z) of a line that is not simply two numbers; None for a comment or a blank line."""
     if not line.strip(" \t,;") or line.lstrip().startswith(_COMMENT):
         return None
     if len(line) > WIDEST:

@@ -65,7 +65,7 @@ def main(cases=tuple(CASES), path: Path | None = HERE / "levels.svg", **how) -> 
         print(f"{r.case:24} mu N/m {r.limit:.3f} g  {onset:16} seen from {r.seen:.2f} g  largest step up "
               f"x{r.jumps[0][2]:.3g} from {r.jumps[0][0]:g} to {r.jumps[0][1]:g} g, down /{r.jumps[1][2]:.3g} from "
               f"{r.jumps[1][0]:g} to {r.jumps[1][1]:g} g  "
-              f"up less down {r.hysteresis / MIL:.2g} mil"
+              f"hysteresis {r.hysteresis / MIL:.2g} mil"
               + ("  folds " + ", ".join(f"{f:.3f}" for f in r.folds) if r.folds else ""))
     if path is not None:
         picture(rows, path)

@@ -141,8 +141,8 @@ def finish(modes: ModalBasis, found: Grid, failures: int, warnings: list) -> Com
         step = int(np.argmax(~np.isfinite(found.v).all(axis=1)))
         warnings = [*warnings, f"the motion is not finite from step {step} on; raise accuracy.steps_per_cycle"]
     elif abs(book["error"]) > 1e-3 * flow:
-        warnings = [*warnings, f"{abs(book['error']) / flow:.1%} of the energy that passed through is "
-                               f"{'missing' if book['error'] > 0 else 'made by the method'}"]
+        warnings = [*warnings, f"the energy does not balance: {abs(book['error']) / flow:.1%} of what passed "
+                               f"through is {'missing' if book['error'] > 0 else 'made by the method'}"]
     for array in (found.time, found.z, found.v, found.force, found.residual, found.iterations, found.drive):
         array.setflags(write=False)
     return Comparison(found.time, found.z, found.v, found.force, found.residual, found.iterations, int(failures),

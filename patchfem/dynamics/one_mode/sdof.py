@@ -24,8 +24,8 @@ def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: 
     if modes.omega.size != 1 or modes.interfaces.shape[0] != 1:
         raise PatchfemError("structure: the fast event engine is of one mode and one interface; use the general one")
     if not drive.segments:
-        raise PatchfemError("drive.type: the event engine needs a drive in closed form (sine, step, levels, release); "
-                            "use method = \"march\"")
+        raise PatchfemError("drive.waveform: the event engine needs a drive in closed form (sine, step, levels, "
+                            "release); use method = \"march\"")
     if static < 0 or kinetic < 0 or (static > 0 and kinetic > static):
         raise PatchfemError("friction.kinetic: friction must be >= 0 and kinetic friction at most static friction; "
                             "lower friction.kinetic or raise friction.static")
@@ -64,7 +64,7 @@ def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: fl
     z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
     far = travel / abs(block.output) if block.output else inf
     if abs(z) > far:
-        raise PatchfemError("initial: the motion starts beyond structure.travel; start inside it")
+        raise PatchfemError("structure.start: the motion starts beyond structure.travel; start inside it")
     run = _Run(block, drive.period, cycles, window)
     run.go(engine, z, v, far, progress)
     return run.collect()

@@ -62,7 +62,7 @@ def _row(modes: ModalBasis, drive, static: float, kinetic: float, start: Start |
     not one sine without a constant part."""
     parts = drive.segments
     if len(parts) != 1 or parts[0].constant != 0 or parts[0].omega <= 0 or parts[0].phase != 0:
-        raise PatchfemError("drive.type: the steady response is that of a sine without a constant part")
+        raise PatchfemError("drive.waveform: the steady response is that of a sine without a constant part")
     scene = scene_of(modes, drive, static, kinetic, drive.period)
     b = scene.segments[0, 3]
     z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)

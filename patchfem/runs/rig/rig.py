@@ -66,7 +66,7 @@ def _said(model, patch, raw, outcome, found) -> list:
     """Warnings of the law and of the load, in this run."""
     f, out = model.friction, warming(model, patch, raw.response, raw.book["friction"])
     if f is not None and has(f.law, "creeps"):
-        out = [*out, f"law '{f.law}' never holds: under a steady half of the limit it creeps at "
+        out = [*out, f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
                f"{0.5493 * f.reference_speed:.3g} m/s"]
     if f is not None and has(f.law, "bonds"):
         law = model.bonds
