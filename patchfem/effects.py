@@ -129,6 +129,16 @@ def absent(named) -> list:
 
 LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
         if name.startswith("friction.law=")}
+LAW_KEYS = {  # what a key of one or a few laws means
+    "stiffness": "slope of the force at first loading, of the whole contact; a patch shares it as the normal force",
+    "chi": "exponent of the sliders' density: a small cycle loses energy as its amplitude to the power chi + 3",
+    "beta": "share of the last slider: its stiffness over that of all the others",
+    "exponent": "sharpness n of the knee",
+    "shape": "share s of the unloading, which rests on the elastic line at 1/2; no energy is created from there on",
+    "stribeck_speed": "speed v_s over which friction falls from static to kinetic",
+    "micro_damping": "force per rate of the bristles' stretch, of the whole contact",
+    "viscous": "force per speed of the slide, of the whole contact",
+}
 LISTED = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
 
 

@@ -3,6 +3,8 @@
 The first word is not a capital unless it is a name; a default that follows from other keys stands in the sentence.
 """
 
+from ..effects import LAW_KEYS
+
 MEANINGS = {
     "Tables": {"title": "a line of text that stands over the results"},
     "Material": {
@@ -85,21 +87,12 @@ MEANINGS = {
         "rest_activation": "activation temperature of the growth at rest; 0 unless given",
         "slip_activation": "activation temperature of the growth in slip; 0 unless given",
     },
-    "Friction": {
+    "Friction": LAW_KEYS | {
         "law": "the law of friction",
         "static": "coefficient of static friction mu_s",
         "kinetic": "coefficient of kinetic friction mu_k, at most static; static unless given",
         "reference_speed": "speed v_0 over which the friction of the law tanh saturates",
         "bond_length": "length eps_0 over which a bond forms and breaks, at rest",
-        "stiffness": "slope at first loading of the laws iwan, bouc-wen and lugre, of the whole contact; shared over a "
-                     "patch as the normal force",
-        "chi": "exponent of the spread of slip lengths of iwan; the loss at small slip grows as the force to chi + 3",
-        "beta": "share of the stiffness of iwan that slips all at once, over that of its spread",
-        "exponent": "sharpness n of the knee of bouc-wen",
-        "shape": "share s of bouc-wen: with 0.5 it unloads along the first slope, with 1 and exponent 1 it is eq. 2.17",
-        "stribeck_speed": "speed v_s over which the friction of lugre falls from static to kinetic",
-        "micro_damping": "damping s_1 of the bristles of lugre against their rate",
-        "viscous": "damping s_2 of lugre against the slide",
         "reading": "eq. 2.17 with the stretch of a bond kept apart from its damage, which never creates energy, or as "
                    "the report prints it",
         "order": "power p with which a bond grows stronger along its path; > -1, and >= 0 for the reading stretch",

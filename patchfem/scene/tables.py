@@ -210,10 +210,10 @@ class Friction(Table):
     chi: number(gt=-1, le=0) | None = None
     beta: NotNegative | None = None
     exponent: Positive = 1.0
+    shape: number(gt=0, le=1) = 0.5
     stribeck_speed: Speed | None = None
     micro_damping: quantity("damping", ge=0) = 0.0
     viscous: quantity("damping", ge=0) = 0.0
-    shape: number(gt=0, le=1) = 0.5
     reading: Literal["stretch", "report"] = "stretch"
     order: Number = 1.0
     rest_growth: Acceleration | None = None

@@ -83,6 +83,99 @@ def press_step(book, k0, begin, f1, f2, beta, arm, turn, out):
     return k, 100, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
 
 
+@njit(error_model="numpy", **LEAN)
+def pressed(begin, k, load, pointed, book, rub):
+    """Contact at a sample whose heave and pitch stand in begin (5,): (piece, load [N], moment [N m]); the energy and
+    the pull of the preloaded contact into the rest of `begin`. The load stays where no contact set fits: piece < 0."""
+    k = locate(book, k, -begin[0], begin[1])
+    if k < 0:
+        return k, load, book.base[1]
+    begin[2], begin[3], begin[4] = pull(book, k, begin[0], begin[1])
+    if pointed:
+        press_state(book, k, -begin[0], begin[1], rub.now)
+    return k, max(book.base[0] - begin[3], 0.0), book.base[1] - begin[4]
+
+
+@njit(error_model="numpy", **LEAN)
+def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub, book, goal, force, turn, out):
+    """Friction and normal contact over a step, each under the mean force of the other: (dq [m], mean friction force
+    [N], piece at its end, iterations, True where they disagree); piece < 0 where no contact set fits.
+
+    after [N]: load at the end, NaN where the contact says it; coupling: 0 where the load does not follow the motion, 1
+    where it follows heave and pitch alone, 2 where friction moves them too. Then the secant, kept inside its bracket,
+    finds the friction force that both agree on.
+    """
+    beta, pointed = ports.beta, not (kind == COULOMB or kind == RATE)
+    guess, count, wrong, end, bad = held[1], 0, 0.0, k, False
+    low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
+    dq, used = 0.0, 0.0
+    for outer in range(1, 81):
+        mean = load
+        if not np.isnan(after):
+            rub.now[0] = after
+            mean = 0.5 * (load + after)
+        elif coupling > 0:
+            end, its, wrong = press_step(book, k, begin, free[1] - beta[1, 0] * guess, free[2] - beta[2, 0] * guess,
+                                         beta, ports.arm, turn, out)
+            if end < 0:
+                return dq, used, end, count, True
+            force[1], force[2] = out[0], out[1]
+            count += its
+            mean = max(book.base[0] - out[0], 0.0)
+            if pointed:
+                press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
+        slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
+        press_all(kind, rub)
+        if rub.b.size:
+            dq, used, its = shear_solve(slides, beta[0, 0], v, dt, kind, rub, goal)
+        else:
+            dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
+        count += abs(its)
+        bad = its < 0 or wrong > goal
+        miss = used - guess
+        if coupling < 2 or abs(miss) <= 0.01 * goal:
+            break
+        if outer == 80 or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
+            if kind == COULOMB and beta[0, 0] > 0 and rub.force[1] * mean <= abs(guess) <= rub.force[0] * mean:
+                used = guess  # between kinetic and static friction the step starts to slip
+                dq = slides - beta[0, 0] * used
+            else:
+                bad = bad or abs(miss) > goal
+            break
+        if miss > 0:
+            low = guess
+        else:
+            high = guess
+        following = used
+        if last_r < np.inf and miss != last_r:
+            following = guess - miss * (guess - last_f) / (miss - last_r)
+        last_f, last_r = guess, miss
+        if not (low < following < high) or outer % 8 == 0:
+            following = 0.5 * (low + high) if low > -np.inf and high < np.inf else used
+        guess = following
+    return dq, used, end, count, bad
+
+
+@njit(error_model="numpy", **LEAN)
+def last_force(used, dq, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare):
+    """Friction force [N] at the end of a step: of the speed, of the slip, or what keeps a stuck contact at rest."""
+    if kind == RATE:
+        return rub.force[0] * load * np.tanh(v1 / rub.force[1])
+    if kind != COULOMB:
+        return used
+    if dq != 0.0:
+        return rub.force[1] * load * (1.0 if dq > 0 else -1.0)
+    force[0] = 0.0
+    pushed(ports.rows, force, plant.mass, accel)
+    base = table[at, 8 * accel.size + 2]
+    accelerations(state, plant.omega, plant.damp, plant.damping, plant.base, base, accel, spare)
+    need, gain = 0.0, 0.0
+    for j in range(accel.size):
+        need += plant.slide[j] * spare[0, j]
+        gain += plant.slide[j] * plant.slide[j] / plant.mass
+    return need / gain if gain > 0 else 0.0
+
+
 @njit(error_model="numpy", cache=True)
 def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind, rub, book, loads, goal, travel, ledger,
                  rows):
@@ -96,32 +189,24 @@ def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind,
     preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
     contact set fits.
     """
-    omega, damp, slide, base, output, damping = (plant.omega, plant.damp, plant.slide, plant.base, plant.output,
-                                                 plant.damping)
-    free_map, push, dense, reach, loss, dense_loss, dt, mass = (plant.free, plant.push, plant.dense, plant.reach,
-                                                                plant.loss, plant.dense_loss, plant.dt, plant.mass)
-    n, around, beta = omega.size, table.shape[0], ports.beta
+    slide, mass, n, around, beta = plant.slide, plant.mass, plant.omega.size, table.shape[0], ports.beta
     free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
     accel, spare = np.empty(n), np.empty((2, n))
     given, pointed = loads.size > 0, not (kind == COULOMB or kind == RATE)
     apart = given or (beta[1, 1] == 0 and beta[2, 2] == 0)
-    mixed = not apart and (beta[0, 1] != 0 or beta[0, 2] != 0)
+    coupling = 0 if apart else (2 if beta[0, 1] != 0 or beta[0, 2] != 0 else 1)
     load, k = book.base[0], at_piece[0]
     for i in range(steps + 1):
-        q, v, stroke = sample(rows[i], state, slide, output)
+        q, v, stroke = sample(rows[i], state, slide, plant.output)
         begin[0], begin[1] = place_of(state, ports.rows, 1), place_of(state, ports.rows, 2)
         moment = book.base[1]
         if given:
             load = loads[i]
             rub.now[0] = load
         else:
-            k = locate(book, k, -begin[0], begin[1])
+            k, load, moment = pressed(begin, k, load, pointed or i == steps, book, rub)
             if k < 0:
                 return i, 4
-            begin[2], begin[3], begin[4] = pull(book, k, begin[0], begin[1])
-            load, moment = max(book.base[0] - begin[3], 0.0), book.base[1] - begin[4]
-            if pointed or i == steps:
-                press_state(book, k, -begin[0], begin[1], rub.now)
         at_piece[0] = k
         rows[i, 2 * n + 6], rows[i, 2 * n + 7], rows[i, 2 * n + 8] = load, moment, begin[2]
         rows[i, 2 * n + 9], rows[i, 2 * n + 10] = begin[0], begin[1]
@@ -129,76 +214,32 @@ def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind,
         held[0] = min(max(held[0], -bound), bound)
         now, energy, slip = rub_state(kind, rub, q, held[0])
         status = note(rows[i, :2 * n + 6], now, energy, slip, stroke, travel, energy + begin[2]
-                      + stored(state, omega, mass), ledger)
+                      + stored(state, plant.omega, mass), ledger)
         if status:
             return i, status
         if i == steps:
             break
         at = (first + i) % around
         for r in range(3):
-            free[r] = free_slide(state, reach, r, table, at)
+            free[r] = free_slide(state, plant.reach, r, table, at)
         for j in range(rub.now.size if pointed else 0):
             rub.before[j] = rub.now[j]
-        guess, count, wrong, end, bad = held[1], 0, 0.0, k, False
-        low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
-        dq, used = 0.0, 0.0
-        for outer in range(1, 81):
-            mean = load
-            if given:
-                rub.now[0] = loads[i + 1]
-                mean = 0.5 * (load + loads[i + 1])
-            elif not apart:
-                end, its, wrong = press_step(book, k, begin, free[1] - beta[1, 0] * guess, free[2] - beta[2, 0] * guess,
-                                             beta, ports.arm, turn, out)
-                if end < 0:
-                    return i, 4
-                force[1], force[2] = out[0], out[1]
-                count += its
-                mean = max(book.base[0] - out[0], 0.0)
-                if pointed:
-                    press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
-            slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
-            press_all(kind, rub)
-            if rub.b.size:
-                dq, used, its = shear_solve(slides, beta[0, 0], v, dt, kind, rub, goal)
-            else:
-                dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
-            count += abs(its)
-            bad = its < 0 or wrong > goal
-            miss = used - guess
-            if not mixed or abs(miss) <= 0.01 * goal:
-                break
-            if outer == 80 or (high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))):
-                if kind == COULOMB and beta[0, 0] > 0 and rub.force[1] * mean <= abs(guess) <= rub.force[0] * mean:
-                    used = guess  # between kinetic and static friction the step starts to slip
-                    dq = slides - beta[0, 0] * used
-                else:
-                    bad = bad or abs(miss) > goal
-                break
-            if miss > 0:
-                low = guess
-            else:
-                high = guess
-            following = used
-            if last_r < np.inf and miss != last_r:
-                following = guess - miss * (guess - last_f) / (miss - last_r)
-            last_f, last_r = guess, miss
-            if not (low < following < high) or outer % 8 == 0:
-                following = 0.5 * (low + high) if low > -np.inf and high < np.inf else used
-            guess = following
+        dq, used, end, count, bad = agreed(free, k, load, loads[i + 1] if given else np.nan, v, held, begin, coupling,
+                                           plant.dt, kind, ports, rub, book, goal, force, turn, out)
+        if end < 0:
+            return i, 4
         force[0] = used
         ledger[5] += count
         ledger[6] = max(ledger[6], count)
         ledger[7] += 1.0 if bad else 0.0
         ledger[8] += used * dq
         pushed(ports.rows, force, mass, accel)
-        move(state, free_map, push, loss, dense, dense_loss, table, at, accel, spare, ledger)
+        move(state, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
         rows[i, 2 * n + 4] = used
-        held[0], held[1], k = used, used, end
-        v1 = 0.0
+        held[1], k, v1 = used, end, 0.0
         for j in range(n):
             v1 += slide[j] * state[1, j]
-        ledger[3] += rub_commit(dq, used, v, v1, dt, kind, rub)
+        ledger[3] += rub_commit(dq, used, v, v1, plant.dt, kind, rub)
         if rub.b.size:
             lost, its = spring_back(kind, rub, goal)
             ledger[3] += lost
@@ -209,17 +250,5 @@ def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind,
         elif not apart:
             load = max(book.base[0] - out[3], 0.0)
             force[1], force[2] = out[3], out[4]
-        if kind == RATE:
-            held[0] = rub.force[0] * load * np.tanh(v1 / rub.force[1])
-        elif kind == COULOMB and dq != 0.0:
-            held[0] = rub.force[1] * load * (1.0 if dq > 0 else -1.0)
-        elif kind == COULOMB:
-            force[0] = 0.0
-            pushed(ports.rows, force, mass, accel)
-            accelerations(state, omega, damp, damping, base, table[at, 8 * n + 2], accel, spare)
-            need, gain = 0.0, 0.0
-            for j in range(n):
-                need += slide[j] * spare[0, j]
-                gain += slide[j] * slide[j] / mass
-            held[0] = need / gain if gain > 0 else 0.0
+        held[0] = last_force(used, dq, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare)
     return steps, 0

@@ -503,7 +503,7 @@ def test_exact_interface_without_friction_among_others():
 
 
 def test_exact_log_has_a_limit(monkeypatch):
-    monkeypatch.setattr("patchfem.dynamics.events.events.event_list.ROOM", 30)
+    monkeypatch.setattr("patchfem.dynamics.events.event_list.ROOM", 30)
     log = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 20).log
     assert log.time.size == log.slide.size == 30 and log.count == 80
     assert not log.time.flags.writeable

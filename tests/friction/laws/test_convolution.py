@@ -290,7 +290,7 @@ def test_refuses_an_uneven_pressure_on_a_rig():
     (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
     (SLIDE, ["contact.strips.count=4"], "contact.strips: beside law 'convolution'"),
     (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
-    (SLIDE, ["friction.kinetic=0.2"], "kinetic belongs to coulomb and nonlocal")])
+    (SLIDE, ["friction.kinetic=0.2"], "kinetic belongs to coulomb, nonlocal and lugre")])
 def test_refuses_what_the_averaged_law_cannot_do(text, sets, says):
     more = [one.replace(SHEAR, "contact.shear={}") for one in sets]
     with pytest.raises(SceneError, match=says):
