@@ -278,7 +278,7 @@ def test_exact_jenkins_against_dop853(stiffness, limit, zeta, ratio):
 
 
 def test_refuses_other_drives():
-    with pytest.raises(PatchfemError, match=r"drive\.type"):
+    with pytest.raises(PatchfemError, match=r"drive\.waveform"):
         point(modes_of(), levels([1.0, 2.0], 1.0, 5.0), 0.5, 0.5)
     with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
         point(modes_of(), BaseSine(1.0, 1.0), 0.5, 0.6)
