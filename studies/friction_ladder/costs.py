@@ -66,7 +66,7 @@ def _elements(path, stiffness, yield_slide, force) -> None:
 def _list(law, path, dt):
     def run():
         c, _ = list_model(law, 1.0, cutoff(1.0, 1e-6), 0.02).build(load_kernels())
-        loops.listed(path, dt, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, np.zeros(path.size))
+        loops.listed(path, dt, c, np.zeros(path.size))
     return run
 
 

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import today
 
 from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
-from patchfem.friction.bonds.bond_kernels import list_mean, list_step
+from patchfem.friction.bonds.list_kernels import list_mean, list_step
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import cutoff
 
@@ -80,10 +80,9 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     c, _ = list_model(law, 1.0, cutoff(order, 1e-5), 0.01).build(loop_kernels)
     path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
     for i, dq in enumerate(np.diff(path)):
-        args = (dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, dq / dt)
         if i >= path.size - 1 - steps:
-            force.append(list_mean(*args, dt))
-        if not list_step(*args, dq / dt, dt):
+            force.append(list_mean(dq, c, dq / dt, dt))
+        if not list_step(dq, c, dq / dt, dq / dt, dt):
             raise ArithmeticError("the bond list is full")
     return Cycle(np.diff(path)[-steps:] / LENGTH, np.array(force))
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from patchfem.friction.bonds.bond_kernels import list_mean, list_step
+from patchfem.friction.bonds.list_kernels import list_mean, list_step
 from patchfem.friction.bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
 from patchfem.friction.laws import elastic_plastic_kernels as law
 
@@ -54,12 +54,12 @@ def loose(path, growth, force):
 
 
 @njit(error_model="numpy")
-def listed(path, dt, bonds, tally, now, law, growth, table, force):
-    """Steps taken before the list was full."""
+def listed(path, dt, c, force):
+    """Steps that a list of bonds took before it was full."""
     for i in range(path.size - 1):
         dq = path[i + 1] - path[i]
-        force[i] = list_mean(dq, bonds, tally, now, law, growth, table, dq / dt, dt)
-        if not list_step(dq, bonds, tally, now, law, growth, table, dq / dt, dq / dt, dt):
+        force[i] = list_mean(dq, c, dq / dt, dt)
+        if not list_step(dq, c, dq / dt, dq / dt, dt):
             return i
     return path.size - 1
 

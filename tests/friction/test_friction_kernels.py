@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from patchfem.friction.bonds import bond_sum_kernels, point_kernels, recursion
+from patchfem.friction.bonds import list_sum_kernels, point_kernels, recursion
 from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
 from patchfem.friction.bonds.recursion import advance, shape_functions
 from patchfem.friction.laws import elastic_plastic_kernels
@@ -113,9 +113,6 @@ def test_exact_rigid_points_are_single_points_together(eps):
     weight, sigma = rng.uniform(0.1, 2, 7), rng.uniform(0, 3, 7)
     bonds = np.concatenate([np.stack([0.6 * sigma, 0.2 * sigma, 0.3 * sigma]), np.zeros((1, 7))])
     for dq in (0.3, -0.01, -2.0, 0.0):
-        single = [point_kernels.bond_mean(*bonds[:2, j], dq, sigma[j], eps) for j in range(7)]
-        want = weight @ np.array(single)
-        assert point_kernels.rigid_mean(dq, weight, bonds, sigma, eps) == pytest.approx(want, rel=1e-13, abs=1e-15)
         moved = np.array([point_kernels.bond_step(*bonds[:3, j], dq, sigma[j], eps) for j in range(7)])
         slide = bonds[3] + dq
         assert point_kernels.rigid_step(dq, weight, bonds, sigma, eps) == pytest.approx(weight @ moved[:, 3] / 2,
@@ -128,7 +125,7 @@ def test_exact_gauss_nodes_of_the_kernels():
     """The five-point and two-point rules written into the kernels are Gauss-Legendre."""
     y, w = np.polynomial.legendre.leggauss(5)
     assert y[-1] == pytest.approx(0.906179845938664, abs=1e-15) and w[2] == pytest.approx(0.5688888888888889)
-    assert bond_sum_kernels.SECOND - 0.5 == pytest.approx(np.polynomial.legendre.leggauss(2)[0][1] / 2, abs=1e-16)
+    assert list_sum_kernels.SECOND - 0.5 == pytest.approx(np.polynomial.legendre.leggauss(2)[0][1] / 2, abs=1e-16)
 
 
 @pytest.mark.parametrize("x", [1e-9, 1e-5, 1e-2, 0.3, 0.499999, 0.5, 0.7, 3.0, 40.0])

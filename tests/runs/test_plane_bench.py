@@ -9,7 +9,7 @@ from scene_texts import COULOMB, NONLOCAL, PLASTIC, POINT, SMALL_PATCH, TRIANGLE
 
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.plane import PlaneRecursion
+from patchfem.friction.bonds.recursion import Recursion
 from patchfem.inputs.paths import read_path
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
@@ -108,10 +108,10 @@ def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     sigma = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
     y = patch.strips.offsets if strips else np.zeros(1)
     weight = np.tile(patch.pieces.interface.weight / count, count)
-    law, flat = PlaneRecursion(Bonds(0.3, 2e-6)), sigma.ravel()
+    law, flat = Recursion(Bonds(0.3, 2e-6)), sigma.ravel()
     time, slide, *_ = model.slide.samples(60)
     q = np.stack([slide, np.interp(time, *np.array([[0, 2e-3, 6e-3, 8e-3], [0, 0, 20e-6, 24e-6]]))], axis=1)
-    state, rows = law.start(flat), [np.zeros((2, flat.size))]
+    state, rows = law.start(flat, 2), [np.zeros((2, flat.size))]
     for dq, dt in zip(np.diff(q, axis=0), np.diff(time)):
         state = law.step(state, dq, flat, flat, dt).state
         rows.append(law.traction(state))

@@ -6,12 +6,13 @@ import numpy as np
 from friction_paths import GAUSS, lengths_by_hand, rates
 from scipy.special import gamma
 
-from patchfem.friction.bonds import bond_kernels
-from patchfem.friction.bonds.bond_list import law_numbers, share_table
+from patchfem.dynamics.contacts.arrays import BondList
+from patchfem.friction.bonds import list_kernels
+from patchfem.friction.bonds.list_numbers import law_numbers, share_table
 from patchfem.friction.bonds.quadrature import cutoff
 from patchfem.friction.laws.stretch import growth_numbers
 
-for kernel in (bond_kernels.list_mean, bond_kernels.list_force, bond_kernels.list_step):
+for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.list_step):
     kernel.enable_caching()  # called from Python here alone: compiled once for all workers and runs
 
 
@@ -25,22 +26,23 @@ class Listed(NamedTuple):
     tally: np.ndarray
 
 
-def list_arrays(law, tail=0.0, merge=0.0, capacity=60_000):
-    """(bonds, tally, now, law, growth, table) of an empty list, as the functions of `bond_kernels` take them."""
+def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
+    """A list before any slide, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
-    return (np.zeros((10, capacity)), np.zeros(12), np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0]), numbers,
-            growth_numbers(law), share_table(law))
+    now = np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
+    return BondList(np.ones(1), np.zeros((10, capacity)), now, np.zeros(12), numbers, share_table(law),
+                    growth_numbers(law), np.zeros(2), np.ones(1))
 
 
 def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     """March the list over the knots `path`, times scalar or one per step."""
-    arrays, rows = list_arrays(law, tail, merge, capacity), []
-    tally = arrays[1]
+    held, rows = empty_list(law, tail, merge, capacity), []
+    tally = held.tally
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0
-        mean = bond_kernels.list_mean(dq, *arrays, v, dt)
-        ahead = bond_kernels.list_force(dq, *arrays, v, dt)
-        assert bond_kernels.list_step(dq, *arrays, v, v, dt)
+        mean = list_kernels.list_mean(dq, held, v, dt)
+        ahead = list_kernels.list_force(dq, held, v, dt)
+        assert list_kernels.list_step(dq, held, v, v, dt)
         rows.append((mean, tally[5], ahead, tally[4]))
     return Listed(*np.array(rows).T, tally)
 

@@ -79,7 +79,7 @@ class Joints(NamedTuple):
 
 class BondList(NamedTuple):
     """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), tally (12,),
-    law (24,), table (k,) as in friction.bonds.bond_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
+    law (24,), table (k,) as in friction.bonds.list_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
     bound (1,): largest force [N]."""
 
     force: np.ndarray

@@ -6,8 +6,8 @@ The functions are those that `march.loop_kernels` asks of every contact.
 import numpy as np
 from numba import njit
 
-from ...friction.bonds.bond_kernels import list_mean, list_slope, list_step
-from ...friction.bonds.bond_sum_kernels import MOMENTS
+from ...friction.bonds.list_kernels import list_mean, list_slope, list_step
+from ...friction.bonds.list_sum_kernels import MOMENTS
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import narrowed
 
@@ -19,9 +19,9 @@ def pulled(dq, c, v0, dt):
     """(path-mean force [N], slope [N/m]) of a bond list; a slope of zero stands for an unknown one."""
     scale = c.force[0]
     if c.law[1] == MOMENTS:
-        force, slope = list_slope(dq, c.bondlist, c.tally, c.now, c.law, c.growth, v0, dt)
+        force, slope = list_slope(dq, c, v0, dt)
         return scale * force, scale * slope
-    return scale * list_mean(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, dt), 0.0
+    return scale * list_mean(dq, c, v0, dt), 0.0
 
 
 @njit(error_model="numpy", **LEAN)
@@ -58,7 +58,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     c.last[1] = c.last[0]
     c.last[0] = dq
     before = c.tally[4]
-    ok = list_step(dq, c.bondlist, c.tally, c.now, c.law, c.growth, c.table, v0, v1, dt)
+    ok = list_step(dq, c, v0, v1, dt)
     net = force * dq - c.force[0] * (c.tally[4] - before)
     if net < 0:
         c.tally[6] -= net

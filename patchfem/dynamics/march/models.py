@@ -119,7 +119,7 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    from ...friction.bonds.bond_list import law_numbers, room, share_table
+    from ...friction.bonds.list_numbers import law_numbers, room, share_table
 
     fields = {"force": [limit], "bondlist": np.zeros((10, room(law, reach, merge))),
               "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),

@@ -1,13 +1,19 @@
-"""Which engine sums the bonds of a shared list, from the tolerance and the cost: eq. 2.17 has more than one exact or
-bounded way to be summed, and which is cheapest depends on the law, the strokes and the steps."""
+"""Which engine sums eq. 2.17 and with which settings, from the tolerance and the cost.
+
+There are two: the recursion, exact for stretch with p = 1 alone, and the list of strips (`list_kernels`) for every law.
+The list has two settings, the tail that its cut-off may lose and the width up to which it merges strips; `direct`,
+`truncated` and `merged` name which of them are used. What is cheapest depends on the law, the strokes and the steps.
+"""
 
 from dataclasses import dataclass
 from math import ceil, sqrt
 
-from .bond_list import AGED, MOMENTS, POWER, SHARES, form_of
+from .list_numbers import AGED, MOMENTS, POWER, SHARES, form_of
 from .parameters import Bonds
+from .quadrature import cutoff
 
-ENGINES = ("direct", "truncated", "merged", "recursion")
+LISTS = {"direct": (False, False), "truncated": (True, False), "merged": (True, True)}  # (drops old strips, joins them)
+ENGINES = (*LISTS, "recursion")
 MERGING = (0.25, 2.5, 1.0)  # largest measured error over merge width squared: order >= 1, growing bonds, order < 1
 YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
@@ -32,9 +38,9 @@ class Choice:
     def said(self) -> str:
         """One line for a plan."""
         parts = [f"{self.engine}: about {self.strips:.0f} strips of bonds, {1e6 * self.seconds:.2g} us per step"]
-        if self.engine in ("truncated", "merged"):
+        if self.tail > 0:
             parts.append(f"tail {self.tail:.1g}")
-        if self.engine == "merged":
+        if self.merge > 0:
             parts.append(f"merge width {self.merge:.2g} bond lengths")
         return ", ".join([*parts, f"error of the sum {self.error:.1g} of the friction limit"])
 
@@ -60,24 +66,23 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
         return Choice("recursion", 0.0, 0.0, 0.0, 0.0, RECURSION)
     cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
     width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / _merging(law)))
-    found = [_priced(law, name, cut, width, stroke, steps) for name in ("truncated", "merged")]
-    if engine == "direct":
-        return _priced(law, "direct", 0.0, 0.0, stroke, steps)
+    found = {name: _priced(law, name, cut * drops, width * joins, stroke, steps)
+             for name, (drops, joins) in LISTS.items()}
     if engine != "auto":
-        return found[0] if engine == "truncated" else found[1]
+        return found[engine]
     if merge is not None:
-        return found[1] if merge > 0 else found[0]
-    fit = [choice for choice in found if choice.error <= 0.1 * tolerance] or found[:1]
-    return min(fit, key=lambda choice: choice.seconds)
+        return found["merged" if merge > 0 else "truncated"]
+    fit = [choice for choice in found.values() if choice.tail > 0 and choice.error <= 0.1 * tolerance]
+    return min(fit or [found["truncated"]], key=lambda choice: choice.seconds)
 
 
-def _merging(law) -> float:
+def _merging(law: Bonds) -> float:
+    """Bound of the error of merging over the square of its width."""
     return MERGING[1 if form_of(law) == AGED else 2 if law.order < 1 else 0]
 
 
-def _priced(law, name, tail, merge, stroke, steps) -> Choice:
-    from .quadrature import cutoff
-
+def _priced(law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float) -> Choice:
+    """The list with these settings, 0 where one is not used."""
     form, reach = form_of(law), cutoff(law.order, tail) if tail > 0 else 745.0
     each = stroke / max(steps, 1)
     pieces = max(1.0, each / 0.25)
@@ -86,7 +91,7 @@ def _priced(law, name, tail, merge, stroke, steps) -> Choice:
         strips = reach / stroke + 2
     elif form == AGED:
         strips *= 2
-    if name == "merged" and merge > 0:
+    if merge > 0:
         strips = min(strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0))
     cost = STRIP[form]
     if form == SHARES and law.order not in (0, 1, 2):
@@ -94,6 +99,6 @@ def _priced(law, name, tail, merge, stroke, steps) -> Choice:
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
     seconds = STEP + PASSES * (PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
     error = tail
-    if name == "merged" and merge > 0 and form != MOMENTS:
+    if merge > 0 and form != MOMENTS:
         error += _merging(law) * merge**2 + (YOUNG if form == AGED and law.order < 0 else 0.0)
-    return Choice(name, tail, merge if name == "merged" else 0.0, error, strips, seconds)
+    return Choice(name, tail, merge, error, strips, seconds)

@@ -13,7 +13,8 @@ class Bonds:
     """Parameters of eq. 2.10-2.17.
 
     static: mu_s; ratio = eps_k/eps_0 = mu_k/mu_s (2.21); length = eps_0 [m]; order = p; reading "stretch" or "report";
-    rest_growth = a_s [m s-2] (2.10 needs this unit) and slip_growth = l_k [m], None for a constant bond length;
+    rest_growth = a_s [m s-2] (2.10 needs this unit) and slip_growth = l_k [m], None for a constant bond length, (m,) in
+    `recursion` for points of their own temperature;
     rest_speed = v_h [m/s], the floor under |v| without which 2.10 has no limit at a reversal; initial = m_0;
     breakaway: share of the bond length that stretches without damage.
     """
@@ -90,15 +91,19 @@ def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> 
     return np.minimum(rest, LONG), np.minimum(abs(dq) / law.slip_growth, LONG)
 
 
-def grow(law: Bonds, eps: float, v0: float, v1: float, dq: float, dt: float) -> float:
-    """Bond length after a step (2.10): exact relaxation towards (I_A eps_0 + I_B eps_k)/(I_A + I_B), in (0, eps_0].
+def grow(law: Bonds, eps, v0: float, v1: float, dq: float, dt: float):
+    """Bond length [m] after a step (2.10): exact relaxation towards (I_A eps_0 + I_B eps_k)/(I_A + I_B), in (0, eps_0].
 
-    A step of zero length and zero time changes nothing; at rest it is pure healing.
+    A step of zero length and zero time changes nothing; at rest it is pure healing. Where the law holds its rates per
+    point (m,), so is the length.
     """
     if not law.grows:
         return law.length
     rest, slide = growth_exponents(law, v0, v1, dq, dt)
     total = rest + slide
+    if np.ndim(total):
+        target = law.length * (rest + slide * law.ratio) / np.where(total > 0, total, 1.0)
+        return np.where(total > 0, target + (eps - target) * np.exp(-total), eps)
     if total == 0:
         return eps
     target = law.length * (rest + slide * law.ratio) / total

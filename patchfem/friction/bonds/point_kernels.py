@@ -134,18 +134,6 @@ def _primitive(v, floor):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def rigid_mean(dq, weight, bonds, source, eps):
-    """`bond_mean` summed over points (m,) that all slide by dq [m], with their weights: one exponential for all; 0.3 ns
-    per point."""
-    zs, sigmas, ms = 0.0, 0.0, 0.0
-    for j in range(weight.size):
-        zs += weight[j] * bonds[1, j]
-        sigmas += weight[j] * source[j]
-        ms += weight[j] * bonds[0, j]
-    return bond_mean(ms, zs, dq, sigmas, eps)
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def rigid_step(dq, weight, bonds, source, eps):
     """`bond_step` of points (m,) that all slide by dq [m], in place; returns the energy they dissipate [J]."""
     path = abs(dq)

@@ -1,20 +1,28 @@
-"""The stretch reading of the quadrature for p = 1, summed exactly by a bond state that never grows.
+"""The stretch reading for p = 1, summed exactly by a bond state that never grows, along a line or in a plane.
 
-With k = exp(-int dR/eps) the surviving share of a bond and 1/eps frozen when it forms, the sums over all bonds
+With k = exp(-int dR/eps) the surviving share of a bond, u its stretch and 1/eps frozen when it forms, the sums over all
+bonds
 
     m = sum sigma k dL/eps,   z = sum sigma k u dL/eps,   s2 = sum sigma k u^2 dL/eps        [Pa, Pa m, Pa m2]
 
-obey m' = |v|(sigma - m)/eps, z' = v m - |v| z/eps, s2' = 2 v z - |v| s2/eps; tau = mu_s z/eps_0. Exact step for a bond
-length held over the step. Stored energy mu_s s2/(2 eps_0) and dissipation mu_s s2/(2 eps_0 eps) per path are never
-negative: passive for every path, pressure and bond length, and for every part of the path that is counted as damaging.
+obey, per unit of path in the direction e, m' = (sigma - m)/eps, z' = m e - z/eps, s2' = 2 z.e - s2/eps; the traction is
+mu_s z/eps_0. The step is exact for a bond length held over it. Stored energy mu_s s2/(2 eps_0) and dissipation
+mu_s s2/(2 eps_0 eps) per path are never negative: passive for every path, pressure and bond length, and for every part
+of the path that is counted as damaging.
 
-Breakaway. The path counts only where the slide drags its elastic range along (`law.elastic_part`); inside it
-z' = v m and s2' = 2 v z. With a share b of the bond length, a dither of the force by less than 2 b mu_s sigma from end
-to end drifts in its first cycle only, b = 0 is Dahl's law and b -> 1 the elastic-plastic one.
+Directions. A line is a plane with one component: u and z are vectors of d = 1 or 2 components, the part of z along the
+increment steps as on a line and the part across it decays. Bonds are arrays (d + 2, m) of m, the components of z, s2.
+
+Breakaway (on a line). The path counts only where the slide drags its elastic range along
+(`parameters.elastic_part`); inside it z' = m e and s2' = 2 z.e. With a share b of the bond length, a dither of the
+force by less than 2 b mu_s sigma from end to end drifts in its first cycle only, b = 0 is Dahl's law and b -> 1 the
+elastic-plastic one.
 
 Load. Where the load falls at rest, the bonds that carry nothing, the last formed, are let go first: the force stays as
 long as a population with the moments (m, z, s2) exists, m >= z^2/s2. Beyond that all stretches shrink, and no point
 keeps more than mu_s sigma. Where it rises, unstressed bonds come in the density m_0. Neither gives energy.
+
+Compiled twins: `point_kernels` for one point of a line.
 """
 
 from dataclasses import dataclass
@@ -23,16 +31,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core import PatchfemError
 from ..protocol import Step
 from .parameters import Bonds, elastic_part, grow
 
 
 class BondState(NamedTuple):
-    """bonds (3, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: the common bond length [m]; play [1] of `elastic_part`."""
+    """bonds (d + 2, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: bond length [m], common or one per point (m,); play [1] of
+    `parameters.elastic_part`."""
 
     bonds: np.ndarray
-    eps: float
-    play: float = 0.0
+    eps: float | np.ndarray
+    play: float | np.ndarray = 0.0
 
 
 def shape_functions(x):
@@ -56,8 +66,15 @@ def moments(x, e):
     return (third + x * x * e) / 2, third, x * third - c
 
 
+def direction(dq) -> tuple:
+    """(length [m], unit vector (d,)) of an increment (d,) [m]; the vector is 0 where nothing moves."""
+    path = float(abs(dq[0]) if len(dq) == 1 else np.hypot(*dq))
+    return path, np.asarray(dq, float) / path if path > 0 else np.zeros(len(dq))
+
+
 def advance(bonds, dq, sigma, eps):
-    """New bonds (3, m), path-mean stretch zbar (m,) [Pa m], its slope (m,) [Pa], integral of s2 dR/eps (m,) [Pa m2].
+    """New bonds (3, m), path-mean stretch zbar (m,) [Pa m], its slope (m,) [Pa], integral of s2 dR/eps (m,) [Pa m2] of
+    an increment along a line.
 
     bonds (3, m), dq scalar or (m,) [m], sigma (m,) [Pa] the pressure that forms the new bonds, eps [m].
     """
@@ -80,9 +97,31 @@ def advance(bonds, dq, sigma, eps):
 
 
 def stretch(bonds, dq):
-    """Bonds (3, m) that all stretch by dq and neither break nor form."""
+    """Bonds (3, m) that all stretch by dq [m] along a line and neither break nor form."""
     m, z, s2 = bonds
     return np.stack([m, z + m * dq, s2 + dq * (2 * z + m * dq)])
+
+
+def moved(law: Bonds, bonds, play, dq, sigma, eps) -> tuple:
+    """(new bonds (d + 2, m), path-mean stretch [Pa m], integral of s2 dR/eps (m,) [Pa m2], play) of an increment.
+
+    dq [m]: a number along a line, where the mean is (m,) and the elastic range of the law is gone through first; (2,)
+    in a plane, where the mean is (2, m). sigma (m,) [Pa] forms the new bonds; eps [m], play [1] numbers or (m,).
+    """
+    if len(bonds) == 3:
+        free, damaging, play = elastic_part(law, play, dq, eps)
+        loose = stretch(bonds, free)
+        out, mean, _, burnt = advance(loose, damaging, sigma, eps)
+        if np.any(free):
+            mean = free / dq * (bonds[1] + loose[1]) / 2 + damaging / dq * mean
+        return out, mean, burnt, play
+    path, e = direction(dq)
+    along = e @ bonds[1:3]
+    across = bonds[1:3] - e[:, None] * along
+    f1, _, decay = shape_functions(path / eps)
+    out, mean, _, burnt = advance(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
+    z = e[:, None] * out[1] + across * decay
+    return np.stack([out[0], *z, out[2]]), e[:, None] * mean + across * f1, burnt, play
 
 
 def pressed(law: Bonds, bonds, s0, s1):
@@ -98,45 +137,57 @@ def pressed(law: Bonds, bonds, s0, s1):
     return np.stack([density, z * keep, s2 * keep])
 
 
+def refuse_directions(law: Bonds, directions: int) -> None:
+    """PatchfemError for a law whose elastic range has no form in two directions."""
+    if directions > 1 and law.breakaway:
+        raise PatchfemError("breakaway in two directions: set breakaway = 0; not yet built")
+
+
 @dataclass(frozen=True, slots=True)
 class Recursion:
-    """Law object of the stretch reading, p = 1; the pressure may change along the increment and in time."""
+    """Law object of the stretch reading, p = 1; the pressure may change along the increment and in time.
+
+    Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m), positive against
+    slip. Where `law` holds rest_growth and slip_growth per point (m,), every point has a bond length of its own.
+    """
 
     law: Bonds
 
-    def start(self, sigma) -> BondState:
-        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa]."""
-        bonds = np.zeros((3, sigma.size))
+    def start(self, sigma, directions: int = 1) -> BondState:
+        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa]; PatchfemError for a law that has no form in two
+        directions."""
+        refuse_directions(self.law, directions)
+        bonds = np.zeros((2 + directions, np.size(sigma)))
         bonds[0] = self.law.initial * sigma
         return BondState(bonds, self.law.length)
 
-    def step(self, state: BondState, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
-        speed = dq / dt if dt > 0 else 0.0
-        middle = grow(self.law, state.eps, speed, speed, dq / 2, dt / 2)
-        free, damaging, play = elastic_part(self.law, state.play, dq, middle)
-        stretched = stretch(state.bonds, free)
-        out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
-        if free != 0:
-            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
-        scale = self.law.static / self.law.length
+    def step(self, state: BondState, dq, s0, s1, dt: float) -> Step:
+        """One straight increment dq [m] in dt [s]; new bonds form at the mean pressure of its ends (m,) [Pa], all are
+        lost where s1 = 0."""
+        law = self.law
+        path = direction(np.atleast_1d(dq))[0]
+        speed = path / dt if dt > 0 else 0.0
+        middle = grow(law, state.eps, speed, speed, path / 2, dt / 2)
+        out, mean, burnt, play = moved(law, state.bonds, state.play, dq, (s0 + s1) / 2, middle)
+        scale = law.static / law.length
         spent = scale * burnt / 2
         lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
         if lost.any():
-            spent = spent + np.where(lost, scale * out[2] / 2, 0.0)
+            spent = spent + np.where(lost, scale * out[-1] / 2, 0.0)
             out = np.where(lost, 0.0, out)
-        return Step(scale * mean, spent, BondState(out, grow(self.law, state.eps, speed, speed, dq, dt), play))
+        return Step(scale * mean, spent, BondState(out, grow(law, state.eps, speed, speed, path, dt), play))
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        """The pressure at rest goes from s0 to s1 (m,) [Pa] on a line; mean: the traction after it."""
         bonds = pressed(self.law, state.bonds, s0, s1)
         scale = self.law.static / self.law.length
         return Step(scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
-        """tau = mu_s z/eps_0 (m,) [Pa]."""
-        return self.law.static / self.law.length * state.bonds[1]
+        """tau = mu_s z/eps_0 [Pa]: (m,) along a line, (2, m) in a plane."""
+        z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
+        return self.law.static / self.law.length * z
 
     def stored(self, state: BondState):
         """Elastic energy of the bonds per area (m,) [J/m2]."""
-        return self.law.static / (2 * self.law.length) * state.bonds[2]
+        return self.law.static / (2 * self.law.length) * state.bonds[-1]

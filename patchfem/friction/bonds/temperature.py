@@ -5,18 +5,15 @@ surface at the reference changes nothing:
 
     a_s = a_ref exp(T_a (1/T_ref - 1/T_s)),   l_k = l_ref exp(T_l (1/T_s - 1/T_ref)).
 
-The print is the limit of an infinite reference. Temperatures are absolute, in kelvin.
+The print is the limit of an infinite reference. Temperatures are absolute, in kelvin. Points of different temperature
+are a law whose two rates are arrays (m,): `recursion.Recursion` then keeps a bond length per point.
 """
 
-from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
 
 from ...core import PatchfemError
-from ..protocol import Step
-from .parameters import Bonds, elastic_part, growth_exponents
-from .recursion import BondState, Recursion, advance, stretch
 
 
 def growth_at(rest: float, slip: float, surface, reference: float, rest_activation: float | None,
@@ -57,47 +54,3 @@ def surface_rise(flux: float, time: float, conductivity: float, capacity: float)
     for a patch that is small against sqrt(k t/(rho c)).
     """
     return 2 * flux * sqrt(time / (pi * conductivity * capacity))
-
-
-def grow_each(law: Bonds, eps, speed: float, dq: float, dt: float):
-    """Bond lengths (m,) after a step at constant speed where `law` holds a_s and l_k per point (twin: `law.grow`)."""
-    rest, slide = growth_exponents(law, speed, speed, dq, dt)
-    total = rest + slide
-    safe = np.where(total > 0, total, 1.0)
-    target = law.length * (rest + slide * law.ratio) / safe
-    return np.where(total > 0, target + (eps - target) * np.exp(-total), eps)
-
-
-@dataclass(frozen=True, slots=True)
-class WarmRecursion(Recursion):
-    """The stretch reading with p = 1 on points of different temperature: every point has a bond length of its own.
-
-    law: a growing `Bonds` whose rest_growth and slip_growth are arrays (m,), as `warm` makes them.
-    """
-
-    @classmethod
-    def warm(cls, law: Bonds, surface, reference: float, rest_activation=None, slip_activation=None):
-        """The law of points at `surface` (m,) [K] from the rates of `law`, which hold at `reference` [K]."""
-        rest, slip = growth_at(law.rest_growth, law.slip_growth, surface, reference, rest_activation, slip_activation)
-        ones = np.ones(np.shape(surface))
-        return cls(replace(law, rest_growth=rest * ones, slip_growth=slip * ones))
-
-    def start(self, sigma) -> BondState:
-        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa], all of length eps_0."""
-        state = Recursion(self.law).start(sigma)
-        return BondState(state.bonds, np.full(sigma.size, self.law.length), np.zeros(sigma.size))
-
-    def step(self, state: BondState, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment; new bonds form at the mean pressure of its ends, all are lost where s1 = 0."""
-        law = self.law
-        speed = dq / dt if dt > 0 else 0.0
-        middle = grow_each(law, state.eps, speed, dq / 2, dt / 2)
-        free, damaging, play = elastic_part(law, state.play, dq, middle)
-        stretched = stretch(state.bonds, free)
-        out, mean, _, burnt = advance(stretched, damaging, (s0 + s1) / 2, middle)
-        if dq != 0:
-            mean = free / dq * (state.bonds[1] + stretched[1]) / 2 + damaging / dq * mean
-        scale, lost = law.static / law.length, s1 <= 0
-        spent = scale * (burnt + np.where(lost, out[2], 0.0)) / 2
-        return Step(scale * mean, spent,
-                    BondState(np.where(lost, 0.0, out), grow_each(law, state.eps, speed, dq, dt), play))

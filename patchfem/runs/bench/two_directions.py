@@ -41,7 +41,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
     refuse_costly(model, law, time.size, 1, slide)
     across = np.interp(time, model.slide.corners[0], model.slide.across)
     q, one = np.stack([slide, across], axis=1), np.ones(1)
-    state, unit = law.start(one), np.zeros((time.size, 2))
+    state, unit = law.start(one, 2), np.zeros((time.size, 2))
     work, stored, losses = np.zeros(time.size), np.zeros(time.size), np.zeros((time.size, 2))
     for k in range(1, time.size):
         step = law.step(state, q[k] - q[k - 1], one, one, time[k] - time[k - 1])
@@ -68,13 +68,13 @@ def law_for(model):
     """The law object in two directions."""
     law = model.bonds
     if law.reading == "stretch" and law.order == 1:
-        from ...friction.bonds.plane import PlaneRecursion
+        from ...friction.bonds.recursion import Recursion
 
-        return PlaneRecursion(law)
-    from ...friction.bonds.plane_quadrature import PlaneQuadrature
+        return Recursion(law)
+    from ...friction.bonds.quadrature import Quadrature
 
     tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
-    return PlaneQuadrature(law, tail)
+    return Quadrature(law, tail)
 
 
 def _pressed(model, patch) -> tuple:

@@ -15,8 +15,6 @@ from scipy.special import gamma
 
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.plane import PlaneRecursion
-from patchfem.friction.bonds.plane_quadrature import PlaneQuadrature
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
 
@@ -26,7 +24,7 @@ GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)
 
 def along(law, path, sigma=ONE, dt=1.0, pressures=None):
     """(means (k, 2, m), tractions, dissipated (k, m), stored, state) of a polygon path (k + 1, 2)."""
-    state, rows = law.start(sigma if pressures is None else pressures[0]), []
+    state, rows = law.start(sigma if pressures is None else pressures[0], 2), []
     for k, dq in enumerate(np.diff(path, axis=0)):
         s0, s1 = (sigma, sigma) if pressures is None else pressures[k:k + 2]
         step = law.step(state, dq, s0, s1, dt)
@@ -53,7 +51,7 @@ def against_tangent(traction, path, radius):
                                                (10, 0.995037, 5.7106)])
 def test_exact_c14_circle(radius, size, lag):
     path = circle(radius, 18, 6000)
-    found = against_tangent(along(PlaneRecursion(Bonds(1.0, 1.0)), path)[1][-1, :, 0], path, radius)
+    found = against_tangent(along(Recursion(Bonds(1.0, 1.0)), path)[1][-1, :, 0], path, radius)
     assert abs(found) == pytest.approx(size, abs=1e-5) == pytest.approx((1 + radius**-2)**-0.5, abs=1e-5)
     assert -np.degrees(np.angle(found)) == pytest.approx(lag, abs=2e-3)
     assert -np.angle(found) == pytest.approx(np.arctan(1 / radius), abs=1e-5)
@@ -73,11 +71,11 @@ def test_exact_circle_of_any_order(reading, order, radius):
     turns = np.append(np.arange(0, 34, 2 * np.pi * radius), 34)
     truth = sum(quad(lambda t, part=part: part(bond(t * t)) * 2 * t, a**0.5, b**0.5, limit=200)[0] * unit
                 for a, b in pairwise(turns) for part, unit in ((np.real, 1), (np.imag, 1j)))
-    law = PlaneQuadrature(Bonds(1.0, 1.0, order, reading, initial=0.0), 0.0)
+    law = Quadrature(Bonds(1.0, 1.0, order, reading, initial=0.0), 0.0)
     miss = []
     for legs in (400, 800):
         path = circle(radius, 30, legs)
-        state = law.start(ONE)
+        state = law.start(ONE, 2)
         for dq in np.diff(path, axis=0):
             state = law._moved(state, dq, ONE, ONE, 1.0)
         miss.append(against_tangent(law.traction(state)[:, 0], path, radius) - truth)
@@ -96,7 +94,7 @@ def test_always_one_direction_is_the_scalar_state(steps, axis, dt):
     path = np.zeros((len(knots), 2))
     path[:, axis] = knots
     one = walk(Recursion(GROWING), knots, lambda q: sigma, dt)
-    found = along(PlaneRecursion(GROWING), path, sigma, dt)
+    found = along(Recursion(GROWING), path, sigma, dt)
     assert found[0][:, axis] == pytest.approx(one.mean, rel=1e-14, abs=1e-14)
     assert found[1][:, axis] == pytest.approx(one.traction, rel=1e-14, abs=1e-14)
     assert found[2] == pytest.approx(one.dissipated, rel=1e-13, abs=1e-14)
@@ -115,7 +113,7 @@ def test_exact_one_direction_is_the_scalar_sum(law, within):
     sigma = np.array([1.0, 0.3])
     path = np.stack([0.6 * knots, -0.8 * knots], axis=1)
     one = walk(Quadrature(law, 0.0), knots, lambda q: sigma, 0.5)
-    found = along(PlaneQuadrature(law, 0.0), path, sigma, 0.5)
+    found = along(Quadrature(law, 0.0), path, sigma, 0.5)
     way = np.array([0.6, -0.8])[:, None]
     assert np.abs(found[1] - way * one.traction[:, None]).max() < within
     assert np.abs(found[3] - one.stored).max() < within
@@ -132,7 +130,7 @@ def random_path(rng, legs):
 def test_always_a_turned_path_turns_the_traction(seed, angle):
     rng = np.random.default_rng(seed)
     path, turn = random_path(rng, 8), np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    for law in (PlaneRecursion(GROWING), PlaneQuadrature(GROWING)):
+    for law in (Recursion(GROWING), Quadrature(GROWING)):
         one, other = along(law, path, dt=0.3), along(law, path @ turn.T, dt=0.3)
         assert other[1] == pytest.approx(np.einsum("ij,kjm->kim", turn, one[1]), abs=1e-13)
         assert other[2] == pytest.approx(one[2], abs=1e-12)
@@ -144,15 +142,15 @@ def test_exact_the_sum_is_the_state_on_random_polygons():
     for _ in range(20):
         path = random_path(rng, 30)
         pressures = rng.uniform(0, 2, (31, 3)) * (rng.uniform(size=(31, 3)) > 0.15)
-        one = along(PlaneRecursion(GROWING), path, dt=0.4, pressures=pressures)
-        other = along(PlaneQuadrature(GROWING, 0.0), path, dt=0.4, pressures=pressures)
+        one = along(Recursion(GROWING), path, dt=0.4, pressures=pressures)
+        other = along(Quadrature(GROWING, 0.0), path, dt=0.4, pressures=pressures)
         for a, b in zip(one[:4], other[:4]):
             assert a == pytest.approx(b, abs=1e-10)
 
 
 def test_exact_a_long_path_is_cut_within_its_tail():
     path = circle(1.3, 80, 500)
-    whole, cut = (along(PlaneQuadrature(Bonds(1.0, 1.0), tail), path) for tail in (0.0, 1e-9))
+    whole, cut = (along(Quadrature(Bonds(1.0, 1.0), tail), path) for tail in (0.0, 1e-9))
     assert cut[1] == pytest.approx(whole[1], abs=2e-9) and len(cut[4].path) < 400 < len(whole[4].path)
 
 
@@ -186,7 +184,7 @@ def test_exact_polygon_by_adaptive_integration(reading, order):
     path = np.array([[0, 0], [1, 0], [1, 1.2], [0.4, 1.2], [0.4, -0.5], [0.4, 0.3], [0.9, 0.3], [0.2, 0.1], [1, 0],
                      [1.5, 0.7], [1.1, 0.9]])
     for end in range(2, len(path) + 1):
-        found = along(PlaneQuadrature(law, 0.0), path[:end])[1][-1, :, 0]
+        found = along(Quadrature(law, 0.0), path[:end])[1][-1, :, 0]
         assert found == pytest.approx(by_hand(law, path[:end], 1.0), abs=1e-9)
 
 
@@ -194,7 +192,7 @@ def test_exact_initial_bonds_point_back_to_the_start():
     law = Bonds(1.0, 1.0, 2.0, "stretch", initial=1.0)
     bare = Bonds(1.0, 1.0, 2.0, "stretch", initial=0.0)
     path = np.array([[0, 0], [0.3, 0.1], [0.2, 0.8]])
-    more = along(PlaneQuadrature(law), path)[1][-1, :, 0] - along(PlaneQuadrature(bare), path)[1][-1, :, 0]
+    more = along(Quadrature(law), path)[1][-1, :, 0] - along(Quadrature(bare), path)[1][-1, :, 0]
     u, r = np.hypot(0.2, 0.8), np.hypot(0.3, 0.1) + np.hypot(0.1, 0.7)
     assert more == pytest.approx(u**2 * np.exp(-r) / 2 * np.array([0.2, 0.8]) / u, rel=1e-13)
 
@@ -205,7 +203,7 @@ def worst_gain(seed, paths, legs=24):
     """Least of (work so far, dissipation, miss of the ledger) over random closed-in paths, all over the work done."""
     rng, worst = np.random.default_rng(seed), [np.inf, np.inf, 0.0]
     for _ in range(paths):
-        law = PlaneRecursion(Bonds(1.0, 1.0, 1.0, "stretch", rng.uniform(0, 1), 10**rng.uniform(-2, 2),
+        law = Recursion(Bonds(1.0, 1.0, 1.0, "stretch", rng.uniform(0, 1), 10**rng.uniform(-2, 2),
                                    10**rng.uniform(-2, 1), 1e-2, rng.uniform()))
         path = random_path(rng, legs)
         path[-1] = path[0]
@@ -236,7 +234,7 @@ def test_exact_work_and_loss_of_a_leg_are_those_of_its_parts(law):
     """Energies of nine legs, each in one step, against forty steps per leg; the loss is never below zero."""
     path = random_path(np.random.default_rng(4), 9)
     fine = np.vstack([path[:1]] + [a + (b - a) * (np.arange(40)[:, None] + 1) / 40 for a, b in pairwise(path)])
-    one, two = along(PlaneQuadrature(law, 0.0), path), along(PlaneQuadrature(law, 0.0), fine)
+    one, two = along(Quadrature(law, 0.0), path), along(Quadrature(law, 0.0), fine)
     work = [np.einsum("kcm,kc->k", part[0], np.diff(way, axis=0)) for part, way in ((one, path), (two, fine))]
     within = 2e-5 if law.order == 0 else 1e-7
     assert work[0] == pytest.approx(work[1].reshape(9, 40).sum(axis=1), abs=within)
@@ -245,18 +243,18 @@ def test_exact_work_and_loss_of_a_leg_are_those_of_its_parts(law):
     assert (two[2] >= -1e-13).all() and (one[2] >= -1e-13).all()
 
 
-@pytest.mark.parametrize("law", [PlaneRecursion, PlaneQuadrature])
+@pytest.mark.parametrize("law", [Recursion, Quadrature])
 def test_refuses_breakaway(law):
     with pytest.raises(PatchfemError, match=r"breakaway in two directions: .*not yet built"):
-        law(Bonds(1.0, 1.0, breakaway=0.1))
+        law(Bonds(1.0, 1.0, breakaway=0.1)).start(ONE, 2)
 
 
 def test_exact_at_rest_only_the_bond_length_changes():
-    law = PlaneRecursion(GROWING)
+    law = Recursion(GROWING)
     state = along(law, circle(0.5, 3, 40))[4]
     still = law.step(state, np.zeros(2), ONE, ONE, 2.0)
     assert (law.traction(still.state) == law.traction(state)).all() and not still.dissipated.any()
     assert still.mean == pytest.approx(law.traction(state), rel=1e-15) and still.state.eps > state.eps
-    added = PlaneQuadrature(GROWING)
+    added = Quadrature(GROWING)
     state = along(added, circle(0.5, 3, 40))[4]
     assert added.step(state, np.zeros(2), ONE, ONE, 2.0).mean == pytest.approx(added.traction(state), rel=1e-13)

@@ -1,5 +1,7 @@
 """Bond growth on a warm surface (2.13): the printed numbers, the reference that changes nothing, and scenes with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from command_line import FROM_PYTHON, loaded
@@ -12,7 +14,7 @@ from patchfem import closed_forms
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.friction.bonds.temperature import WarmRecursion, critical_speed, grow_each, growth_at, surface_rise
+from patchfem.friction.bonds.temperature import critical_speed, growth_at, surface_rise
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.plan import plan
@@ -73,7 +75,8 @@ def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
     """Three points at 250, 293.15 and 450 K in one call = three recursions with rates by hand."""
     law = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, breakaway=breakaway)
     hot, sigma = np.array([250.0, 293.15, 450.0]), np.array([1.0, 2.0, 0.5])
-    engine = WarmRecursion.warm(law, hot, 293.15, 2500.0, 1500.0)
+    rest, slip = growth_at(law.rest_growth, law.slip_growth, hot, 293.15, 2500.0, 1500.0)
+    engine = Recursion(replace(law, rest_growth=rest, slip_growth=slip))
     alone = [Recursion(Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10 * np.exp(2500 * (1 / 293.15 - 1 / t)),
                              2e-7 * np.exp(1500 * (1 / t - 1 / 293.15)), 1e-5, breakaway=breakaway)) for t in hot]
     state, states = engine.start(sigma), [one.start(sigma[i:i + 1]) for i, one in enumerate(alone)]
@@ -95,8 +98,8 @@ def test_always_the_growth_per_point_is_that_of_one_point(dq, dt, eps):
     one = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5)
     each = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, np.full(2, 10.0), np.full(2, 2e-7), 1e-5)
     speed = dq / dt if dt > 0 else 0.0
-    assert grow_each(each, np.full(2, eps), speed, dq, dt) == pytest.approx(grow(one, eps, speed, speed, dq, dt),
-                                                                            rel=1e-14)
+    assert grow(each, np.full(2, eps), speed, speed, dq, dt) == pytest.approx(grow(one, eps, speed, speed, dq, dt),
+                                                                              rel=1e-14)
 
 
 # ---- scenes

@@ -6,7 +6,7 @@ from math import exp
 from numba import njit
 
 from ..flags_kernels import LEAN
-from .bond_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
+from .list_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
 
 GONE = 1e-8  # share of a bond length that was there when a bond formed
 MOST_AGED = 0.1  # widest growth J across one strip of growing bonds

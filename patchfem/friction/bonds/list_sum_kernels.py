@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit, uint64
 
 from ..flags_kernels import LEAN
-from .bond_math_kernels import FAST, fexp, flog, share, tabled
+from .list_math_kernels import FAST, fexp, flog, share, tabled
 
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
 SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
@@ -250,8 +250,15 @@ def own_length(part, psi, length, c0, c1):
 
 
 @njit(error_model="numpy", **LEAN)
+def _bends(p):
+    """Whether R^p is too steep at R = 0, or bends too sharply there, for two Gauss points in R."""
+    return p < 2 and p != np.floor(p)
+
+
+@njit(error_model="numpy", **LEAN)
 def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
-    """One strip of growing bonds with u = 0 inside, or with p < 0 near its end: two points on each side of u = 0.
+    """One strip of growing bonds with u = 0 inside, or near the present with a fractional p: two points on each side of
+    u = 0.
 
     A young bond has own proportional to R, so that (R/own)^p is smooth and the points are Gauss's in R. Where the bonds
     grew at rest instead, R^p is steep towards R = 0 and the points are Gauss's in R^(p + 1), which takes it in exactly.
@@ -259,7 +266,7 @@ def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
     step, near, force, energy = b - a, max(path - at, 0.0), 0.0, 0.0
     turn = min(max((b - q) / step, 0.0), 1.0)
     steep = False
-    if p < 0:
+    if _bends(p):
         last, first = own_length(0.0, psi, length, c0, c1), own_length(1.0, psi, length, c0, c1)
         steep = last > SPROUTING * first and near * first < 0.5 * (near + wide) * last
     for side in range(2):
@@ -290,10 +297,11 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
     force, energy = _aged(q, path, psi, length, bonds, first, end, p)
     for k in range(first, end):
         a, b, near, wide = bonds[0, k], bonds[1, k], path - bonds[2, k], bonds[3, k]
-        if (q - a) * (q - b) >= 0 and (p >= 0 or near > 3 * wide):
+        beside = _bends(p) and near <= 3 * wide
+        if (q - a) * (q - b) >= 0 and not beside:
             continue
         less, lower = _aged(q, path, psi, length, bonds, k, k + 1, p)
-        if p >= 0 and wide <= coarse * fexp(near / (3 * length)) and near > length:
+        if not beside and wide <= coarse * fexp(near / (3 * length)) and near > length:
             part, far = spread_over(q, min(a, b), max(a, b), 0.0)
             own = _aged(max(a, b) + wide, path, psi, length, bonds, k, k + 1, p)[0]
             more, higher = part * own, far * own

@@ -7,7 +7,7 @@ from scipy.special import gammainc, roots_jacobi
 
 from .parameters import Bonds
 
-MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0  # forms of the sum, as in bond_sum_kernels
+MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0  # forms of the sum, as in list_sum_kernels
 NOTHING_LEFT = 745.0  # damage beyond which exp(-damage) is zero
 STRIP = 4  # strips per bond length of a step, at most
 NODES = 1 / 32  # of the table of P(p + 1, x)

@@ -1,8 +1,14 @@
-"""A shared list of bonds, compiled: force along a straight increment, its path mean, and the step that keeps the list.
+"""The list of bonds, compiled: force along a straight increment, its path mean, and the step that keeps the list.
 
-numbers of a list: law (24,) of `bond_list.law_numbers`; now (6,): q, path, damage, growth J, mature length, ref;
-tally (12,): first strip, end, spread ones, length after the last merge, stored energy [m], force [1], created and
-dissipated [m], pieces beyond one per step, strips merged although their places differ, largest length.
+One list sums eq. 2.17 along a line for every order and reading. Two numbers of `list_numbers.law_numbers` make the
+engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`truncated`) and the width up to which
+`list_merge_kernels` joins neighbours (`merged`); with neither it keeps every bond (`direct`).
+
+c: a named tuple with the arrays of a list, such as `dynamics.contacts.arrays.BondList`: bondlist (10, capacity), the
+rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
+`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (12,): first strip, end,
+spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
+per step, strips merged although their places differ, largest length.
 """
 
 from math import ceil, exp, expm1
@@ -11,9 +17,9 @@ import numpy as np
 from numba import njit
 
 from ..flags_kernels import LEAN
-from .bond_math_kernels import fexp, flog, share
-from .bond_merge_kernels import merge
-from .bond_sum_kernels import (
+from .list_math_kernels import fexp, flog, share
+from .list_merge_kernels import merge
+from .list_sum_kernels import (
     AGED,
     FIRST,
     MOMENTS,
@@ -78,12 +84,13 @@ def _young(size, before, after, more, middle, law):
 
 
 @njit(error_model="numpy", **LEAN)
-def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
+def list_state(dq, c, v0, dt):
     """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
 
     Friction force = mu_s N * weight. Energy: the force of each bond over its own stretch at frozen damage.
     """
-    q, path, damage, age, eps, middle = _after(dq, now, growth, v0, v0, dt)
+    bonds, tally, now, law = c.bondlist, c.tally, c.now, c.law
+    q, path, damage, age, eps, middle = _after(dq, now, c.growth, v0, v0, dt)
     head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] * law[2]
     force, energy = first_bonds(q, path, damage, law)
     size, young = abs(dq), 0.0
@@ -97,7 +104,7 @@ def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
         force += scale * f
         energy += scale * g / (p + 1)
     elif law[1] == SHARES:
-        f, g = shares_sums(q, path, bonds, head, many, end, p, law[2], table, law[4])
+        f, g = shares_sums(q, path, bonds, head, many, end, p, law[2], c.table, law[4])
         force += f
         energy += g
     else:
@@ -113,24 +120,24 @@ def list_state(dq, bonds, tally, now, law, growth, table, v0, dt):
 
 
 @njit(error_model="numpy", **LEAN)
-def list_force(dq, bonds, tally, now, law, growth, table, v0, dt):
+def list_force(dq, c, v0, dt):
     """Weight [1] of the list after the straight increment dq: friction force = mu_s N * weight.
 
     Twin: `quadrature.Quadrature`.
     """
-    return list_state(dq, bonds, tally, now, law, growth, table, v0, dt)[0]
+    return list_state(dq, c, v0, dt)[0]
 
 
 @njit(error_model="numpy", **LEAN)
-def list_energy(dq, bonds, tally, now, law, growth, table, v0, dt):
+def list_energy(dq, c, v0, dt):
     """Energy [m] of all bonds, those of the increment too, after the straight increment dq in the stretch reading."""
-    middle = _after(dq, now, growth, v0, v0, dt)[5]
-    young = middle * middle / law[2] * share(law[0] + 1, abs(dq) / middle)
-    return young + list_state(dq, bonds, tally, now, law, growth, table, v0, dt)[1]
+    middle = _after(dq, c.now, c.growth, v0, v0, dt)[5]
+    young = middle * middle / c.law[2] * share(c.law[0] + 1, abs(dq) / middle)
+    return young + list_state(dq, c, v0, dt)[1]
 
 
 @njit(error_model="numpy", **LEAN)
-def _panel(energy, low, high, dq, bonds, tally, now, law, growth, table, v0, dt):
+def _panel(energy, low, high, dq, c, v0, dt):
     """Integral of the force, or of the energy, over a share of the increment by five Gauss points."""
     out = 0.0
     for y, w in ((-0.906179845938664, 0.23692688505618908), (-0.5384693101056831, 0.47862867049936647),
@@ -138,14 +145,14 @@ def _panel(energy, low, high, dq, bonds, tally, now, law, growth, table, v0, dt)
                  (0.906179845938664, 0.23692688505618908)):
         part = low + (high - low) * (1 + y) / 2
         if energy:
-            out += w / 2 * list_energy(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
+            out += w / 2 * list_energy(part * dq, c, v0, part * dt)
         else:
-            out += w / 2 * list_force(part * dq, bonds, tally, now, law, growth, table, v0, part * dt)
+            out += w / 2 * list_force(part * dq, c, v0, part * dt)
     return (high - low) * out
 
 
 @njit(error_model="numpy", **LEAN)
-def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
+def list_mean(dq, c, v0, dt):
     """Path-mean weight over the increment.
 
     Stretch reading of order 1: closed. Of another order: what damage takes, the share dR/eps of the stored energy, and
@@ -155,60 +162,63 @@ def list_mean(dq, bonds, tally, now, law, growth, table, v0, dt):
     bonds takes Gauss points as well: their force may jump there, and its value at the place itself is that of neither
     side.
     """
+    tally, now, law = c.tally, c.now, c.law
     if dq == 0:
         return tally[5]
     if law[1] == MOMENTS:
-        return list_slope(dq, bonds, tally, now, law, growth, v0, dt)[0]
+        return list_slope(dq, c, v0, dt)[0]
     size = abs(dq) / now[4]
     low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
     short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
     if law[1] == POWER and size > LEAST_BALANCED:
-        gain = list_energy(dq, bonds, tally, now, law, growth, table, v0, dt) - tally[4]
-        middle = _after(dq, now, growth, v0, v0, dt)[5]
-        spent = _path_mean(True, short, gain + tally[4], dq, bonds, tally, now, law, growth, table, v0, dt)
+        gain = list_energy(dq, c, v0, dt) - tally[4]
+        middle = _after(dq, now, c.growth, v0, v0, dt)[5]
+        spent = _path_mean(True, short, gain + tally[4], dq, c, v0, dt)
         return (spent * abs(dq) / middle + gain) / dq
     last = 0.0
     if short:
-        last = list_force(dq, bonds, tally, now, law, growth, table, v0, dt)
-    return _path_mean(False, short, last, dq, bonds, tally, now, law, growth, table, v0, dt)
+        last = list_force(dq, c, v0, dt)
+    return _path_mean(False, short, last, dq, c, v0, dt)
 
 
 @njit(error_model="numpy", **LEAN)
-def _path_mean(energy, short, last, dq, bonds, tally, now, law, growth, table, v0, dt):
+def _path_mean(energy, short, last, dq, c, v0, dt):
     """Path mean of the force, or of the energy, over the increment; last: its value at the end of a short one."""
     if short:
         if energy:
-            half = list_energy(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
-            return (tally[4] + 4 * half + last) / 6
-        half = list_force(0.5 * dq, bonds, tally, now, law, growth, table, v0, 0.5 * dt)
-        return (tally[5] + 4 * half + last) / 6
-    size = abs(dq) / now[4]
+            half = list_energy(0.5 * dq, c, v0, 0.5 * dt)
+            return (c.tally[4] + 4 * half + last) / 6
+        half = list_force(0.5 * dq, c, v0, 0.5 * dt)
+        return (c.tally[5] + 4 * half + last) / 6
+    size = abs(dq) / c.now[4]
     if size <= 0.5:
-        return _panel(energy, 0.0, 1.0, dq, bonds, tally, now, law, growth, table, v0, dt)
+        return _panel(energy, 0.0, 1.0, dq, c, v0, dt)
     low, high, out = 0.0, 0.5 / size, 0.0
     while low < 1:
         high = 1.0 if high > 0.75 else high
-        out += _panel(energy, low, high, dq, bonds, tally, now, law, growth, table, v0, dt)
+        out += _panel(energy, low, high, dq, c, v0, dt)
         low, high = high, 2 * high
     return out
 
 
 @njit(error_model="numpy", **LEAN)
-def list_slope(dq, bonds, tally, now, law, growth, v0, dt):
+def list_slope(dq, c, v0, dt):
     """(path-mean weight, its derivative [1/m]) of the stretch reading of order 1, exact."""
-    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), bonds, int(tally[0]), int(tally[1]))
+    tally, now, law = c.tally, c.now, c.law
+    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(tally[0]), int(tally[1]))
     first = law[3] * exp(-now[2])
-    middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, growth)
+    middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, c.growth)
     mean, slope = bond_mean(m + first, z + first * now[0], dq, 1.0, middle)
     return mean / law[2], slope / law[2]
 
 
 @njit(error_model="numpy", **LEAN)
-def list_step(dq, bonds, tally, now, law, growth, table, v0, v1, dt):
+def list_step(dq, c, v0, v1, dt):
     """Commit dq: append its strips, drop those beyond the cut-off, merge now and then. False when the list is full."""
+    bonds, tally, now, law = c.bondlist, c.tally, c.now, c.law
     before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
-    q, path, damage, grown, eps, middle = _after(dq, now, growth, v0, v1, dt)
+    q, path, damage, grown, eps, middle = _after(dq, now, c.growth, v0, v1, dt)
     now[0], now[1], now[2], now[3], now[4] = q, path, damage, grown, eps
     _rescale(bonds, tally, now, law)
     size, done = abs(dq), True
@@ -217,7 +227,7 @@ def list_step(dq, bonds, tally, now, law, growth, table, v0, v1, dt):
         _cut(bonds, tally, now, law)
         if law[5] > 0 and tally[1] - tally[0] > 1.2 * tally[3] + 12:
             merge(bonds, tally, now, law)
-    tally[5], tally[4] = list_state(0.0, bonds, tally, now, law, growth, table, 0.0, 0.0)
+    tally[5], tally[4] = list_state(0.0, c, 0.0, 0.0)
     tally[10] = max(tally[10], tally[1] - tally[0])
     return done
 
