@@ -23,7 +23,7 @@ MEANINGS = {
         "element_size": "length of the elements along the interface; chosen by the tolerance for a static patch, "
                         "length/200 elsewhere",
         "substrate": "what the pieces are made of: a name of the material table, or a table of young, poisson, density",
-        "mesh": "a mesh file of both pieces, tagged as the README says; made from the dimensions unless given",
+        "mesh": "a mesh file of both pieces, tagged as GUIDE.md says; made from the dimensions unless given",
     },
     "Coating": {
         "material": "what the layer is made of, written as a substrate is",
