@@ -258,11 +258,12 @@ def wedge_opening(load, length, width, stiffness):
 
 
 def wedge_linear(rotation, load, length, width, stiffness) -> tuple:
-    """(fraction in contact, centre of pressure [m], least and largest pressure on the contact [Pa]) of a tilted pad.
+    """Contact of a tilted rigid pad on a linear foundation.
 
-    rotation theta [rad] a number of either sign; theta > 0 opens +x, so the centre is then < 0. Above
-    `wedge_opening` f = sqrt(2 N/(k_n |theta| b))/L and the centre lies L/2 - f L/3 from the middle; below it the
-    pressure is linear over the whole pad, centre k_n |theta| L^2/(12 p). Arguments as in `wedge_opening`.
+    Returns (fraction in contact, centre of pressure [m], least and largest pressure on the contact [Pa]). rotation
+    theta [rad] a number of either sign; theta > 0 opens +x, so the centre is then < 0. Above `wedge_opening` f = sqrt(2
+    N/(k_n |theta| b))/L and the centre lies L/2 - f L/3 from the middle. Below it the pressure is linear over the whole
+    pad, centre k_n |theta| L^2/(12 p). Arguments as in `wedge_opening`.
     """
     tilt, mean = abs(rotation), load / (length * width)
     if tilt <= wedge_opening(load, length, width, stiffness):
@@ -273,10 +274,11 @@ def wedge_linear(rotation, load, length, width, stiffness) -> tuple:
 
 
 def wedge_skin(rotation, length, decay) -> tuple:
-    """(mean over largest pressure, centre of pressure [m]) of a tilted rigid pad on a rough skin, p ~ exp(-gap/u_0).
+    """Contact of a tilted rigid pad on an exponential rough skin, p ~ exp(-gap/u_0).
 
-    With B = |theta| L/u_0: f = (1 - e^-B)/B, centre L (1/2 - 1/B + 1/(e^B - 1)) towards the closed edge. Neither
-    depends on the load. rotation (any shape) [rad], length L [m], decay u_0 [m]. ValueError unless L, u_0 > 0.
+    Returns (mean over largest pressure, centre of pressure [m]). With B = |theta| L/u_0: f = (1 - e^-B)/B, centre L
+    (1/2 - 1/B + 1/(e^B - 1)) towards the closed edge. Neither depends on the load. rotation (any shape) [rad], length L
+    [m], decay u_0 [m]. ValueError unless L, u_0 > 0.
     """
     positive(length=length, decay=decay)
     b = np.abs(np.asarray(rotation, float)) * length / decay

@@ -23,7 +23,7 @@ def decay_half_cycles(start, friction) -> int:
 
 
 def decay_rest(start, friction, omega) -> tuple:
-    """(time [s], place [m]) at which a Coulomb oscillator released at `start` comes to rest; arguments of `decay`."""
+    """Time [s] and place [m] at which a Coulomb oscillator released at `start` comes to rest; arguments of `decay`."""
     positive(omega=omega)
     count = decay_half_cycles(start, friction)
     sign = 1.0 if start >= 0 else -1.0
@@ -91,11 +91,11 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
 
 
 def two_stop_relation(slip):
-    """(f/a, amplitude over a/omega_n^2) of the steady motion with two stops per cycle: undamped, at resonance.
+    """Steady motion with two stops per cycle, undamped, at resonance: (f/a, amplitude over a/omega_n^2).
 
-    slip in (0, pi): drive phase [rad] during which the block slides in each half cycle; release at the phase t_0,
-    tan t_0 = s sin s/(sin s - s cos s); f/a runs from 1 (s = 0) to pi/4 (s = pi), the amplitude from 0 to pi/4.
-    ValueError for a slip outside (0, pi).
+    slip in (0, pi): drive phase [rad] during which the block slides in each half cycle; release at the phase t_0, tan
+    t_0 = s sin s/(sin s - s cos s). f/a runs from 1 (s = 0) to pi/4 (s = pi), the amplitude from 0 to pi/4. ValueError
+    for a slip outside (0, pi).
     """
     s = np.asarray(slip, float)
     if np.any(s <= 0) or np.any(s >= np.pi):

@@ -122,13 +122,13 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
 
 
 def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
-    """(area, force at the end of a stroke) of a steady loop of the stretch reading, p = 1, constant bond length.
+    """Steady loop of the stretch reading, p = 1, constant bond length: (area [J], force at the end of a stroke [N]).
 
-    amplitude, length [m]; limit = mu_s N [N]; breakaway: share b of the length that stretches without damage. With
-    x = amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E): force limit z, area
-    4 limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2); b = 0: 4 limit (amplitude - length tanh x), Dahl's
-    loop. Up to x = b the loop is a line: no area, force limit x of a slide from rest. Returns ([J], [N]).
-    ValueError unless amplitude and length are positive and 0 <= breakaway < 1.
+    amplitude, length [m]; limit = mu_s N [N]; breakaway: share b of the length that stretches without damage. With x =
+    amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E) the force is limit z and the area 4
+    limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2). b = 0: 4 limit (amplitude - length tanh x), Dahl's loop.
+    Up to x = b the loop is a line: no area, force limit x of a slide from rest. ValueError unless amplitude and length
+    are positive and 0 <= breakaway < 1.
     """
     positive(amplitude=amplitude, length=length)
     if not 0 <= breakaway < 1:
@@ -141,10 +141,11 @@ def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
 
 
 def dither_drift(low, high, breakaway=0.0):
-    """Slide per cycle in bond lengths that a force between low and high (shares of mu_s N, -1 < low < high < 1) leaves
-    behind in the stretch reading, p = 1, constant bond length and load; 0 where high - low <= 2 breakaway.
+    """Drift of a dithered force in the stretch reading: slide per cycle in bond lengths that it leaves behind.
 
-    Up: the elastic range, then ln((1 - low - 2 b)/(1 - high)); down: the range, then ln((1 + high - 2 b)/(1 + low)).
+    p = 1, constant bond length and load. The force runs between low and high, shares of mu_s N, -1 < low < high < 1.
+    The drift is 0 where high - low <= 2 breakaway. Up: the elastic range, then ln((1 - low - 2 b)/(1 - high)); down:
+    the range, then ln((1 + high - 2 b)/(1 + low)).
     """
     if high - low <= 2 * breakaway * (1 + 1e-12):
         return 0.0
@@ -152,9 +153,9 @@ def dither_drift(low, high, breakaway=0.0):
 
 
 def report_loop(amplitude, length, limit=1.0):
-    """(area, force at the end of a stroke) of the steady loop of the printed law, p = 0, constant bond length.
+    """Steady loop of the printed law, p = 0, constant bond length: (area, force at the end of a stroke).
 
-    4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
+    They are 4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
     ValueError unless amplitude and length are positive.
     """
     positive(amplitude=amplitude, length=length)
@@ -163,10 +164,10 @@ def report_loop(amplitude, length, limit=1.0):
 
 
 def jenkins_loop(amplitude, length, limit=1.0):
-    """(area, force at the end of a stroke) of the elastic-plastic law 3.12 with its reversal: 4 limit (A - eps), limit.
+    """Steady loop of the elastic-plastic law 3.12 with its reversal: (area, force at the end of a stroke).
 
-    Below the yield slide (amplitude <= length) the loop is a line: (0, limit A/eps).
-    ValueError unless amplitude and length are positive.
+    They are 4 limit (A - eps) and limit. Below the yield slide (amplitude <= length) the loop is a line: (0, limit
+    A/eps). ValueError unless amplitude and length are positive.
     """
     positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)

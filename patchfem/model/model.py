@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Model:
-    """What a run is asked to compute, frozen, in SI; nothing is solved.
+    """The question that a run answers, frozen, in SI; nothing is solved.
 
     kind: "patch", "bench", "rig" or "linear". patch or point, whichever carries the load, the other None. friction:
     keys of the law as they act, of the first interface; heat: surface temperature table or None; spread [m] of the pad
-    (2.15) or None, pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
+    (2.15) or None; pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
     reading factor) or None. absent: effects that the scene does not name.
     """
 
@@ -118,8 +118,7 @@ def build(scene: Scene) -> Model:
 
 
 def _law(scene: Scene) -> tuple:
-    """(keys of the law as they act, its surface temperature table, its spread [m], width of the pad [m]) of the first
-    interface."""
+    """Law of the first interface: (keys as they act, surface temperature table, spread [m], width of the pad [m])."""
     given = scene.structure.interface[0] if scene.structure is not None and scene.structure.interface else \
         scene.friction
     if given is None:

@@ -15,7 +15,7 @@ PHASES = 16  # releases kept per period
 
 
 def impulse(u, o):
-    """(h, h', step answer) of the free mode after u."""
+    """Answers of the free mode after u: (to a unit impulse h, its rate h', to a unit step)."""
     if u * o[6] < REACH:
         h, h1, _ = series(u, 1.0, 0.0, 0.0, 0.0, o)
         return h, h1, step_answer(u, o, h, h1)
@@ -121,8 +121,10 @@ def newton(theta, z, v, angle, sign, b, static, kinetic, o, out, phases, tries):
 
 
 def sliding_guess(b, kinetic, o):
-    """(theta, z, v, found) in the middle of an upward slide of the motion that slides without a stop, if there is one:
-    Den Hartog's, with damping; nothing is checked on the way."""
+    """Guess of a motion that slides without a stop, if there is one: Den Hartog's, with damping.
+
+    Returns (theta, z, v, found) in the middle of an upward slide. Nothing is checked on the way.
+    """
     beta, om = o[0], o[5]
     half = pi / om
     one, h, _ = motion(half, 0.0, 1.0, 0.0, 0.0, o)
@@ -147,8 +149,10 @@ def sliding_guess(b, kinetic, o):
 
 
 def settle(theta, z, v, halves, b, static, kinetic, o, out, phases):
-    """(theta, z, v, ok) after half turns of the drive, turned over after each, and on to the middle of the stick or
-    slip then under way."""
+    """State after half turns of the drive: (theta, z, v, ok), turned over after each half turn.
+
+    It ends in the middle of the stick or slip that is then under way.
+    """
     for _ in range(halves):
         if not flow(theta, z, v, pi, b, static, kinetic, o, out, phases):
             return theta, z, v, False

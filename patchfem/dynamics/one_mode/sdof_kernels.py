@@ -14,7 +14,7 @@ FULL, DONE, TRAVEL, LOST, PILED = 0, 1, 2, 3, 4
 
 
 def need_slopes(size, push, static, up):
-    """(B sin, B cos) of the drive where the force that holds the interface reaches its limit, rising for up = 1.
+    """Drive (B sin, B cos) where the force that holds the interface reaches its limit, rising for up = 1.
 
     push: the constant part of that force; size: |B|. The cosine is 0 where the limit is never passed.
     """
@@ -26,9 +26,9 @@ def need_slopes(size, push, static, up):
 
 
 def release(push, b, theta, static):
-    """(angle until the interface lets go, direction, B sin, B cos there) from a stuck state; direction 0: never.
+    """Next release from a stuck state: (angle until the interface lets go, direction, B sin, B cos there).
 
-    push + b sin(theta) is the force that holds it, over the mass.
+    direction 0: never. push + b sin(theta) is the force that holds it, over the mass.
     """
     best, way, sine, cosine, size = inf, 0.0, 0.0, 0.0, abs(b)
     for up in (1.0, -1.0):
@@ -59,8 +59,11 @@ def crossing(z, limit, direction, v0, g0, bc, bs, span, o):
 
 
 def closed_books(span, v0, a0, p0, q0, v1, a1, p1, q1, o):
-    """(work of the alternating drive force, viscous loss) between two states of a slip: the equation of motion of the
-    speed times the force p, its quadrature q, the speed and the acceleration, each integrated by parts."""
+    """Work of the alternating drive force and viscous loss between two states of a slip.
+
+    They follow from the equation of motion of the speed times the force p, its quadrature q, the speed and the
+    acceleration, each integrated by parts.
+    """
     beta, alpha, om = o[0], o[1], o[5]
     x, y = beta - om * om, alpha * om
     vp, vq, vv = v1 * p1 - v0 * p0, v1 * q1 - v0 * q0, 0.5 * (v1 * v1 - v0 * v0)
@@ -258,7 +261,7 @@ def _keep(state, s, turns, theta, z, v, direction, g0, bc, bs):
 
 
 def begin(push, b, theta, v, static, kinetic):
-    """(direction, g0, bc, bs) of the phase that follows a state: push + b sin(theta) is the force that would hold z."""
+    """Phase that follows a state: (direction, g0, bc, bs); push + b sin(theta) is the force that would hold z."""
     sine, cosine = b * sin(theta), b * cos(theta)
     need = push + sine
     if v != 0.0:

@@ -16,8 +16,10 @@ REACH = 0.3
 
 
 def oscillator(w, decay, om):
-    """(beta, alpha, decay, own, kind, om, top) of a natural frequency w and decay = xi w, or half a rigid mode's
-    damping [1/s]; kind 0 below critical damping, 1 above, 2 at it."""
+    """Constants (beta, alpha, decay, own, kind, om, top) of a mode of natural frequency w.
+
+    decay = xi w, or half a rigid mode's damping [1/s]; kind 0 below critical damping, 1 above, 2 at it.
+    """
     if decay == w:
         return w * w, 2 * decay, decay, 0.0, 2.0, om, max(w, om)
     own = sqrt(abs((w - decay) * (w + decay)))
@@ -27,7 +29,7 @@ def oscillator(w, decay, om):
 
 
 def series(u, v0, g0, bc, bs, o):
-    """(shift, speed, acceleration) by the power series, for top u <= 0.3."""
+    """Motion (shift, speed, acceleration) by the power series, for top u <= 0.3."""
     beta, alpha, om = o[0], o[1], o[5]
     if u <= 0.0:
         return 0.0, v0, g0 - alpha * v0
@@ -65,7 +67,7 @@ def step_answer(u, o, h, h1):
 
 
 def motion(u, v0, g0, bc, bs, o):
-    """(shift, speed, acceleration) at u after the start of a phase with speed v0."""
+    """Motion (shift, speed, acceleration) at u after the start of a phase with speed v0."""
     return moved(u, cos(o[5] * u), sin(o[5] * u), v0, g0, bc, bs, o)
 
 
@@ -195,8 +197,11 @@ def over_parts(v0, a0, size, bc, bs, o):
 
 
 def stop(v0, g0, bc, bs, o, limit):
-    """(first time in (0, limit] at which the speed, positive just after 0, is back at zero, shift, acceleration there);
-    time -1 if there is none, -2 if it was lost."""
+    """First time in (0, limit] at which the speed, positive just after 0, is back at zero; with shift and acceleration
+    there.
+
+    The time is -1 if there is none, -2 if it was lost.
+    """
     beta, alpha, om = o[0], o[1], o[5]
     size = hypot(bc, bs)
     free = alpha if o[4] != 1.0 else 0.0

@@ -117,8 +117,10 @@ def response(modes: ModalBasis, drives, static: float, kinetic: float, patience:
 
 
 def jenkins_point(modes: ModalBasis, drive, limit: float, stiffness: float) -> tuple:
-    """(amplitude of the output [m], multipliers (3,) of a period, residual) of the steady motion with a Jenkins spring:
-    tangential stiffness [N/m], limit [N]. Amplitude 0 and residual inf where none that slips was found."""
+    """Steady motion with a Jenkins spring: (amplitude of the output [m], multipliers (3,) of a period, residual).
+
+    stiffness: tangential [N/m]; limit [N]. Amplitude 0 and residual inf where no motion that slips was found.
+    """
     from .jenkins import Jenkins
 
     row, output = _row(modes, drive, limit, limit, None)

@@ -477,7 +477,7 @@ def test_refuses_what_it_is_not_for():
         simulate(two, BaseSine(1.0, 1.0), 0.1, 0.1, 5)
     with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
         simulate(modes_of(), BaseSine(1.0, 1.0), 0.1, 0.2, 5)
-    with pytest.raises(PatchfemError, match=r"drive\.type"):
+    with pytest.raises(PatchfemError, match=r"drive\.waveform"):
         simulate(modes_of(), Recorded(np.array([0.0, 1.0]), np.zeros(2), 1.0), 0.1, 0.1, 5)
     with pytest.raises(PatchfemError, match="slide"):
         simulate(modes_of(slide=0.0), BaseSine(1.0, 1.0), 0.1, 0.1, 5)
