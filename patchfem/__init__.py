@@ -23,6 +23,7 @@ Read the package in this order. A module imports its own entry of the list and t
 19. `campaigns`   many runs: fits, error against cost
 20. `export`      summary, netCDF, VTK, report
 21. `api`         load, build, plan and run from Python
+22. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

@@ -16,7 +16,7 @@ import pytest
 from house import DEFS, circles, folder_of, graph_of, imports, sources
 
 HERE = Path(__file__).parents[1]
-SCENE = ("", "__main__", "api", "scene", "scene.*", "model", "model.*")  # may know a Scene
+SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
 SCENE_ALSO = ("campaigns.fit", "campaigns.fit_model")  # and so may these, each named with its reason
 OUTSIDE = {"numba": ("*kernels", "compiled"), "pyvista": ("export.fields.view",), "meshio": ("mesh.files", "export.*")}
 PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order

@@ -1,0 +1,23 @@
+"""Verbs that show a results folder or write it in other formats."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .shared import Out, say
+
+
+def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
+    """Write the fields of a results folder as .pvd (series), .vtu or .csv (last or --frame), or .vtkhdf."""
+    from ..export.fields.vtu import export as write
+
+    print(write(folder, out, frame))
+
+
+def view(folder: Path, /, *, out: Out = None,
+         frame: int | None = None, magnify: float | None = None):
+    """Show the pressed pieces of a results folder in a window, or draw them into -o PICTURE.png."""
+    from ..export.fields.view import view as show
+
+    show(folder, out, frame, magnify, say)

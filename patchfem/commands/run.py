@@ -1,0 +1,51 @@
+"""The verb that runs a scene and writes its results folder."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .shared import Json, NotReached, Out, Quiet, Refused, Sets, progress_bar, say, scene_of
+
+
+def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
+        json_: Json = False,
+        resume: Annotated[bool, Parameter(negative=())] = False,
+        fresh: Annotated[bool, Parameter(negative=())] = False,
+        quiet: Quiet = False,
+        verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
+    """Run SCENE and write its results folder, by default out/<scene name>; --fresh ignores kept operators."""
+    if resume:
+        raise Refused("run: --resume is not yet built; run the scene again")
+    from ..export.folder import run_into
+    from ..runs.plan import plan as make
+
+    talk = (lambda text: None) if quiet else say
+    what = make(scene_of(scene, set_))
+    if verbose:
+        talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
+    target = out if out is not None else Path("out") / what.model.source.path.stem
+    with progress_bar(quiet or json_) as progress:
+        answer = run_into(what, target, talk, progress, fresh)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        _print_answer(answer, target, verbose)
+    if answer["outcome"] == "not_converged":
+        raise NotReached
+
+
+def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
+    from ..core import Outcome
+
+    print(f"{answer['outcome']}: {Outcome(answer['outcome']).sentence}")
+    for name, m in answer["measures"].items():
+        error = "" if m["error"] is None else f" ± {m['error']:.2g}"
+        value = "-" if m["value"] is None else f"{m['value']:.6g}"
+        print(f"  {name:<42} {value}{error} {m['unit']}")
+    for text in answer["warnings"]:
+        say(f"warning: {text}")
+    if verbose:
+        say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
+    print(f"results: {target}")

@@ -1,0 +1,84 @@
+"""Verbs that look at a scene without running it: its mistakes, its plan, its mesh."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .shared import Json, Refused, Sets, model_of, say, scene_of
+
+
+def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
+    """Name every mistake in SCENE and in the path it slides along; compute nothing."""
+    found = scene_of(scene, set_)
+    if found.slide is not None and found.slide.file is not None:
+        from ..model.slide import slide_asked
+
+        slide_asked(found)
+    for remark in found.remarks:
+        say(f"{scene}: {remark}")
+    if json_:
+        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks}))
+    else:
+        print(f"{scene}: a {found.kind} scene without mistakes")
+
+
+def plan(scene: Path, /, *, set_: Sets = (), json_: Json = False,
+         probe: Annotated[bool, Parameter(negative=())] = False):
+    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; --probe solves the static patch."""
+    from ..runs.plan import plan as make
+
+    found = make(scene_of(scene, set_))
+    answer, asked = found.as_json(), found.model.patch
+    if probe and asked is not None:
+        from ..model.source import placed
+        from ..runs.patch.ladder import solve_all
+        from ..runs.patch.values import values
+
+        with placed(found.model.source):
+            solved = values(solve_all(asked, found.model.accuracy.tolerance, False)[0])
+        answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"
+        answer["probe"] = solved
+    if json_:
+        print(json.dumps(answer))
+        return
+    _print_plan(answer, probe)
+
+
+def _print_plan(answer: dict, probe: bool) -> None:
+    print(f"kind     {answer['kind']}, engine {answer['engine']}")
+    for effect in answer["effects"]:
+        print(f"  runs   {effect['effect']:<28} {effect['equations']}")
+    print(f"  not    {', '.join(answer['not_in_scene'])}")
+    print("sizes    " + ", ".join(f"{k} {v}" for k, v in answer["unknowns"].items()) + f", steps {answer['steps']}")
+    print(f"cost     about {answer['seconds']:.1f} s and {answer['bytes'] / 1e6:.0f} MB")
+    print("chain    " + " -> ".join(f"{k} {v:.4g} N/m" if not isinstance(v, str) else f"{k} {v}"
+                                   for k, v in answer["stiffness_chain"].items()))
+    if not probe and not isinstance(answer["stiffness_chain"].get("pieces_shear", "rigid"), str):
+        print("         pieces_shear is an upper estimate from the layers; --probe solves it")
+    print("groups   " + ", ".join(f"{k} {v:.4g}" for k, v in answer["groups"].items()))
+    for sentence in answer["verdict"]:
+        print(f"verdict  {sentence}")
+
+
+def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], set_: Sets = ()):
+    """Write the tagged mesh of SCENE as .msh or .vtu."""
+    found = model_of(scene, set_)
+    if found.patch is None:
+        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
+    from ..mesh.files import write_mesh
+    from ..model.pieces import bodies_of
+    from ..model.source import placed
+
+    with placed(found.source):
+        if found.patch.chosen:
+            from ..runs.patch.ladder import solve_all
+
+            pair = solve_all(found.patch, found.accuracy.tolerance)[0].pair
+            low, high = pair.grid, None if pair.upper is pair.piece else pair.upper_grid
+        else:
+            low, high = bodies_of(found.patch)
+    write_mesh(low, out, high)
+    for name, body in (("lower", low), ("upper", high or low)):
+        print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")

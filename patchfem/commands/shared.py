@@ -1,0 +1,62 @@
+"""What several verbs of the command line share: options, loading of a scene, a progress bar, two ways to end."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
+Json = Annotated[bool, Parameter(name="--json", negative=())]
+Out = Annotated[Path | None, Parameter(name=["-o", "--out"])]
+Quiet = Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())]
+
+
+class NotReached(Exception):
+    """The run is on disk and marked not_converged, exit code 3."""
+
+
+class Refused(Exception):
+    """A request that the command line itself turns down, exit code 2."""
+
+
+def say(text: str) -> None:
+    """One line on stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def scene_of(path: Path, sets):
+    """The scene of a file with the words of --set put in; SceneError names every mistake."""
+    from ..scene.scene import load
+
+    return load(path, sets)
+
+
+def model_of(path: Path, sets):
+    """What the scene of a file means, built once; SceneError names every mistake."""
+    from ..model.model import build
+
+    return build(scene_of(path, sets))
+
+
+class progress_bar:
+    """A bar on a terminal, nothing elsewhere; the call takes the done share."""
+
+    def __init__(self, silent: bool):
+        self.bar = None
+        if not silent and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self.bar = Progress(console=Console(stderr=True), transient=True)
+            self.task = self.bar.add_task("running", total=1.0)
+
+    def __enter__(self):
+        if self.bar is None:
+            return None
+        self.bar.start()
+        return lambda share: self.bar.update(self.task, completed=share)
+
+    def __exit__(self, *_):
+        if self.bar is not None:
+            self.bar.stop()

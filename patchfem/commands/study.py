@@ -1,0 +1,80 @@
+"""Verbs that run a scene many times: error against time, and values fitted to measurements."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .shared import Json, NotReached, Out, Quiet, Refused, Sets, model_of, say, scene_of
+
+MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak",
+        "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
+
+
+def cost(scene: Path, /, *, over: str = "", out: Out = None,
+         set_: Sets = (), json_: Json = False,
+         quiet: Quiet = False):
+    """Error against time of SCENE for a knob (--over element_size, steps_per_cycle, shear_modes), or for all it has."""
+    from ..campaigns.cost import KNOBS, cheapest, curve, knobs_of, turned_by
+
+    found = model_of(scene, set_)
+    if over and over not in KNOBS:
+        raise Refused(f"cost --over {over}: the knobs are {', '.join(KNOBS)}; others are not yet built")
+    knobs = [over] if over else knobs_of(found)
+    if not knobs:
+        raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
+    from ..export.cost import write
+
+    target, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}
+    for knob in knobs:
+        runs = curve(found, knob, None if quiet else say)
+        names = [name for name in MAIN if name in turned_by(runs)]
+        best = cheapest(runs, found.accuracy.tolerance)
+        table, picture = write(target, knob, runs, found.accuracy.tolerance, names)
+        answer[knob] = {"runs": [{"label": one.label, "value": one.value, "seconds": one.seconds, "values": one.values,
+                                  "errors": one.errors} for one in runs], "cheapest": best}
+        if not json_:
+            _print_cost(knob, runs, names, best, found.accuracy.tolerance)
+            print(f"results: {table} {picture}")
+    if json_:
+        print(json.dumps(answer))
+
+
+def fit(scene: Path, /, *, to: Path, free: Annotated[tuple[str, ...], Parameter(negative=())],
+        hold: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+        out: Out = None, set_: Sets = (),
+        json_: Json = False,
+        quiet: Quiet = False):
+    """Fit keys of SCENE (--free table.key=low..high,...) to the measured loop --to FILE; rows that --hold names
+    (column=value,...) are only predicted."""
+    found = scene_of(scene, set_)
+    from ..campaigns.fit import fit_loop
+    from ..export.fit_folder import fit_into
+
+    fitted = fit_loop(found, to, free, hold, None if quiet else say)
+    target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
+    answer = fit_into(fitted, target)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        from ..export.fit import lines_of
+
+        print("\n".join(lines_of(answer)))
+        for text in answer["warnings"]:
+            say(f"warning: {text}")
+        print(f"results: {target}")
+    if answer["outcome"] == "not_converged":
+        raise NotReached
+
+
+def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float) -> None:
+    print(f"{knob:<16} {'seconds':>9}  " + "  ".join(f"{name[:16]:>16}" for name in names) + "   (relative errors)")
+    for one in runs:
+        cells = (one.errors.get(name) for name in names)
+        text = (f"{error / abs(one.values[name]):16.1e}" if error is not None and one.values[name] else f"{'-':>16}"
+                for name, error in zip(names, cells))
+        print(f"{one.label:<16} {one.seconds:9.3f}  " + "  ".join(text))
+    for name in names:
+        print(f"  {name}: " + (f"no setting meets {tolerance:g}" if best[name] is None else
+                               f"{best[name]} is the quickest within {tolerance:g}"))
