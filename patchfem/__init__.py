@@ -18,12 +18,13 @@ Read the package in this order. A module imports its own entry of the list and t
 14. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
 15. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
 16. `response`    measures of a run, outcome, events, levels, ringing
-17. `runs`        patch, bench and rig: where the pillars meet
-18. `identify`    values from measurements with intervals
-19. `campaigns`   many runs: fits, error against cost
-20. `export`      summary, netCDF, VTK, report
-21. `api`         load, build, plan and run from Python
-22. `commands`    the verbs of the command line
+17. `wear`        worn depth over many cycles
+18. `runs`        patch, bench and rig: where the pillars meet
+19. `identify`    values from measurements with intervals
+20. `campaigns`   many runs: fits, error against cost
+21. `export`      summary, netCDF, VTK, report
+22. `api`         load, build, plan and run from Python
+23. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

@@ -2,8 +2,8 @@
 
 In: sizes in SI units, shapes as each docstring says. Out: closed forms, or one scalar equation solved to round-off.
 `contact` has Hertz, punches, waves, wedges and layers; `friction` the bond law of eqs. 2.10 to 2.17 along given
-slides; `dynamics` one mode with Coulomb friction. Nothing here uses the rest of the package, so tests may trust it.
-Read `contact` first.
+slides; `dynamics` one mode with Coulomb friction; `wear` depths under a steady slip.
+Nothing here uses the rest of the package, so tests may trust it. Read `contact` first.
 """
 
 from .contact import (
@@ -54,6 +54,7 @@ from .friction import (
     weight_across,
     weight_along,
 )
+from .wear import even_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
 
 __all__ = [
     "COULOMB_RESONANCE",
@@ -66,6 +67,7 @@ __all__ = [
     "decay_half_cycles",
     "decay_rest",
     "dither_drift",
+    "even_wear_pressure",
     "growth_factor",
     "hertz_half_width",
     "hertz_peak",
@@ -98,4 +100,7 @@ __all__ = [
     "westergaard_half_width",
     "westergaard_pressure",
     "westergaard_stiffness",
+    "worn_crown_half_width",
+    "worn_pad_fraction",
+    "worn_volume",
 ]

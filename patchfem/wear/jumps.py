@@ -1,0 +1,114 @@
+"""Jumps over many cycles of wear: each as long as the tolerance allows, or as many as are asked for."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .depth import explicit_jump, jump, rates
+
+GROW, SHRINK, SAFETY = 4.0, 0.2, 0.9  # of a jump against the one before it
+FIRST = 1e-3  # share of all cycles in the first automatic jump
+LEAST = 1e-9  # share of all cycles that a jump may fall to
+ORDER = 2
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Wearing:
+    """The question of a wear run: how the pieces press and slide, and what they lose.
+
+    press(worn, softening) -> contact forces (m,) [N], as `depth.jump` wants it; path(worn) -> slip path (m,) [m] of
+    one cycle, the same array object as long as wear does not change it; area (m,) [m2]; coefficient [m2/N]; cycles:
+    all of them; explicit: forward Euler in place of the implicit jump.
+    """
+
+    press: Callable
+    path: Callable
+    area: np.ndarray
+    coefficient: float
+    cycles: float
+    explicit: bool = False
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Worn:
+    """The state of a wear run after `cycle` cycles.
+
+    depth (m,) [m] and force (m,) [N] then; path (m,) [m]: slip path of the next cycle; trend (m,): change of the path
+    per cycle over the last jump; length [cycles]: of the next automatic jump; rough (m,) [m]: the depth by the same
+    jumps undivided, from which `error` follows.
+    """
+
+    cycle: float
+    depth: np.ndarray
+    force: np.ndarray
+    path: np.ndarray
+    trend: np.ndarray
+    length: float
+    rough: np.ndarray
+
+    @property
+    def error(self) -> float:
+        """Error [m] of the depth by the length of the jumps: what halving them all has changed."""
+        return float(np.abs(self.depth - self.rough).max())
+
+
+def start(asked: Wearing) -> Worn:
+    """The state before any wear."""
+    zero = np.zeros_like(asked.area)
+    return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero)
+
+
+def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None) -> Worn:
+    """The state one jump later.
+
+    count: how many equal jumps there are; None: the jump is as long as the tolerance allows. Its error is the
+    difference between one jump and two halves of it, over 3: of the depth against the largest depth, and of the
+    contact forces against the load. Two halves are kept. The slip path is carried forward by its trend to the middle
+    of the jump; where the path at the end differs, the halves are done again with the mean of both ends, and a sixth of
+    the difference counts as error (Milne's device).
+    """
+    left = asked.cycles - state.cycle
+    length = min(asked.cycles / count if count else state.length, left)
+    length = left if left - length < 1e-9 * asked.cycles else length
+    while True:
+        found, miss = _halved(asked, state, np.maximum(state.path + 0.5 * length * state.trend, 0.0), length, tolerance)
+        if count or miss <= 1 or length <= LEAST * asked.cycles:
+            found, miss = _corrected(asked, state, found, miss, length, tolerance)
+            if count or miss <= 1 or length <= LEAST * asked.cycles:
+                break
+        length *= max(SHRINK, SAFETY * miss ** (-1 / (ORDER + 1)))
+    grown = length * min(GROW, SAFETY * max(miss, 1e-9) ** (-1 / (ORDER + 1)))
+    return replace(found, cycle=asked.cycles if length == left else found.cycle, length=grown)
+
+
+def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: float, tolerance: float) -> tuple:
+    """(state, error over what the tolerance allows) with the slip path at the end of a jump taken into account."""
+    path = asked.path(found.depth)
+    if path is state.path:
+        return found, miss
+    again, miss = _halved(asked, state, (state.path + path) / 2, length, tolerance)
+    shift = float(np.abs(again.depth - found.depth).max()) / 6
+    return replace(again, path=path, trend=(path - state.path) / length), max(miss, shift / _allowed(again, tolerance))
+
+
+def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) -> tuple:
+    """(state after a jump in two halves along a given slip path, its error over what the tolerance allows)."""
+    rate = rates(asked.coefficient, path, asked.area)
+    if asked.explicit:
+        depth, force = explicit_jump(asked.press, state.depth, rate, length)
+        rough, _ = explicit_jump(asked.press, state.rough, rate, length / 2)
+        rough, _ = explicit_jump(asked.press, rough, rate, length / 2)
+        return replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough), 0.0
+    once, least = jump(asked.press, state.depth, rate, length)
+    half, _ = jump(asked.press, state.depth, rate, length / 2)
+    depth, force = jump(asked.press, half, rate, length / 2)
+    rough, _ = jump(asked.press, state.rough, rate, length) if state.rough is not state.depth else (once, least)
+    found = replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough)
+    scale, load = 2**ORDER - 1, float(force.sum())
+    miss = float(np.abs(depth - once).max()) / scale / _allowed(found, tolerance)
+    return found, max(miss, float(np.abs(force - least).sum()) / scale / (tolerance * load) if load > 0 else 0.0)
+
+
+def _allowed(found: Worn, tolerance: float) -> float:
+    return tolerance * max(float(found.depth.max()), 1e-300)

@@ -1,0 +1,186 @@
+"""Implicit wear jumps: volume, shape and stability against closed forms and exact transients."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from pieces import bare_pair, coated_pair
+from scipy.linalg import expm
+
+from patchfem.closed_forms import (
+    even_wear_pressure,
+    worn_crown_half_width,
+    worn_pad_fraction,
+    worn_volume,
+)
+from patchfem.contact.unilateral import solve_forces
+from patchfem.core import PatchfemError
+from patchfem.wear.depth import critical_jump, explicit_jump, jump, rates, refuse_explicit
+from patchfem.wear.jumps import Wearing, after, start
+
+LOAD, KAPPA, PATH = 116.0, 1e-14, 40e-6
+
+
+def pressing(compliance, x, gap, load=LOAD):
+    """The pieces under a load with the rotation held."""
+    def press(worn, softening):
+        return solve_forces(compliance + np.diag(softening), x, gap + worn, np.array([load]))[0]
+
+    return press
+
+
+@cache
+def flat():
+    """Flat bare blocks: (press, compliance, area, rate of even slip, critical jump)."""
+    pair = bare_pair(32)
+    area, c = pair.interface.weight, np.array(pair.normal)
+    rate = rates(KAPPA, np.full(area.size, PATH), area)
+    return (pressing(c, pair.interface.x, np.zeros(area.size)), c, area, rate,
+            critical_jump(c, rate, np.ones(area.size, bool)))
+
+
+def evolved(asked, tolerance=1e-3, count=None):
+    """(last state, number of jumps) of a whole wear run."""
+    state, jumps = start(asked), 0
+    while state.cycle < asked.cycles:
+        state, jumps = after(asked, state, tolerance, count), jumps + 1
+    return state, jumps
+
+
+@pytest.mark.parametrize("multiple", [0.1, 1, 10, 100, 1000])
+def test_exact_volume_and_no_checkerboard_at_any_jump(multiple):
+    press, _, area, rate, critical = flat()
+    depth = np.zeros(area.size)
+    before = np.diff(press(depth, depth) / area, 2)
+    for count in range(1, 11):
+        depth, force = jump(press, depth, rate, multiple * critical)
+        volume = worn_volume(KAPPA, LOAD, PATH * multiple * critical * count)
+        assert depth @ area == pytest.approx(volume, rel=1e-12)
+        assert np.abs(np.diff(force / area, 2)).max() <= 2 * np.abs(before).max()
+    assert force.min() > 0
+
+
+def test_order_two_against_the_exact_transient_of_a_punch():
+    """f' = -Q diag(rate) f while all touches, with Q the stiffness at held load: f = expm(-n Q diag(rate)) f0."""
+    press, c, area, rate, critical = flat()
+    stiff, one = np.linalg.inv(c), np.ones(area.size)
+    stiff = stiff - np.outer(stiff @ one, one @ stiff) / (one @ stiff @ one)
+    cycles, zero, errors = 6 * critical, np.zeros(area.size), []
+    exact = expm(-cycles * stiff * rate[None, :]) @ press(zero, zero)
+    for count in (8, 16, 32):
+        depth = zero
+        for _ in range(count):
+            depth, force = jump(press, depth, rate, cycles / count)
+        errors.append(np.abs(force - exact).max() / exact.max())
+    assert errors[-1] < 2e-5
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.1)
+
+
+def test_exact_even_pressure_after_wearing_in():
+    press, _, area, rate, critical = flat()
+    depth = np.zeros(area.size)
+    for _ in range(40):
+        depth, force = jump(press, depth, rate, 10 * critical)
+    assert np.ptp(force / area) < 1e-12 * (force / area).mean()
+
+
+def test_exact_pressure_times_path_is_even_under_uneven_slip():
+    """A yawing pad: p s = constant, the classical p ~ 1/s."""
+    pair = bare_pair(32)
+    x, area, width = pair.interface.x, pair.interface.weight, pair.interface.width
+    path = PATH * (1.5 + x / x[-1])
+    press, rate, depth = pressing(np.array(pair.normal), x, 0 * x), rates(KAPPA, path, area), 0 * x
+    for _ in range(60):
+        depth, force = jump(press, depth, rate, 1e7)
+    assert force / area == pytest.approx(even_wear_pressure(LOAD / width, path, area / width), rel=1e-11)
+
+
+def test_order_of_the_explicit_step_and_its_limit():
+    press, _, area, rate, critical = flat()
+    for share, even in ((0.25, True), (0.95, True), (1.05, False), (1.5, False)):
+        depth = np.zeros(area.size)
+        for _ in range(400):
+            depth, force = explicit_jump(press, depth, rate, share * critical)
+        pressure = force / area
+        assert (np.ptp(pressure) < 1e-4 * pressure.mean()) == even
+        assert (force.min() > 0) == even  # beyond the limit every second node lifts off
+    with pytest.raises(PatchfemError, match=r"critical .*leave wear\.scheme out"):
+        refuse_explicit(1.05 * critical, critical)
+    refuse_explicit(0.95 * critical, critical)
+
+
+def test_exact_tilted_pad_on_springs():
+    """Contact grows as sqrt(1/k + kappa s) until it is full; the error is at most a cell."""
+    length, width, angle, stiffness, count = 10e-3, 10e-3, 1e-4, 1e13, 1000
+    x = (np.arange(count) + 0.5) / count * length - length / 2
+    area = np.full(count, length / count * width)
+    press = pressing(np.diag(1 / (stiffness * area)), x, angle * x)
+    rate, depth, cycles = rates(KAPPA, np.full(count, PATH), area), np.zeros(count), 0.0
+    for step in (2e5, 4e5, 8e5, 1e6):
+        depth, force = jump(press, depth, rate, step)
+        cycles += step
+        exact = worn_pad_fraction(KAPPA, LOAD / width, PATH * cycles, angle, length, stiffness)
+        assert np.mean(force > 0) == pytest.approx(exact, abs=1.0 / count)
+    assert exact > 0.9
+
+
+def crowned(cells=100, radius=0.05):
+    """Coated pieces, one of them crowned, under gross slip for 135 723 cycles."""
+    pair = coated_pair(cells)
+    x, area = pair.interface.x, pair.interface.weight
+    even = np.full(x.size, PATH)
+    return Wearing(pressing(np.array(pair.normal), x, x**2 / 2 / radius), lambda worn: even, area, 1e-13, 135723.0)
+
+
+def test_order_ten_jumps_find_the_depth_of_a_thousand():
+    asked = crowned()
+    many, _ = evolved(asked, count=1000)
+    ten, _ = evolved(asked, count=10)
+    assert ten.depth.max() == pytest.approx(many.depth.max(), rel=1e-6)  # 0.5 % is asked for
+    assert (ten.force / asked.area).max() == pytest.approx((many.force / asked.area).max(), rel=1e-3)
+    for count in (1, 2, 5, 10):
+        some, _ = evolved(asked, count=count)
+        assert abs(some.depth.max() - many.depth.max()) <= some.error + many.error
+
+
+def test_always_automatic_jumps_meet_the_tolerance():
+    asked, counts = crowned(), []
+    fine, _ = evolved(asked, 1e-6)
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        state, count = evolved(asked, tolerance)
+        counts.append(count)
+        assert np.abs(state.depth - fine.depth).max() <= max(state.error, 1e-12 * fine.depth.max())
+        assert state.error <= tolerance * state.depth.max()
+        assert state.depth @ asked.area == pytest.approx(worn_volume(1e-13, LOAD, PATH * 135723), rel=1e-12)
+    assert counts == sorted(counts)
+
+
+def test_order_worn_crown_tends_to_the_closed_half_width():
+    asked = crowned(400, 0.05)
+    state, _ = evolved(asked)
+    exact = worn_crown_half_width(1e-13, LOAD / 12.7e-3, PATH * 135723, 0.05)
+    width = (state.force > 0).sum() * 12.7e-3 / 400 / 2
+    assert exact < width + 12.7e-3 / 400 and width < 1.15 * exact
+
+
+def test_exact_wear_coefficient_zero_changes_nothing():
+    asked = crowned(40)
+    still, _ = evolved(Wearing(asked.press, asked.path, asked.area, 0.0, 1000.0))
+    assert not still.depth.any() and still.error == 0.0
+
+
+def test_order_two_with_a_path_that_follows_the_wear():
+    """A slip path that depends on the worn depth, as under partial slip."""
+    press, _, area, _, critical = flat()
+    lean = np.linspace(0.5, 1.5, area.size)
+
+    def path(worn):
+        return PATH * lean * np.exp(-worn / 5e-7)
+
+    asked = Wearing(press, path, area, KAPPA, 60 * critical)
+    ends = [evolved(asked, count=count)[0].depth for count in (10, 20, 40, 640)]
+    errors = [np.abs(depth - ends[-1]).max() / ends[-1].max() for depth in ends[:-1]]
+    assert errors[-1] < 1e-3
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.3)
+    auto, _ = evolved(asked, 1e-3)
+    assert np.abs(auto.depth - ends[-1]).max() <= 1e-3 * ends[-1].max()
