@@ -36,7 +36,7 @@ class Worn:
 
     depth (m,) [m] and force (m,) [N] then; path (m,) [m]: slip path of the next cycle; trend (m,): change of the path
     per cycle over the last jump; length [cycles]: of the next automatic jump; rough (m,) [m]: the depth by the same
-    jumps undivided, from which `error` follows.
+    jumps undivided; strayed [m]: sum of what the slip path's change within the jumps may have cost.
     """
 
     cycle: float
@@ -46,17 +46,18 @@ class Worn:
     trend: np.ndarray
     length: float
     rough: np.ndarray
+    strayed: float
 
     @property
     def error(self) -> float:
-        """Error [m] of the depth by the length of the jumps: what halving them all has changed."""
-        return float(np.abs(self.depth - self.rough).max())
+        """Error [m] of the depth by the length of the jumps: what halving them all has changed, and `strayed`."""
+        return float(np.abs(self.depth - self.rough).max()) + self.strayed
 
 
 def start(asked: Wearing) -> Worn:
     """The state before any wear."""
     zero = np.zeros_like(asked.area)
-    return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero)
+    return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero, 0.0)
 
 
 def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None) -> Worn:
@@ -66,7 +67,8 @@ def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = Non
     difference between one jump and two halves of it, over 3: of the depth against the largest depth, and of the
     contact forces against the load. Two halves are kept. The slip path is carried forward by its trend to the middle
     of the jump; where the path at the end differs, the halves are done again with the mean of both ends, and a sixth of
-    the difference counts as error (Milne's device).
+    the difference counts as error (Milne's device); as this error is not damped, it is held against the wear of the
+    jump alone.
     """
     left = asked.cycles - state.cycle
     length = min(asked.cycles / count if count else state.length, left)
@@ -89,7 +91,8 @@ def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: fl
         return found, miss
     again, miss = _halved(asked, state, (state.path + path) / 2, length, tolerance)
     shift = float(np.abs(again.depth - found.depth).max()) / 6
-    return replace(again, path=path, trend=(path - state.path) / length), max(miss, shift / _allowed(again, tolerance))
+    here = shift / (tolerance * max(float((again.depth - state.depth).max()), 1e-300))
+    return replace(again, path=path, trend=(path - state.path) / length, strayed=state.strayed + shift), max(miss, here)
 
 
 def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) -> tuple:
