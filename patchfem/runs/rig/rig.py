@@ -134,9 +134,9 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
 
     sigma, f = patch.pressure.sigma_n, model.friction
     if model.rig.load_varies:
-        from .varying_load import frames_of as wrench_frames
+        from .varying_load import frames_of as varying_frames
 
-        return wrench_frames(model, patch, raw)
+        return varying_frames(model, patch, raw)
     if numerics.engine == "exact" or not raw.snapshots:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
