@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError, rounded
 from .model.model import Model
 from .model.model import build as build_model
-from .runs import result as found
+from .response import result as found
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.run import run as run_plan

@@ -135,8 +135,8 @@ def _split_file(model: Model, level: int) -> tuple:
     from ..mesh.anymesh import halved
     from ..mesh.tensor import TensorGrid, finer
     from ..model.pieces import bodies_of
+    from ..response.patch_rows import TABLE
     from ..runs.patch.press import solve
-    from ..runs.patch.rows import TABLE
     from ..runs.patch.values import values
 
     low, high = bodies_of(model.patch)

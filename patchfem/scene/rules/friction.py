@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...effects import has, takes, using
-from ..tables import Friction
+from ..keys.tables import Friction
 from .draft import LAWS, Draft, _needs
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from ...effects import carries, has, listed, named, refusal
-from ..tables import Contact, Friction, Tables
+from ..keys.tables import Contact, Friction, Tables
 
 if TYPE_CHECKING:
     from .draft import Draft

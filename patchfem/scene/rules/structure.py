@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..types import choices
+from ..keys.types import choices
 
 if TYPE_CHECKING:
     from .draft import Draft

@@ -21,7 +21,7 @@ from patchfem.runs.rig.march import created_warning
 from patchfem.runs.rig.numerics import choose as settings_of
 from patchfem.runs.rig.numerics import quadrature_of
 from patchfem.scene import scene
-from patchfem.scene.tables import Accuracy
+from patchfem.scene.keys.tables import Accuracy
 
 TEXT = """title = "one mass"
 [normal]

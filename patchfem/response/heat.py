@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..scene.materials import MATERIALS, THERMAL
+from ..scene.keys.materials import MATERIALS, THERMAL
 
 
 def heating(model, patch, work: float, duration: float) -> list:
