@@ -14,8 +14,8 @@ import patchfem as pf
 from patchfem import api
 from patchfem.core import Measure, rounded
 from patchfem.export.summary import measure_object
-from patchfem.response.result import meaning
 from patchfem.response.rows import TABLE
+from patchfem.runs.results.result import meaning
 
 RIG = POINT + COULOMB + SHORT
 TWO = """\

@@ -135,9 +135,9 @@ def _split_file(model: Model, level: int) -> tuple:
     from ..mesh.anymesh import halved
     from ..mesh.tensor import TensorGrid, finer
     from ..model.pieces import bodies_of
-    from ..response.patch_rows import TABLE
     from ..runs.patch.press import solve
     from ..runs.patch.values import values
+    from ..runs.results.patch_rows import TABLE
 
     low, high = bodies_of(model.patch)
     for _ in range(level):

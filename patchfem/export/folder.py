@@ -10,7 +10,7 @@ import numpy as np
 from .. import __version__
 from ..effects import EFFECTS
 from ..model.structure import motions
-from ..response.result import Result
+from ..runs.results.result import Result
 from ..runs.run import run
 from ..structure.drive_sizes import largest
 from .results import Folder

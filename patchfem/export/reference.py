@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 from ..effects import EFFECTS
-from ..response.patch_rows import ROWS as STATIC
 from ..response.rows import ROWS as MOTION
+from ..runs.results.patch_rows import ROWS as STATIC
 from ..scene.keys.materials import MATERIALS
 from ..scene.keys.meanings import CONDITIONS, meaning
 from ..scene.keys.quantities import EXAMPLES, KINDS

@@ -1,5 +1,5 @@
 """Numbers read off a run.
 
 In: histories. Out: measures by name with their errors from coarser runs, the outcome, events of sticking and
-slipping, ringing, all of it in a `Result`. Read `measures` first.
+slipping, ringing. Read `measures` first.
 """

@@ -9,8 +9,8 @@ from ..core import Measure, Outcome
 from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
-from ..response.result import FRAMES, Result, frames_of, still, unripe, warming, without_errors, worded
 from .plan import Plan, plan, refuse_size
+from .results.result import FRAMES, Result, frames_of, still, unripe, warming, without_errors, worded
 
 __all__ = ["Plan", "Result", "plan", "run"]
 

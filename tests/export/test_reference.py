@@ -4,8 +4,8 @@ import pytest
 
 from patchfem.effects import EFFECTS
 from patchfem.export.reference import FILE, tables, text
-from patchfem.response.patch_rows import TABLE as STATIC
 from patchfem.response.rows import TABLE as MOTION
+from patchfem.runs.results.patch_rows import TABLE as STATIC
 from patchfem.scene.keys import meanings
 from patchfem.scene.keys.materials import MATERIALS
 from patchfem.scene.keys.meanings import CONDITIONS, MEANINGS, meaning

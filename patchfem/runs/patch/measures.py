@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import Measure
 from ...mesh.tensor import TensorGrid
-from ...response.patch_rows import TABLE
+from ..results.patch_rows import TABLE
 from .press import Patch, pressed, solve
 from .values import edge_cells, values
 

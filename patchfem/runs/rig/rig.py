@@ -10,9 +10,9 @@ from ...friction.record import law_from
 from ...response.coarser import estimate
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
-from ...response.result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
+from ..results.result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
 from .engines import ENGINES, Variant
 from .march import created_warning
 from .numerics import MOST_STEPS, choose, refuse_costly

@@ -1,6 +1,6 @@
 """Static measures of a pressed patch: unit, least floor and meaning of each."""
 
-from ..core import Row
+from ...core import Row
 
 ROWS = (
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together"),

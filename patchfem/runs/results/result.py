@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core import Measure, Outcome
+from ...core import Measure, Outcome
 from .patch_rows import TABLE as STATIC
 
 FRAMES = 16  # of the interface, in the last cycle
@@ -45,7 +45,7 @@ def meaning(name: str, apart: str = "interface") -> str:
     """Meaning of a measure by its name in a summary; slip_amplitude_2 is that of the second interface."""
     if name in STATIC:
         return STATIC[name].text
-    from .rows import of_first, row_of
+    from ...response.rows import of_first, row_of
 
     first = of_first(name)
     return row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
@@ -94,7 +94,7 @@ def without_errors(found: dict, estimate: bool) -> dict:
 
 def unripe(law, speed: float) -> list:
     """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
-    from ..friction.bonds.parameters import ripening
+    from ...friction.bonds.parameters import ripening
 
     a = ripening(law, speed) if law.reading == "report" else 0.0
     if a <= 0.3:
