@@ -8,6 +8,7 @@ from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from ..runs.plan import plan
+from ..runs.results.patch_rows import TABLE
 from ..runs.run import run
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes")
@@ -137,7 +138,6 @@ def _split_file(model: Model, level: int) -> tuple:
     from ..model.pieces import bodies_of
     from ..runs.patch.press import solve
     from ..runs.patch.values import values
-    from ..runs.results.patch_rows import TABLE
 
     low, high = bodies_of(model.patch)
     for _ in range(level):

@@ -13,7 +13,10 @@ import numpy as np
 from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets, sides
 from ...core import ModalBasis, Outcome, PatchfemError, Response
+from ...friction.laws.stretch import growth_numbers
+from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from .march import GOAL, Run
+from .march import march as run
 from .models import coulomb_model
 
 COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
@@ -53,7 +56,6 @@ def bonds(law) -> Rubbing:
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError("friction: under a load that changes only reading = \"stretch\" with order = 1 and no "
                             "breakaway; the others are not yet built")
-    from ...friction.laws.stretch import growth_numbers
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
@@ -152,8 +154,6 @@ def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tole
     `FLOOR` of its mean pressure, so nodes that are open at first have their share; with m modes they are exact whatever
     the weights. count: how many, None: as the backbone under these weights asks for at a tenth of the tolerance.
     """
-    from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
-
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
     if law.growth[0] >= 0:  # a patch that could jump by itself is refused, under its preload as where the load stays
         shear_modes(giving, law.static * force, law.length, 1,
@@ -298,7 +298,5 @@ def march(modes: ModalBasis, drive, sets: ContactSets | None, law: Rubbing, cycl
           window: int = 10, travel: float = np.inf, frames: int = 0, start=None, load=None, say=None, progress=None,
           shear=None):
     """`march.march` of a basis on contact sets, or under a prescribed load, from rest or from `start`."""
-    from .march import march as run
-
     model = model_of(modes, law, sets, load, shear)
     return run(modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start)

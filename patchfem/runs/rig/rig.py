@@ -13,7 +13,9 @@ from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
 from ..results.result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
+from . import levels
 from .engines import ENGINES, Variant
+from .levels import with_errors as level_errors
 from .march import created_warning
 from .numerics import MOST_STEPS, choose, refuse_costly
 from .solution import curve_measures
@@ -41,8 +43,6 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if numerics.engine not in ("exact", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
-        from . import levels
-
         lowest = levels.onset(raw.levels, raw.slips, model.accuracy.tolerance)
         found, extra = found | levels.measures(raw.levels, lowest), extra | {"levels": raw.levels}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
@@ -115,8 +115,6 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
 def _level_errors(found, rung, made: dict, numerics):
     """The levels of a Solution with the errors of the time step."""
-    from .levels import with_errors as level_errors
-
     half, quarter = (made[variant].levels for variant in rung.runs[:2])
     return level_errors(found.levels, half, quarter, numerics.steps)
 

@@ -3,13 +3,12 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...dynamics.march import varying_load as march
 from ...model.model import Model
 
 
 def rubbing_of(model: Model):
     """The dynamics.march.varying_load.Rubbing of the law of a model."""
-    from ...dynamics.march import varying_load as march
-
     f = model.friction
     if f.law == "coulomb":
         return march.coulomb(f.static, f.kinetic)
@@ -25,8 +24,6 @@ def rubbing_of(model: Model):
 def model_of(model: Model, patch, count: int | None = None):
     """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]; count: how many
     shear modes stand for pieces that give way, None: by the tolerance."""
-    from ...dynamics.march import varying_load as march
-
     load, sets = (model.point.at, None) if patch is None else (None, march.sets_of(patch, model.patch.spring))
     law, shear = rubbing_of(model), None
     if model.soft:
@@ -69,8 +66,6 @@ def frames_of(model: Model, patch, raw) -> dict:
 
 def _shear(law, shot, nodal) -> tuple:
     """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
-    from ...dynamics.march import varying_load as march
-
     top, bottom, _ = shot["memory"]
     if law.kind == march.PLASTIC:
         return law.static * top, law.length * np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
