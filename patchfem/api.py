@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError, rounded
 from .model.model import Model
 from .model.model import build as build_model
-from .runs import result as found
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
+from .runs.results import result as found
 from .runs.run import run as run_plan
 from .scene.scene import Scene, SceneError, loads, with_files
 from .scene.scene import load as load_file

@@ -15,7 +15,7 @@ from patchfem import api
 from patchfem.core import Measure, rounded
 from patchfem.export.summary import measure_object
 from patchfem.response.rows import TABLE
-from patchfem.runs.result import meaning
+from patchfem.runs.results.result import meaning
 
 RIG = POINT + COULOMB + SHORT
 TWO = """\

@@ -59,7 +59,7 @@ def test_exact_a_rubbing_point_needs_no_patch(scene):
 
 
 def test_exact_a_rubbing_point_needs_no_other_rig(scene):
-    """One mode, one sine, one point: no masses, files, springs, wrench, other drives, other engines."""
+    """One mode, one sine, one point: no masses, files, springs, heave, other drives, other engines."""
     modules = loaded(FROM_PYTHON, scene(POINT + COULOMB + STRUCTURE))
     absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
@@ -68,7 +68,7 @@ def test_exact_a_rubbing_point_needs_no_other_rig(scene):
            "dynamics.one_mode.steady", "dynamics.events.steady_events",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load", "runs.rig.comparison",
-           "runs.rig.steady", "dynamics.harmonic.balance", "contact.atlas", "inputs.signals")
+           "runs.rig.steady", "dynamics.harmonic.balance", "contact.contact_sets", "inputs.signals")
     assert "pyuff" not in modules
 
 

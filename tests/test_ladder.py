@@ -18,7 +18,7 @@ from house import DEFS, circles, folder_of, graph_of, imports, sources
 HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
 SCENE_ALSO = ("campaigns.fit", "campaigns.fit_model")  # and so may these, each named with its reason
-OUTSIDE = {"numba": ("*kernels", "compiled"), "pyvista": ("export.fields.view",), "meshio": ("mesh.files", "export.*")}
+OUTSIDE = {"numba": ("*kernels", "compiled"), "pyvista": ("export.drawing.view",), "meshio": ("mesh.files", "export.*")}
 PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order
 MODULE_LINES, FUNCTION_LINES, FOLDER_FILES = 400, 90, 16
 
@@ -129,7 +129,7 @@ SMALL = {  # a house without a fault, into which the tests plant one each
     "dynamics.events": "def f():\n    compiled.load('dynamics.event_kernels')\n    from .drives import Sine",
     "model.build": "from ..scene.reader import Scene\ndef build(scene: Scene): pass",
     "runs": "from . import run", "runs.run": "from ..model.build import build\nfrom ..dynamics import events",
-    "export.fields.view": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
+    "export.drawing.view": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
 }  # fmt: skip
 
 

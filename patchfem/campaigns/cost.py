@@ -8,6 +8,7 @@ from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from ..runs.plan import plan
+from ..runs.results.patch_rows import TABLE
 from ..runs.run import run
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes")
@@ -136,7 +137,6 @@ def _split_file(model: Model, level: int) -> tuple:
     from ..mesh.tensor import TensorGrid, finer
     from ..model.pieces import bodies_of
     from ..runs.patch.press import solve
-    from ..runs.patch.rows import TABLE
     from ..runs.patch.values import values
 
     low, high = bodies_of(model.patch)

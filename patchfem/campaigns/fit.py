@@ -11,7 +11,7 @@ from ..effects import has
 from ..identify.least_squares import Fit, fit
 from ..identify.words import remarks
 from ..inputs.loops import Loop, read_loop
-from ..scene.quantities import KINDS
+from ..scene.keys.quantities import KINDS
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
 from .fit_model import BenchModel

@@ -18,6 +18,6 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out
 def view(folder: Path, /, *, out: Out = None,
          frame: int | None = None, magnify: float | None = None):
     """Show the pressed pieces of a results folder in a window, or draw them into -o PICTURE.png."""
-    from ..export.fields.view import view as show
+    from ..export.drawing.view import view as show
 
     show(folder, out, frame, magnify, say)

@@ -1,7 +1,7 @@
 """Compiled polygons of the contact sets: a set holds where none of its few sides is passed.
 
 Every node of a set bounds by a line the motions (d, t) at which the set holds. Few of these lines are sides of the
-polygon that they enclose. `book` is a `press_kernels.Book`.
+polygon that they enclose. `sets` is a `press_kernels.SetArrays`.
 """
 
 import numpy as np
@@ -14,37 +14,37 @@ SIDES, BOX = 16, 100.0  # most sides of a polygon; half its largest width, in th
 
 
 @njit(error_model="numpy", **LEAN)
-def units(book):
+def units(sets):
     """Scale of a closing [m] and of a turn [rad] in the polygons."""
-    arm = max(abs(book.x[0]), abs(book.x[-1]))
-    return book.base[3], book.base[3] / arm if arm > 0 else 1.0
+    arm = max(abs(sets.x[0]), abs(sets.x[-1]))
+    return sets.base[3], sets.base[3] / arm if arm > 0 else 1.0
 
 
 @njit(error_model="numpy", **LEAN)
-def outline(book, slot):
+def outline(sets, slot):
     """Work out the polygon of the set in a slot: a box, cut by the line of every node (Sutherland, Hodgman 1974).
 
     The nodes at the ends of the contact cut first, because they leave little to the others. A set of too many sides
     gets none.
     """
-    unit_d, unit_t = units(book)
-    r0, r1, r2, on = book.rows[slot, 0], book.rows[slot, 1], book.rows[slot, 2], book.on[slot]
+    unit_d, unit_t = units(sets)
+    r0, r1, r2, on = sets.rows[slot, 0], sets.rows[slot, 1], sets.rows[slot, 2], sets.on[slot]
     top = 0.0
     for i in range(on.size):
         if on[i]:
             top = max(top, abs(r0[i]) + abs(r1[i]) * unit_d + abs(r2[i]) * unit_t)
-    book.limit[slot, 0], book.limit[slot, 1] = -4 * NOISE * top, -4 * NOISE * unit_d
-    old, new = book.corner[0], book.corner[1]
+    sets.limit[slot, 0], sets.limit[slot, 1] = -4 * NOISE * top, -4 * NOISE * unit_d
+    old, new = sets.corner[0], sets.corner[1]
     count = 4
     for k in range(4):  # corner k: place, and the node whose line leads on to the next corner
         old[0, k], old[1, k], old[2, k] = BOX * (-1 if k in (0, 3) else 1), BOX * (-1 if k < 2 else 1), -1.0
-    book.sides[slot] = 0
+    sets.sides[slot] = 0
     for turn in range(2 * on.size):
         i = turn % on.size
         edge = i == 0 or i == on.size - 1 or on[i] != on[i - 1] or on[i] != on[i + 1]
         if edge != (turn < on.size):
             continue
-        c0 = r0[i] - (book.limit[slot, 0] if on[i] else book.limit[slot, 1])
+        c0 = r0[i] - (sets.limit[slot, 0] if on[i] else sets.limit[slot, 1])
         c1, c2 = r1[i] * unit_d, r2[i] * unit_t
         least = np.inf
         for k in range(count):
@@ -75,47 +75,47 @@ def outline(book, slot):
         if old[2, k] >= 0:
             if sides == SIDES:
                 return
-            book.edge[slot, sides], book.beside[slot, sides] = int(old[2, k]), -1
+            sets.edge[slot, sides], sets.beside[slot, sides] = int(old[2, k]), -1
             sides += 1
-    book.sides[slot] = sides
+    sets.sides[slot] = sides
 
 
 @njit(error_model="numpy", **LEAN)
-def boxed(book, d, t):
+def boxed(sets, d, t):
     """Whether a motion (d, t) lies in the box of the polygons."""
-    unit_d, unit_t = units(book)
+    unit_d, unit_t = units(sets)
     return abs(d) <= BOX * unit_d and abs(t) <= BOX * unit_t
 
 
 @njit(error_model="numpy", **LEAN)
-def margin(book, k, side, d, t):
+def margin(sets, k, side, d, t):
     """How far the node of a side of set k is from failing at (d, t): force [N] or gap [m]."""
-    i = book.edge[k, side]
-    least = book.limit[k, 0] if book.on[k, i] else book.limit[k, 1]
-    return book.rows[k, 0, i] + book.rows[k, 1, i] * d + book.rows[k, 2, i] * t - least
+    i = sets.edge[k, side]
+    least = sets.limit[k, 0] if sets.on[k, i] else sets.limit[k, 1]
+    return sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t - least
 
 
 @njit(error_model="numpy", **LEAN)
-def within(book, k, d, t):
+def within(sets, k, d, t):
     """Whether the polygon of set k says that the set holds at (d, t); False also where it has no polygon."""
-    if book.sides[k] == 0 or not boxed(book, d, t):
+    if sets.sides[k] == 0 or not boxed(sets, d, t):
         return False
-    for side in range(book.sides[k]):
-        if margin(book, k, side, d, t) < 0:
+    for side in range(sets.sides[k]):
+        if margin(sets, k, side, d, t) < 0:
             return False
     return True
 
 
 @njit(error_model="numpy", **LEAN)
-def way_out(book, k, d, t, dd, dt):
+def way_out(sets, k, d, t, dd, dt):
     """Share of the increment (dd, dt) after which set k ends, and the side where it does; side -1 where no polygon can
     say."""
     out, found = np.inf, -1
-    if book.sides[k] == 0 or not (boxed(book, d, t) and boxed(book, d + dd, t + dt)):
+    if sets.sides[k] == 0 or not (boxed(sets, d, t) and boxed(sets, d + dd, t + dt)):
         return out, found
-    for side in range(book.sides[k]):
-        here = margin(book, k, side, d, t)
-        rate = margin(book, k, side, d + dd, t + dt) - here
+    for side in range(sets.sides[k]):
+        here = margin(sets, k, side, d, t)
+        rate = margin(sets, k, side, d + dd, t + dt) - here
         if rate < 0 and max(here, 0.0) < -rate * out:
             out, found = max(here, 0.0) / -rate, side
     return out, found

@@ -1,4 +1,4 @@
-"""Compiled contact map: on one contact set everything is affine in the motion of the upper holder.
+"""Compiled contact sets: on one contact set everything is affine in the motion of the upper holder.
 
 d is the closing beyond a reference state, t the rotation beyond it. With the unknowns of a set (forces where it
 touches, gaps where not) the complementarity problem w = b + t x - d + C f reads y = R (1, d, t). One node more or less
@@ -6,7 +6,7 @@ is a principal pivot of the tableau [T | R].
 
 A set is known by its 64-bit name, the exclusive or of the names of its nodes, so a state on a known set costs one pass
 over the nodes. The search flips all nodes that fail, later the first of them alone; that ends for every positive
-definite C (Murty, Opsearch 11, 1974). NumPy twin: `atlas.Atlas`.
+definite C (Murty, Opsearch 11, 1974). NumPy twin: `contact_sets.ContactSets`.
 """
 
 from typing import NamedTuple
@@ -23,8 +23,8 @@ FLAW = 1e-8  # relative residual above which the tableau is made anew; below it 
 COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)
 
 
-class Book(NamedTuple):
-    """Arrays of a contact map of m nodes with room for k contact sets.
+class SetArrays(NamedTuple):
+    """Arrays of the contact sets of m nodes with room for k contact sets.
 
     c (m, m); x, b (m,): places and openings of the reference state; tableau (m, m + 3) with its set `here` (m,); rows
     (k, 3, m): force or gap per (1, d, t) of every set; on (k, m); energy (k, 6): of the preloaded contact, the
@@ -62,9 +62,9 @@ class Book(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def pivot(book, k):
+def pivot(sets, k):
     """Exchange force and gap of node k in the tableau; m^2 multiplications. False where the pivot is not positive."""
-    tableau, row = book.tableau, book.row
+    tableau, row = sets.tableau, sets.row
     m, wide = tableau.shape
     p = tableau[k, k]
     if not p > 0:
@@ -82,33 +82,33 @@ def pivot(book, k):
     for j in range(wide):
         tableau[k, j] = -row[j]
     tableau[k, k] = 1 / p
-    book.here[k] = not book.here[k]
-    book.meta[PIVOTS] += 1
+    sets.here[k] = not sets.here[k]
+    sets.meta[PIVOTS] += 1
     return True
 
 
 @njit(error_model="numpy", **LEAN)
-def renew(book):
+def renew(sets):
     """Write the tableau of the empty contact set."""
-    m = book.x.size
+    m = sets.x.size
     for i in range(m):
         for j in range(m):
-            book.tableau[i, j] = book.c[i, j]
-        book.tableau[i, m] = book.b[i]
-        book.tableau[i, m + 1] = -1.0
-        book.tableau[i, m + 2] = book.x[i]
-        book.here[i] = False
-    book.meta[RENEWED] += 1
+            sets.tableau[i, j] = sets.c[i, j]
+        sets.tableau[i, m] = sets.b[i]
+        sets.tableau[i, m + 1] = -1.0
+        sets.tableau[i, m + 2] = sets.x[i]
+        sets.here[i] = False
+    sets.meta[RENEWED] += 1
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def refine(book):
+def refine(sets):
     """Read the rows of the set off the tableau and refine them once on C itself; relative residual found before that.
    """
-    m, c, tableau = book.x.size, book.c, book.tableau
-    force, left = book.side[0], book.side[1]
+    m, c, tableau = sets.x.size, sets.c, sets.tableau
+    force, left = sets.side[0], sets.side[1]
     for i in range(m):
-        share = 1.0 if book.here[i] else 0.0
+        share = 1.0 if sets.here[i] else 0.0
         for r in range(3):
             force[r, i] = share * tableau[i, m + r]
     top0, top1, top2, off0, off1, off2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -119,12 +119,12 @@ def refine(book):
             s0 += line[j] * force[0, j]
             s1 += line[j] * force[1, j]
             s2 += line[j] * force[2, j]
-        top0, top1, top2 = max(top0, abs(s0), abs(book.b[i])), max(top1, abs(s1), 1.0), max(top2, abs(s2),
-                                                                                         abs(book.x[i]))
-        s0 += book.b[i]
+        top0, top1, top2 = max(top0, abs(s0), abs(sets.b[i])), max(top1, abs(s1), 1.0), max(top2, abs(s2),
+                                                                                         abs(sets.x[i]))
+        s0 += sets.b[i]
         s1 -= 1.0
-        s2 += book.x[i]
-        if book.here[i]:
+        s2 += sets.x[i]
+        if sets.here[i]:
             off0, off1, off2 = max(off0, abs(s0)), max(off1, abs(s1)), max(off2, abs(s2))
             left[0, i], left[1, i], left[2, i] = s0, s1, s2
         else:
@@ -145,86 +145,86 @@ def refine(book):
 
 
 @njit(error_model="numpy", **LEAN)
-def store(book, name):
+def store(sets, name):
     """Keep the refined set of the tableau in the next slot and return the slot; the oldest set gives way where none is
     free."""
-    m, meta = book.x.size, book.meta
-    slot, bucket = meta[SLOT], book.heads.size - 1
-    meta[SLOT] = (slot + 1) % book.names.size
+    m, meta = sets.x.size, sets.meta
+    slot, bucket = meta[SLOT], sets.heads.size - 1
+    meta[SLOT] = (slot + 1) % sets.names.size
     meta[BUILT] += 1
-    if meta[COUNT] < book.names.size:
+    if meta[COUNT] < sets.names.size:
         meta[COUNT] += 1
     else:
-        at = book.names[slot] & bucket
-        k = book.heads[at]
+        at = sets.names[slot] & bucket
+        k = sets.heads[at]
         if k == slot:
-            book.heads[at] = book.link[slot]
+            sets.heads[at] = sets.link[slot]
         else:
-            while book.link[k] != slot:
-                k = book.link[k]
-            book.link[k] = book.link[slot]
-    q = book.energy[slot]
+            while sets.link[k] != slot:
+                k = sets.link[k]
+            sets.link[k] = sets.link[slot]
+    q = sets.energy[slot]
     q[:] = 0.0
-    q[0], q[1], q[2] = -book.base[2], -book.base[0], book.base[1]
+    q[0], q[1], q[2] = -sets.base[2], -sets.base[0], sets.base[1]
     for i in range(m):
-        f0, f1, f2 = book.tableau[i, m], book.tableau[i, m + 1], book.tableau[i, m + 2]
-        book.rows[slot, 0, i], book.rows[slot, 1, i], book.rows[slot, 2, i] = f0, f1, f2
-        book.on[slot, i] = book.here[i]
-        if book.here[i]:
-            q[0] -= 0.5 * f0 * book.b[i]
+        f0, f1, f2 = sets.tableau[i, m], sets.tableau[i, m + 1], sets.tableau[i, m + 2]
+        sets.rows[slot, 0, i], sets.rows[slot, 1, i], sets.rows[slot, 2, i] = f0, f1, f2
+        sets.on[slot, i] = sets.here[i]
+        if sets.here[i]:
+            q[0] -= 0.5 * f0 * sets.b[i]
             q[1] += f0
-            q[2] -= f0 * book.x[i]
+            q[2] -= f0 * sets.x[i]
             q[3] += f1
-            q[4] += 0.5 * (f2 - f1 * book.x[i])
-            q[5] -= f2 * book.x[i]
-    book.names[slot] = name
+            q[4] += 0.5 * (f2 - f1 * sets.x[i])
+            q[5] -= f2 * sets.x[i]
+    sets.names[slot] = name
     at = name & bucket
-    book.link[slot] = book.heads[at]
-    book.heads[at] = slot
-    outline(book, slot)
+    sets.link[slot] = sets.heads[at]
+    sets.heads[at] = slot
+    outline(sets, slot)
     return slot
 
 
 @njit(error_model="numpy", **LEAN)
-def to_wanted(book):
+def to_wanted(sets):
     """Pivot the tableau to the set `wanted`; False where a pivot is not positive."""
-    for i in range(book.x.size):
-        if book.here[i] != book.wanted[i] and not pivot(book, i):
+    for i in range(sets.x.size):
+        if sets.here[i] != sets.wanted[i] and not pivot(sets, i):
             return False
     return True
 
 
 @njit(error_model="numpy", **LEAN)
-def build(book, name):
+def build(sets, name):
     """Work out the set `wanted` and return its slot; -1 where the compliance is not positive definite on it."""
-    if not to_wanted(book) or refine(book) > FLAW:
-        renew(book)
-        if not to_wanted(book) or refine(book) > FLAW:
+    if not to_wanted(sets) or refine(sets) > FLAW:
+        renew(sets)
+        if not to_wanted(sets) or refine(sets) > FLAW:
             return -1
-    return store(book, name)
+    return store(sets, name)
 
 
 @njit(error_model="numpy", **LEAN)
-def find(book, name):
+def find(sets, name):
     """Slot of the set `wanted`; -1 where it is not kept."""
-    k = book.heads[name & (book.heads.size - 1)]
+    k = sets.heads[name & (sets.heads.size - 1)]
     while k >= 0:
-        if book.names[k] == name:
+        if sets.names[k] == name:
             same = True
-            for i in range(book.x.size):
-                if book.on[k, i] != book.wanted[i]:
+            for i in range(sets.x.size):
+                if sets.on[k, i] != sets.wanted[i]:
                     same = False
                     break
             if same:
                 return k
-        k = book.link[k]
+        k = sets.link[k]
     return k
 
 
 @njit(error_model="numpy", fastmath=LEAST, **LEAN)
-def holds(book, k, d, t):
+def holds(sets, k, d, t):
     """Whether no node of set k fails at (d, t), and the force and the gap below which a node counts as failing."""
-    r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
+    r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     top, pull, deep = 0.0, 0.0, 0.0
     for i in range(on.size):
         y = r0[i] + r1[i] * d + r2[i] * t
@@ -233,69 +233,69 @@ def holds(book, k, d, t):
         pull = min(pull, y if on[i] else 0.0)
         deep = min(deep, 0.0 if on[i] else y)
     force = -NOISE * top
-    gap = -NOISE * (book.base[3] + abs(d) + abs(t) * max(abs(book.x[0]), abs(book.x[-1])))
+    gap = -NOISE * (sets.base[3] + abs(d) + abs(t) * max(abs(sets.x[0]), abs(sets.x[-1])))
     return pull >= force and deep >= gap, force, gap
 
 
 @njit(error_model="numpy", **LEAN)
-def flip(book, k, d, t, force, gap, alone):
+def flip(sets, k, d, t, force, gap, alone):
     """Write set k with its failing nodes exchanged into `wanted` and return its name; `alone`: only the first of them.
    """
-    name, searching = book.names[k], True
-    for i in range(book.x.size):
-        on = book.on[k, i]
-        y = book.rows[k, 0, i] + book.rows[k, 1, i] * d + book.rows[k, 2, i] * t
+    name, searching = sets.names[k], True
+    for i in range(sets.x.size):
+        on = sets.on[k, i]
+        y = sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t
         fails = searching and y < (force if on else gap)
         if fails:
-            name ^= book.node[i]
+            name ^= sets.node[i]
             searching = not alone
-        book.wanted[i] = on != fails
+        sets.wanted[i] = on != fails
     return name
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def locate(book, k, d, t):
+def locate(sets, k, d, t):
     """Slot of the contact set at (d, t), searched from set k; -1 where none was found.
 
     Cost: 0.5 us for 400 nodes on a known set, 0.3 ms for a new one that differs by one node.
     """
-    for count in range(BLOCKS + 10 * book.x.size):
-        if within(book, k, d, t):
+    for count in range(BLOCKS + 10 * sets.x.size):
+        if within(sets, k, d, t):
             return k
-        good, force, gap = holds(book, k, d, t)
+        good, force, gap = holds(sets, k, d, t)
         if good:
             return k
-        name = flip(book, k, d, t, force, gap, count >= BLOCKS)
-        found = find(book, name)
-        k = found if found >= 0 else build(book, name)
+        name = flip(sets, k, d, t, force, gap, count >= BLOCKS)
+        found = find(sets, name)
+        k = found if found >= 0 else build(sets, name)
         if k < 0:
             return k
     return -1
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def begin(book, name):
+def begin(sets, name):
     """Work out the set `wanted` from the empty set; its slot, -1 as in `build`."""
-    renew(book)
-    return build(book, name)
+    renew(sets)
+    return build(sets, name)
 
 
 @njit(error_model="numpy", **LEAN)
-def pull(book, k, h, turn):
+def pull(sets, k, h, turn):
     """Energy of the preloaded contact of set k, and its slopes in heave h = -d and in turn.
 
     N = N0 - slope in heave, M = M0 - slope in turn.
     """
-    q, d = book.energy[k], -h
+    q, d = sets.energy[k], -h
     by_d, by_t = q[3] * d + q[4] * turn, q[4] * d + q[5] * turn
     return q[0] + d * (q[1] + 0.5 * by_d) + turn * (q[2] + 0.5 * by_t), -(q[1] + by_d), q[2] + by_t
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def press_state(book, k, d, t, force):
+def press_state(sets, k, d, t, force):
     """Load N, moment M and energy of set k at (d, t); writes its nodal forces (m,), none below zero."""
-    energy, slope, turn = pull(book, k, -d, t)
+    energy, slope, turn = pull(sets, k, -d, t)
     for i in range(force.size):
-        y = book.rows[k, 0, i] + book.rows[k, 1, i] * d + book.rows[k, 2, i] * t
-        force[i] = max(y, 0.0) if book.on[k, i] else 0.0
-    return book.base[0] - slope, book.base[1] - turn, energy
+        y = sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t
+        force[i] = max(y, 0.0) if sets.on[k, i] else 0.0
+    return sets.base[0] - slope, sets.base[1] - turn, energy

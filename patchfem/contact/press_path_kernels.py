@@ -8,9 +8,9 @@ from .press_kernels import LEAST, holds, locate, pull
 
 
 @njit(error_model="numpy", fastmath=LEAST, **LEAN)
-def reach(book, k, d, t, dd, dt, force, gap):
+def reach(sets, k, d, t, dd, dt, force, gap):
     """Share of the increment (dd, dt) from (d, t) at which the first node of set k falls to its bound."""
-    r0, r1, r2, on = book.rows[k, 0], book.rows[k, 1], book.rows[k, 2], book.on[k]
+    r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     out = np.inf
     for i in range(on.size):
         rate = r1[i] * dd + r2[i] * dt
@@ -21,22 +21,22 @@ def reach(book, k, d, t, dd, dt, force, gap):
 
 
 @njit(error_model="numpy", **LEAN)
-def across(book, k, side, d, t):
+def across(sets, k, side, d, t):
     """Slot of the contact set beyond a side of set k at (d, t); -1 where none was found. side -1: any side."""
     if side >= 0:
-        following = book.beside[k, side]
-        name = book.names[k] ^ book.node[book.edge[k, side]]
-        if following >= 0 and book.names[following] == name and within(book, following, d, t):
+        following = sets.beside[k, side]
+        name = sets.names[k] ^ sets.node[sets.edge[k, side]]
+        if following >= 0 and sets.names[following] == name and within(sets, following, d, t):
             return following
-        following = locate(book, k, d, t)
-        if following >= 0 and book.names[following] == name and following != k:
-            book.beside[k, side] = following
+        following = locate(sets, k, d, t)
+        if following >= 0 and sets.names[following] == name and following != k:
+            sets.beside[k, side] = following
         return following
-    return locate(book, k, d, t)
+    return locate(sets, k, d, t)
 
 
 @njit(error_model="numpy", **LEAN)
-def path_mean(book, k, h, turn, dh, dt, out):
+def path_mean(sets, k, h, turn, dh, dt, out):
     """Mean slopes of the energy of the preloaded contact along a straight increment (dh, dt) of heave and turn from set
     k on.
 
@@ -46,21 +46,21 @@ def path_mean(book, k, h, turn, dh, dt, out):
     """
     out[:] = 0.0
     at, small = 0.0, 1e-10
-    for _ in range(20 * book.x.size + 100):
+    for _ in range(20 * sets.x.size + 100):
         end, side = 1.0, -1
-        if not within(book, k, -(h + dh), turn + dt):
+        if not within(sets, k, -(h + dh), turn + dt):
             d, t = -(h + at * dh), turn + at * dt
-            share, side = way_out(book, k, d, t, -(1 - at) * dh, (1 - at) * dt)
+            share, side = way_out(sets, k, d, t, -(1 - at) * dh, (1 - at) * dt)
             end = min(at + max(share, 0.0) * (1 - at), 1.0)
             if side < 0:
-                good, force, gap = holds(book, k, -(h + dh), turn + dt)
+                good, force, gap = holds(sets, k, -(h + dh), turn + dt)
                 if not good:
-                    _, f, g = holds(book, k, d, t)
-                    share = reach(book, k, d, t, -dh, dt, min(force, f), min(gap, g))
+                    _, f, g = holds(sets, k, d, t)
+                    share = reach(sets, k, d, t, -dh, dt, min(force, f), min(gap, g))
                     end = min(at + max(share, 0.0), 1.0)
-        _, a1, a2 = pull(book, k, h + at * dh, turn + at * dt)
-        energy, b1, b2 = pull(book, k, h + end * dh, turn + end * dt)
-        q, part, bend = book.energy[k], 0.5 * (end - at), 0.5 * (end * end - at * at)
+        _, a1, a2 = pull(sets, k, h + at * dh, turn + at * dt)
+        energy, b1, b2 = pull(sets, k, h + end * dh, turn + end * dt)
+        q, part, bend = sets.energy[k], 0.5 * (end - at), 0.5 * (end * end - at * at)
         out[0] += part * (a1 + b1)
         out[1] += part * (a2 + b2)
         out[5] += bend * q[3]
@@ -71,7 +71,7 @@ def path_mean(book, k, h, turn, dh, dt, out):
             out[2], out[3], out[4], out[7] = energy, b1, b2, out[6]
             return k
         beyond = min(at + small, 1.0)
-        following = across(book, k, side, -(h + beyond * dh), turn + beyond * dt)
+        following = across(sets, k, side, -(h + beyond * dh), turn + beyond * dt)
         if following < 0:
             return following
         small = 10 * small if following == k else 1e-10

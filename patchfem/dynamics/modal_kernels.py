@@ -200,7 +200,7 @@ def note(row, force, energy, slip, out, travel, total, ledger):
 
 @njit(error_model="numpy", **LEAN)
 def tell(count, work, ledger):
-    """Book the iterations of a step (below 0: it failed) and its friction work [J]."""
+    """Add the iterations of a step (below 0: it failed) and its friction work [J]."""
     ledger[5] += abs(count)
     ledger[6] = max(ledger[6], abs(count))
     ledger[7] += 1.0 if count < 0 else 0.0

@@ -3,7 +3,7 @@
 import csv
 from pathlib import Path
 
-from .pictures import drawing, styled
+from .drawing.pictures import drawing, styled
 
 
 def write(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> tuple:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
+from .drawing.pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
 
 LABEL = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
 

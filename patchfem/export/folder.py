@@ -10,9 +10,11 @@ import numpy as np
 from .. import __version__
 from ..effects import EFFECTS
 from ..model.structure import motions
-from ..runs.result import Result
+from ..runs.results.result import Result
 from ..runs.run import run
 from ..structure.drive_sizes import largest
+from . import netcdf
+from .report import write_report
 from .results import Folder
 from .summary import summary, write_json
 
@@ -82,7 +84,6 @@ def write(result: Result, path: Path) -> dict:
 
         drawn = write_fields(result, path / "fields.vtkhdf")
         data |= {"bodies": drawn} if drawn else {}
-    from .report import write_report
 
     result.seconds["files"] = perf_counter() - begin
     write_report(path / "report.html", data)
@@ -128,15 +129,11 @@ def _between(result: Result) -> dict:
 
 
 def _write_netcdf(result: Result, path: Path) -> None:
-    from . import netcdf
-
     netcdf.write(dataset(result), path)
 
 
 def dataset(result: Result):
     """The xarray.Dataset of result.nc: histories, interface frames, levels, events, curve, provenance."""
-    from . import netcdf
-
     histories, modal = _histories(result)
     patch, extra = result.patch, result.extra
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)

@@ -9,16 +9,16 @@ from typing import Literal, get_args, get_origin
 
 from ..effects import EFFECTS
 from ..response.rows import ROWS as MOTION
-from ..runs.patch.rows import ROWS as STATIC
-from ..scene.materials import MATERIALS
-from ..scene.meanings import CONDITIONS, meaning
-from ..scene.quantities import EXAMPLES, KINDS
+from ..runs.results.patch_rows import ROWS as STATIC
+from ..scene.keys.materials import MATERIALS
+from ..scene.keys.meanings import CONDITIONS, meaning
+from ..scene.keys.quantities import EXAMPLES, KINDS
+from ..scene.keys.tables import Coating, Material, Tables
+from ..scene.keys.types import keys, kind_of, model_of, parts
 from ..scene.reader import is_value
 from ..scene.rules.draft import ASPERITIES, LAWS, SLIDES
 from ..scene.rules.drive import WAVEFORMS
 from ..scene.rules.limits import NOT_YET_BUILT
-from ..scene.tables import Coating, Material, Tables
-from ..scene.types import keys, kind_of, model_of, parts
 
 FILE = Path(__file__).parents[1] / "scene" / "README.md"
 NEEDS = {"friction.law": LAWS, "slide.kind": SLIDES, "contact.asperities.law": ASPERITIES, "drive.waveform": WAVEFORMS}

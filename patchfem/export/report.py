@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import rounded
-from . import curves, pictures
+from .drawing import curves, pictures
 
 CSS = """
 :root{--ink:#1c2430;--soft:#5d6877;--line:#dfe4ea;--tint:#f4f7fa;--accent:#1f5f99}

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..contact.gaps import crown, step, tilt
 from ..core import PatchfemError
-from ..scene.tables import Contact
+from ..scene.keys.tables import Contact
 
 SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: crown(x, part.radius),
           "step": lambda x, part: step(x, part.height, part.at)}

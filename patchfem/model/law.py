@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ..core import PatchfemError
-
-if TYPE_CHECKING:
-    from ..friction.bonds.parameters import Bonds
+from ..friction.bonds.parameters import Bonds
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,8 +62,6 @@ def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
 
     The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
     """
-    from ..friction.bonds.parameters import Bonds
-
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)

@@ -7,8 +7,8 @@ from textwrap import shorten
 from typing import TYPE_CHECKING
 
 from ..effects import absent
+from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
-from ..scene.tables import Accuracy, Friction, Temperature
 from .source import Source
 
 if TYPE_CHECKING:

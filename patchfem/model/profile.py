@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from ..scene.quantities import KINDS
+from ..scene.keys.quantities import KINDS
 from ..surface.fine import too_fine
 from ..surface.nodes import on_nodes, placed
 from ..surface.profile import cleaned, level

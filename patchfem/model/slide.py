@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import Missing
 from ..inputs.paths import read_path
-from ..scene.quantities import KINDS
+from ..scene.keys.quantities import KINDS
 
 LEAST = 8  # steps between two rows of a path file: two of them are left in the coarsest run of the error estimate
 REST = 4

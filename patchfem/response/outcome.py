@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from ..core import Measure, Outcome
 from ..structure.drive_sizes import sinusoidal
-from .measures import classify
+from .measures import classify, steady_amplitude
 
 
 def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0) -> tuple:
@@ -50,6 +50,4 @@ def steady_of(drive, amplitudes, phasors) -> tuple:
 
     A released or struck rig comes to rest, whatever the tail of its amplitudes looks like.
     """
-    from .measures import steady_amplitude
-
     return steady_amplitude(amplitudes, phasors) if sinusoidal(drive) else (None, None)

@@ -10,7 +10,7 @@ from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
-from .result import FRAMES, Result, frames_of, still, unripe, warming, without_errors, worded
+from .results.result import FRAMES, Result, frames_of, still, unripe, warming, without_errors, worded
 
 __all__ = ["Plan", "Result", "plan", "run"]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from . import quantities
+from .keys import quantities
+from .keys.types import choices, keys, kind_of, model_of, parts
 from .reader import _message, _set_value, owner_of
-from .types import choices, keys, kind_of, model_of, parts
 
 
 @dataclass(frozen=True, slots=True)

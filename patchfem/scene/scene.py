@@ -15,7 +15,8 @@ from textwrap import shorten
 from typing import Any
 
 from ..effects import takes
-from . import tables
+from .keys import tables
+from .keys.types import keys as keys_of
 from .lines import key_lines
 from .reader import Draft, apply_set
 from .rules.accuracy import method_unused
@@ -25,7 +26,6 @@ from .rules.drive import drive_unused, waveform_unused
 from .rules.friction import kinetic_unused, temperature_unused
 from .rules.limits import combinations, not_yet_built
 from .text import effects, toml
-from .types import keys as keys_of
 
 
 class SceneError(Exception):

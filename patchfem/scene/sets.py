@@ -6,10 +6,10 @@ import json
 from numbers import Integral, Real
 from typing import Any
 
-from .quantities import format_si
+from .keys.quantities import format_si
+from .keys.types import kind_of
 from .reader import owner_of
 from .scene import SceneError
-from .types import kind_of
 
 
 def assignments(sets: dict[str, Any]) -> tuple[str, ...]:

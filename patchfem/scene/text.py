@@ -6,11 +6,11 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from .quantities import format_si
+from .keys.quantities import format_si
+from .keys.tables import Accuracy, Asperities, Drive, Friction, Material, OnePiece, Slide
+from .keys.types import Table, keys, kind_of
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
-from .tables import Accuracy, Asperities, Drive, Friction, Material, OnePiece, Slide
-from .types import Table, keys, kind_of
 
 _SELECTORS = ("kind", "law", "reading", "waveform")
 

@@ -7,7 +7,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem.export.pictures import STYLE
+from patchfem.export.drawing.pictures import STYLE
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from drift_laws import LENGTH, PERIOD, SHARES, ladder
 from force_control import OutOfReach, drift
 
 from patchfem.closed_forms.friction import dither_drift, stretch_loop
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.friction.bonds.recursion import Recursion
 
 HERE = Path(__file__).parent

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 
 from patchfem.closed_forms.friction import weight_along
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 ORDERS = (-0.5, 0.0, 1.0, 2.0)

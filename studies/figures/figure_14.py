@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 
 from patchfem.closed_forms.friction import weight_across
-from patchfem.export.pictures import BLUE
+from patchfem.export.drawing.pictures import BLUE
 
 HERE = Path(__file__).parent
 

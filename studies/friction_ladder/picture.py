@@ -15,7 +15,7 @@ import costs
 import ladder
 from drawing import drawing
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 AMPLITUDES = 10.0 ** np.linspace(-1, 1.75, 12)

@@ -29,7 +29,7 @@ from drawing import drawing
 from failure_cases import CASES, SLIDES, STEPS, refined, solve
 from problems import TWO, exact
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 DRAWN = {"Fig 17, 18: displacement 1e-2": "displacement", "Fig 19, 20: velocity 1e-4": "velocity",

@@ -39,7 +39,7 @@ from engines import OURS
 from peer import run
 from precision_rows import EQUAL, FLOOR, curve, measure, ratios
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 TABLE = HERE / "work_precision.json"

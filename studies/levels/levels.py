@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from level_rows import CASES, FLOOR, MIL, solve
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 MEASURED = (3.8, 4.2)  # onset on the rig [g]

@@ -14,7 +14,7 @@ import fixtures
 import tilted
 from drawing import drawing
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.runs.patch.press import pressed
 
 HERE = Path(__file__).parent

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from list_runs import along, bonds, slide
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 AMPLITUDES = (0.1, 1.0, 3.0, 10.0, 50.0)

@@ -30,9 +30,9 @@ def along(law, path, dt, tail, merge, repeats=1) -> tuple:
     hub, best = load_kernels(), np.inf
     for _ in range(repeats):
         contact, work = model.build(hub)
-        burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+        energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
         begin = process_time()
-        bad = hub.follow_path(path, dt, model.kind, contact, work, 1e-11, burnt, forces)
+        bad = hub.follow_path(path, dt, model.kind, contact, work, 1e-11, energies, forces)
         best = min(best, process_time() - begin)
         assert bad == 0
     return forces[:, 0], 1e6 * best / (path.size - 1), int(contact.tally[10])

@@ -43,9 +43,9 @@ def compiled(model, path, repeats: int = 3) -> tuple:
     hub, best, dt = load_kernels(), np.inf, 2 * np.pi / STEPS
     for _ in range(repeats):
         contact, work = model.build(hub)
-        burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+        energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
         begin = process_time()
-        hub.follow_path(path, dt, model.kind, contact, work, 1e-11, burnt, forces)
+        hub.follow_path(path, dt, model.kind, contact, work, 1e-11, energies, forces)
         best = min(best, process_time() - begin)
     tally = getattr(contact, "tally", np.zeros(11))  # points keep no list
     return best / (path.size - 1), max(tally[10] or tally[1] - tally[0], 1.0)

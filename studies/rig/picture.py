@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 
 from patchfem.core import G_N
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs.measured import read_table
 from patchfem.runs import run as runner
 from patchfem.scene import scene

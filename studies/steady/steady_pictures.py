@@ -8,7 +8,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 
-from patchfem.export.pictures import BLUE, GREY, ORANGE
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 
 def against_march(table: dict, measure: str, path: Path) -> Path:

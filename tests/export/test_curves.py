@@ -9,7 +9,8 @@ from command_line import cli
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import Outcome
-from patchfem.export import curves, netcdf, report
+from patchfem.export import netcdf, report
+from patchfem.export.drawing import curves
 
 FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
           "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),

@@ -5,13 +5,13 @@ import pytest
 from patchfem.effects import EFFECTS
 from patchfem.export.reference import FILE, tables, text
 from patchfem.response.rows import TABLE as MOTION
-from patchfem.runs.patch.rows import TABLE as STATIC
-from patchfem.scene import meanings
-from patchfem.scene.materials import MATERIALS
-from patchfem.scene.meanings import CONDITIONS, MEANINGS, meaning
-from patchfem.scene.quantities import KINDS, parse
+from patchfem.runs.results.patch_rows import TABLE as STATIC
+from patchfem.scene.keys import meanings
+from patchfem.scene.keys.materials import MATERIALS
+from patchfem.scene.keys.meanings import CONDITIONS, MEANINGS, meaning
+from patchfem.scene.keys.quantities import KINDS, parse
+from patchfem.scene.keys.types import keys, kind_of, model_of
 from patchfem.scene.reader import is_value, owner_of
-from patchfem.scene.types import keys, kind_of, model_of
 
 PAGE = text()
 
@@ -47,7 +47,7 @@ def test_always_every_key_has_a_sentence_and_no_sentence_lacks_its_key():
 
 def test_refuses_a_key_without_a_sentence(monkeypatch):
     monkeypatch.setitem(meanings.MEANINGS, "Tilt", {"on": "the piece"})
-    with pytest.raises(KeyError, match=r"Tilt\.angle in scene/meanings"):
+    with pytest.raises(KeyError, match=r"Tilt\.angle in scene/keys/meanings"):
         text()
 
 

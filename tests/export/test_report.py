@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
 from patchfem.export import pictures, report
-from patchfem.scene.quantities import KINDS
+from patchfem.scene.keys.quantities import KINDS
 
 PERIOD, MIL = 1 / 143, 25.4e-6
 KIND = {"m": "length", "s": "time", "rad": "angle", "Pa": "pressure", "N": "force", "N m": "moment",

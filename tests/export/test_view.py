@@ -12,8 +12,8 @@ from exported import at, write_small
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.export.fields import view
-from patchfem.export.fields.panels import areas, borders, curves, panels, rounded
+from patchfem.export.drawing import view
+from patchfem.export.drawing.panels import areas, borders, curves, panels, rounded
 from patchfem.export.fields.vtkhdf import Series
 
 ABORTS, HANGS, FAILS = "import os; os.abort()", "import time; time.sleep(60)", "raise RuntimeError('no device')"

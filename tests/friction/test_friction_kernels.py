@@ -30,13 +30,13 @@ def test_exact_bond_mean_and_step_are_advance(eps):
     bonds, sigma = random_bonds(1, 40), np.random.default_rng(2).uniform(0, 2, 40)
     sigma[::7] = 0.0
     for dq in (-1e3, -2.0, -0.3, -1e-3, 1e-6, 0.02, 0.7, 30.0):
-        out, mean, slope, burnt = advance(bonds, dq, sigma, eps)
+        out, mean, slope, dissipated = advance(bonds, dq, sigma, eps)
         for j in range(40):
             got = point_kernels.bond_mean(bonds[0, j], bonds[1, j], dq, sigma[j], eps)
             assert got == pytest.approx((mean[j], slope[j]), rel=1e-11, abs=1e-13)
             moved = point_kernels.bond_step(bonds[0, j], bonds[1, j], bonds[2, j], dq, sigma[j], eps)
             assert moved[:3] == pytest.approx(out[:, j], rel=1e-12, abs=1e-14)
-            assert moved[3] == pytest.approx(burnt[j], rel=1e-11, abs=1e-14)
+            assert moved[3] == pytest.approx(dissipated[j], rel=1e-11, abs=1e-14)
 
 
 def test_exact_bond_step_of_no_length():
@@ -92,11 +92,11 @@ def test_exact_jenkins_is_a_clip(seed):
         ahead, behind = (jenkins_numpy(dq + s * h, stretch, stiffness, limit)[0] for s in (1, -1))
         assert force == pytest.approx(want, abs=1e-12)
         assert slope == pytest.approx((ahead - behind) / (2 * h), rel=1e-4, abs=1e-6)
-        burnt = elastic_plastic_kernels.commit(num, mem, 0, dq, force, 0.0, 0.0, 1.0, 0.0)
+        dissipated = elastic_plastic_kernels.commit(num, mem, 0, dq, force, 0.0, 0.0, 1.0, 0.0)
         share = stiffness * limit
         assert now == pytest.approx([stiffness @ new, stiffness @ new**2 / 2, share @ new / share.sum()], abs=1e-12)
-        assert stretch == pytest.approx(new, abs=1e-15) and burnt == pytest.approx(loss, abs=1e-11)
-        assert burnt >= -1e-15
+        assert stretch == pytest.approx(new, abs=1e-15) and dissipated == pytest.approx(loss, abs=1e-11)
+        assert dissipated >= -1e-15
 
 
 def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():

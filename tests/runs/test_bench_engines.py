@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.bonds.parameters import LONGEST, Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.model.model import build
 from patchfem.response.measures import work_check
@@ -16,7 +16,6 @@ from patchfem.runs.bench.stepped import stepped
 from patchfem.runs.bench.watch import BLOCK, UNWATCHED, Watch
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
-from patchfem.runs.rig.numerics import LONGEST
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

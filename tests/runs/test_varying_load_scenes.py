@@ -1,11 +1,11 @@
-"""Scenes whose contact acts on the modes with its whole wrench, and rigs under a load that swings."""
+"""Scenes whose contact pushes and turns the modes as well as it rubs, and rigs under a load that swings."""
 
 import numpy as np
 import pytest
 from scene_texts import BENCH, RIG, STRUCTURE, only
 
 from patchfem.contact.unilateral import solve_forces
-from patchfem.dynamics.march.varying_load import atlas_of
+from patchfem.dynamics.march.varying_load import sets_of
 from patchfem.export.folder import _histories
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -53,9 +53,9 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
     sets = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
     patch = result_of(PITCH, *FEW, *sets, "drive.cycles=1").patch
-    atlas, x, turn, spring = atlas_of(patch, 2e4), patch.x, 2e-6, 2e4
-    piece = atlas.at(0.0, turn)
-    force = piece.forces(0.0, turn)
+    sets, x, turn, spring = sets_of(patch, 2e4), patch.x, 2e-6, 2e4
+    touching = sets.at(0.0, turn)
+    force = touching.forces(0.0, turn)
     own = turn + (force @ x - patch.pressure.moment) / spring
     before = patch.pressure.sigma_n * patch.pieces.interface.weight
     gap = patch.pressure.gap - patch.pieces.normal @ before + own * x

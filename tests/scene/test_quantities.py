@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.scene.quantities import EXAMPLES, KINDS, format_si, parse
+from patchfem.scene.keys.quantities import EXAMPLES, KINDS, format_si, parse
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
+from patchfem.scene.keys.materials import MATERIALS
 from patchfem.scene.lines import key_lines
-from patchfem.scene.materials import MATERIALS
 from patchfem.scene.scene import Scene, SceneError, load, loads
 
 

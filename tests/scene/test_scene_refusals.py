@@ -7,10 +7,10 @@ import re
 import pytest
 from scene_texts import BENCH, LINEAR, PATCH, RIG, STRUCTURE, line_of, mistakes, only
 
+from patchfem.scene.keys.tables import Tables
+from patchfem.scene.keys.types import keys, model_of
 from patchfem.scene.rules.limits import NOT_YET_BUILT, _find
 from patchfem.scene.scene import SceneError, load, loads
-from patchfem.scene.tables import Tables
-from patchfem.scene.types import keys, model_of
 
 # (text, sets, key whose line is named, what the message says)
 BAD_VALUES = [

@@ -27,7 +27,7 @@ def pairs():
 PAIRS = pairs()
 
 
-def wrench(state, x):
+def resultants(state, x):
     return np.array([state.shear, state.load, state.normal_force @ x])
 
 
@@ -48,7 +48,7 @@ def test_exact_tangent_is_the_slope_of_the_full_solve(kind, angle):
         ends = []
         for size in (1, 2):  # from the state before, so that the set of slip is that of the same stroke
             q, delta, turn = base + size * move
-            ends.append(wrench(advance(state, ops, Step(approach=delta, slide=q, gap=gap + turn * x), MU), x))
+            ends.append(resultants(advance(state, ops, Step(approach=delta, slide=q, gap=gap + turn * x), MU), x))
         slope = ends[1] - ends[0]
         assert np.abs(slope - found @ move).max() <= 1e-6 * np.abs(np.abs(found) @ np.abs(move)).max()
 

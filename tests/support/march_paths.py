@@ -18,7 +18,7 @@ def follow(model, path, dt=0.3):
     """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of hub.follow_path."""
     hub = load_kernels()
     contact, work = model.build(hub)
-    burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    bad = hub.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, work, GOAL * model.limit, burnt,
-                          forces)
-    return forces, burnt, bad, contact
+    energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    bad = hub.follow_path(np.ascontiguousarray(path, float), dt, model.kind, contact, work, GOAL * model.limit,
+                          energies, forces)
+    return forces, energies, bad, contact

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from patchfem.contact.atlas import Atlas
+from patchfem.contact.contact_sets import ContactSets
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march import varying_load
@@ -27,18 +27,18 @@ def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
                       MASS, normal=np.array(normal, float), pitch=np.array(pitch, float))
 
 
-def elastic(m: int = 21, crown: float = 0.0) -> Atlas:
+def elastic(m: int = 21, crown: float = 0.0) -> ContactSets:
     """Springs of 5e7 N/m coupled like those of a half space, pressed by LOAD, flat or crowned."""
     x = np.linspace(-5e-3, 5e-3, m)
     c = 2e-8 * (np.exp(-np.abs(x[:, None] - x) / 2e-3) * 0.3 + np.eye(m))
     gap = crown * (x / x[-1])**2
     delta = brentq(lambda d: solve_forces(c, x, gap - d, np.zeros(0))[0].sum() - LOAD, 1e-9, 1e-5, xtol=1e-18)
     force = solve_forces(c, x, gap - delta, np.zeros(0))[0]
-    return Atlas(c, x, gap - delta, force > 0)
+    return ContactSets(c, x, gap - delta, force > 0)
 
 
 @cache
-def crowned() -> Atlas:
+def crowned() -> ContactSets:
     return elastic(21, 4e-7)
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from traces import UM, bumpy, text
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.scene.quantities import KINDS
+from patchfem.scene.keys.quantities import KINDS
 from patchfem.surface import trace
 from patchfem.surface.trace import UNITS, read_trace
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ... import compiled
 from ...core import PatchfemError
 from ...friction.protocol import Element
 from ..contacts.dispatch import COULOMB, law_of, number_of
@@ -97,8 +98,6 @@ def kernels_of(laws) -> tuple:
 
 def loops(laws):
     """The compiled loops of the comparison methods for these laws."""
-    from ... import compiled
-
     smooth = tuple(name for name in kernels_of(laws) if name != COULOMB)
     law = law_of(smooth or (COULOMB,), ("at_end",))
     return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})

@@ -52,24 +52,24 @@ def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: i
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
-    book = _Book(modes, drive, cycles, window, travel)
+    kept = _Kept(modes, drive, cycles, window, travel)
     engine, waiting = Engine(modes, drive, static, kinetic, cycles, start), []
-    book.live = engine.live
+    kept.live = engine.live
     for piece in engine.pieces():
         waiting.append(piece)
         if len(waiting) == _TOGETHER:
-            book.add(batches.gather(waiting))
+            kept.add(batches.gather(waiting))
             waiting = []
-            if book.outcome is not None:
+            if kept.outcome is not None:
                 break
             if progress is not None:
-                progress(piece.time / book.end)
-    if waiting and book.outcome is None:
-        book.add(batches.gather(waiting))
-    return book.close(engine.recorder.log())
+                progress(piece.time / kept.end)
+    if waiting and kept.outcome is None:
+        kept.add(batches.gather(waiting))
+    return kept.close(engine.recorder.log())
 
 
-class _Book:
+class _Kept:
     """Samples, sums and extremes that are kept while a run goes on."""
 
     def __init__(self, modes, drive, cycles, window, travel):

@@ -34,9 +34,9 @@ def march(kind: tuple, *arguments) -> tuple:
     return loop_of(kind).march(*arguments)
 
 
-def follow_path(path, dt, kind, contact, work, goal, burnt, forces) -> int:
+def follow_path(path, dt, kind, contact, work, goal, energies, forces) -> int:
     """`loop_kernels.follow` with the contact of this kind; work: nothing. The steps that failed."""
-    return loop_of(kind).follow(path, float(dt), contact, float(goal), burnt, forces)
+    return loop_of(kind).follow(path, float(dt), contact, float(goal), energies, forces)
 
 
 __all__ = ["Plant", "contact_of", "follow_path", "loop_of", "march"]

@@ -200,18 +200,18 @@ def rub_commit(dq, used, v0, v1, dt, kind, rub):
             memory[0, j], memory[1, j] = press_springs(y, springs, rub.now[j])
         give_way(rub)
         return used * dq + before - held_energy(kind, rub, memory)
-    burnt = before - held_energy(kind, rub, half)
+    dissipated = before - held_energy(kind, rub, half)
     for j in range(rub.now.size):
         load = 0.5 * (rub.before[j] + rub.now[j])
         m, z, s2 = half[0, j], half[1, j], half[2, j]
         if load > 0:
             m, z, s2, part = bond_step(m, z, s2, local_slide(j, dq, rub.psi, rub.y), load, rub.middle[0])
-            burnt += 0.5 * mu / length * part
+            dissipated += 0.5 * mu / length * part
         memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[3], length)
-        burnt += 0.5 * mu / length * (s2 - memory[2, j])
+        dissipated += 0.5 * mu / length * (s2 - memory[2, j])
     give_way(rub)
     rub.eps[0] = grow(rub.eps[0], v0, v1, abs(dq), dt, rub.growth)[0]
-    return burnt
+    return dissipated
 
 
 @njit(error_model="numpy", **LEAN)

@@ -1,9 +1,9 @@
-"""Modes that feel the whole wrench of the contact: normal force, moment and friction under the load of the moment.
+"""Modes that feel the normal force, the moment and the friction of the contact, each under the load of the moment.
 
 The upper holder moves from its solved preload by heave h = normal . z and pitch th = pitch . z; the nodal forces are
-those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.atlas`), the modes count from
-the preloaded equilibrium: modal force normal (N - N0) + pitch (M - M0) - slide F. The holder's rotational spring is in
-series with the pitch, a compliance x_i x_j/K beside that of the pieces.
+those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes
+count from the preloaded equilibrium: modal force normal (N - N0) + pitch (M - M0) - slide F. The holder's rotational
+spring is in series with the pitch, a compliance x_i x_j/K beside that of the pieces.
 """
 
 from dataclasses import dataclass, replace
@@ -11,9 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...compiled import load as compiled
-from ...contact.atlas import Atlas, sides
+from ...contact.contact_sets import ContactSets, sides
 from ...core import ModalBasis, Outcome, PatchfemError, Response
+from ...friction.laws.stretch import growth_numbers
+from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from .march import GOAL, Run
+from .march import march as run
 from .models import coulomb_model
 
 COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
@@ -53,14 +56,13 @@ def bonds(law) -> Rubbing:
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError("friction: under a load that changes only reading = \"stretch\" with order = 1 and no "
                             "breakaway; the others are not yet built")
-    from ...friction.laws.stretch import growth_numbers
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
 
 
-def atlas_of(patch, spring: float = 0.0) -> Atlas:
-    """The atlas around the solved state of a patch; spring [N m/rad] of the holder's rotation, 0: rigid.
+def sets_of(patch, spring: float = 0.0) -> ContactSets:
+    """The contact sets around the solved state of a patch; spring [N m/rad] of the holder's rotation, 0: rigid.
 
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
@@ -73,7 +75,7 @@ def atlas_of(patch, spring: float = 0.0) -> Atlas:
     c, x = patch.pieces.normal, patch.x
     if spring > 0:
         c = c + np.outer(x, x) / spring
-    return Atlas(c, x, patch.pressure.gap - c @ force, force > 0)
+    return ContactSets(c, x, patch.pressure.gap - c @ force, force > 0)
 
 
 def rows_of(modes: ModalBasis) -> np.ndarray:
@@ -83,25 +85,25 @@ def rows_of(modes: ModalBasis) -> np.ndarray:
                      for part in (modes.slide, modes.normal, modes.pitch)])
 
 
-def contact_frequencies(modes: ModalBasis, atlas: Atlas) -> np.ndarray:
+def contact_frequencies(modes: ModalBasis, sets: ContactSets) -> np.ndarray:
     """Natural frequencies [rad/s] of the modes on the preloaded contact set, without friction: what a step must
     resolve."""
     rows = rows_of(modes)[1:]
-    q = atlas.reference.energy
+    q = sets.reference.energy
     hessian = np.array([[q[3], -q[4]], [-q[4], q[5]]])
     return np.sqrt(np.maximum(np.linalg.eigvalsh(np.diag(modes.omega**2) + rows.T @ hessian @ rows / modes.mass), 0))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class WrenchModel:
-    """What `march.march` needs to know: law, atlas of the contact, rows (3, n) of slide, heave and pitch.
+class VaryingLoadModel:
+    """What `march.march` needs to know: law, contact sets, rows (3, n) of slide, heave and pitch.
 
-    load: function of times (k,) [s] to a load [N] >= 0 that is prescribed on one point, in place of the atlas; shear:
-    ShearModes on every node of the atlas where the pieces give way, see `shear_of`.
+    load: function of times (k,) [s] to a load [N] >= 0 that is prescribed on one point, in place of the contact; shear:
+    ShearModes on every node where the pieces give way, see `shear_of`.
     """
 
     law: Rubbing
-    atlas: Atlas | None
+    sets: ContactSets | None
     rows: np.ndarray
     load: object = None
     shear: object = None
@@ -109,7 +111,7 @@ class WrenchModel:
     @property
     def preload(self) -> float:
         """Load [N] at the start."""
-        return self.atlas.load if self.load is None else float(self.load(np.zeros(1))[0])
+        return self.sets.load if self.load is None else float(self.load(np.zeros(1))[0])
 
     @property
     def limit(self) -> float:
@@ -134,7 +136,7 @@ class WrenchModel:
     @property
     def runner(self):
         """The class that marches it."""
-        return WrenchRun
+        return VaryingLoadRun
 
     def build(self, hub):
         """(contact, None) that nothing uses."""
@@ -152,8 +154,6 @@ def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tole
     `FLOOR` of its mean pressure, so nodes that are open at first have their share; with m modes they are exact whatever
     the weights. count: how many, None: as the backbone under these weights asks for at a tenth of the tolerance.
     """
-    from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
-
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
     if law.growth[0] >= 0:  # a patch that could jump by itself is refused, under its preload as where the load stays
         shear_modes(giving, law.static * force, law.length, 1,
@@ -163,36 +163,36 @@ def shear_of(giving, law: Rubbing, force, weight, count: int | None = None, tole
     return enough_modes(giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance)
 
 
-def wrench_model(modes: ModalBasis, law: Rubbing, atlas: Atlas | None, load=None, shear=None) -> WrenchModel:
-    """The model of a basis on an atlas, or under a prescribed load on one point, which no heave or pitch can move.
+def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=None, shear=None) -> VaryingLoadModel:
+    """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS):
         raise PatchfemError("contact.shear: under a load that changes it takes law 'elastic-plastic' (for Coulomb with "
                             "a short bond_length) or 'nonlocal'; not yet built")
-    if shear is not None and shear.points.size != atlas.x.size:
+    if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
         raise PatchfemError("structure.mode.normal: a load on one rigid point leaves no room for heave or pitch; name "
                             "[contact] in place of [normal]")
-    return WrenchModel(law, atlas, rows_of(modes), load, shear)
+    return VaryingLoadModel(law, sets, rows_of(modes), load, shear)
 
 
-class WrenchRun(Run):
-    """The arrays of a march under the whole wrench and its clock."""
+class VaryingLoadRun(Run):
+    """The arrays of a march under a load that varies, and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
         self.loop, self.press = compiled("dynamics.march.varying_load_kernels"), compiled("contact.press_kernels")
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
-        law, atlas = model.law, model.atlas
-        arrays = atlas.arrays() if model.load is None else _one_point(model.preload)
+        law, sets = model.law, model.sets
+        arrays = sets.arrays() if model.load is None else _one_point(model.preload)
         x = arrays["x"]
-        self.sets = self.press.Book(**arrays)
+        self.sets = self.press.SetArrays(**arrays)
         self.ports = self.loop.Ports(np.ascontiguousarray(model.rows, float), self.prop.beta.copy(),
                                      float(np.ptp(x) / 2) or 1.0)
         now, slot = np.full(x.size, model.preload), 0
         if model.load is None:
             heave, turn = model.rows[1:] @ self.state[0]
-            slot = self.press.locate(self.sets, self.press.begin(self.sets, atlas.name(arrays)), -heave, turn)
+            slot = self.press.locate(self.sets, self.press.begin(self.sets, sets.name(arrays)), -heave, turn)
             self.press.press_state(self.sets, slot, -heave, turn, now)
         self.slot, memory = np.array([slot]), np.zeros((3, x.size))
         memory[1 if law.kind == PLASTIC else 0] = now * (1.0 if law.kind == PLASTIC else law.force[3])
@@ -204,7 +204,7 @@ class WrenchRun(Run):
         self.ledger[0] += self.strained()
 
     def fork(self, drive):
-        """As of a Run; the pieces of the atlas are shared, which any run may ask."""
+        """As of a Run; the contact sets are shared, which any run may ask."""
         twin = super().fork(drive)
         twin.rub = type(self.rub)(*(array.copy() for array in self.rub))
         return twin
@@ -214,9 +214,9 @@ class WrenchRun(Run):
         model, loads = self.model, np.zeros(0)
         if model.load is not None:
             loads = np.array(model.load((self.done + np.arange(count + 1)) * self.prop.dt), float)
-        return self.loop.march_wrench(row, count, self.state, self.held, self.slot, self.plant, self.ports, table,
-                                      model.law.kind, self.rub, self.sets, loads, GOAL * model.limit,
-                                      float(self.travel), self.ledger, rows)
+        return self.loop.march(row, count, self.state, self.held, self.slot, self.plant, self.ports, table,
+                               model.law.kind, self.rub, self.sets, loads, GOAL * model.limit, float(self.travel),
+                               self.ledger, rows)
 
     def _booked(self, rows) -> np.ndarray:
         """As of a Run; the noise is that of the largest force, of the slide's last digit (a sum over the modes) and of
@@ -269,7 +269,7 @@ class WrenchRun(Run):
         extra = out.extra | dict(zip(PRESS, rows[:, -5:].T))
         if model.load is not None:
             return replace(out, extra=extra)
-        pull = np.stack([rows[:, -5] - model.atlas.load, rows[:, -4] - model.atlas.moment], axis=1)
+        pull = np.stack([rows[:, -5] - model.sets.load, rows[:, -4] - model.sets.moment], axis=1)
         return replace(out, acceleration=out.acceleration + pull @ model.rows[1:] @ modes.output / modes.mass,
                        extra=extra)
 
@@ -285,7 +285,7 @@ def _shear_arrays(shear, size: int, limit: float) -> tuple:
 
 
 def _one_point(load: float) -> dict:
-    """Arrays of a book that is never asked, for a load that is prescribed."""
+    """Arrays of contact sets that are never asked, for a load that is prescribed."""
     return {"c": np.ones((1, 1)), "x": np.zeros(1), "b": np.zeros(1), "tableau": np.zeros((1, 4)),
             "here": np.zeros(1, bool), "rows": np.zeros((1, 3, 1)), "on": np.zeros((1, 1), bool),
             "energy": np.zeros((1, 6)), "names": np.zeros(1, np.int64), "heads": np.full(2, -1, np.int64),
@@ -294,11 +294,9 @@ def _one_point(load: float) -> dict:
             "meta": np.zeros(5, np.int64), **sides(1)}
 
 
-def march(modes: ModalBasis, drive, atlas: Atlas | None, law: Rubbing, cycles: float, steps_per_cycle: int,
+def march(modes: ModalBasis, drive, sets: ContactSets | None, law: Rubbing, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, start=None, load=None, say=None, progress=None,
           shear=None):
-    """`march.march` of a basis on an atlas, or under a prescribed load, from rest or from `start`."""
-    from .march import march as run
-
-    model = wrench_model(modes, law, atlas, load, shear)
+    """`march.march` of a basis on contact sets, or under a prescribed load, from rest or from `start`."""
+    model = model_of(modes, law, sets, load, shear)
     return run(modes, drive, model, cycles, steps_per_cycle, window, travel, frames, say, progress, start)

@@ -1,4 +1,4 @@
-"""Compiled step of modes that feel the whole wrench of the contact: normal force, moment and friction.
+"""Compiled step of modes that feel the normal force, the moment and the friction of the contact.
 
 Heave h (> 0 away) and pitch t (> 0 opens +x) move the upper holder, so d = -h closes it. Over a step the modes move
 exactly under constant forces. Those of the normal contact are the path mean of its slopes along the straight increment,
@@ -46,18 +46,18 @@ def pushed(rows, force, mass, accel):
 
 
 @njit(error_model="numpy", **LEAN)
-def press_step(book, k0, begin, f1, f2, beta, arm, turn, out):
+def press_step(sets, k0, begin, f1, f2, beta, arm, turn, out):
     """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
-    guess in `turn` (2,). Returns (piece at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
+    guess in `turn` (2,). Returns (set at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
 
-    The slopes have a convex potential, so the answer is unique; inside one piece one step finds it.
+    The slopes have a convex potential, so the answer is unique; inside one set one step finds it.
     """
     b11, b12, b21, b22 = beta[1, 1], beta[1, 2], beta[2, 1], beta[2, 2]
     dh, dt = turn[0], turn[1]
     old_h, old_t, step_h, step_t, part, best = dh, dt, 0.0, 0.0, 1.0, np.inf
     k = k0
     for count in range(1, 100):
-        k = path_mean(book, k0, begin[0], begin[1], dh, dt, out)
+        k = path_mean(sets, k0, begin[0], begin[1], dh, dt, out)
         if k < 0:
             return k, count, np.inf
         p1, p2 = b11 * out[0] + b12 * out[1], b21 * out[0] + b22 * out[1]
@@ -77,29 +77,29 @@ def press_step(book, k0, begin, f1, f2, beta, arm, turn, out):
             part *= 0.5
             if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
                 turn[0], turn[1] = old_h, old_t
-                k = path_mean(book, k0, begin[0], begin[1], old_h, old_t, out)
-                return k, count, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
+                k = path_mean(sets, k0, begin[0], begin[1], old_h, old_t, out)
+                return k, count, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
         dh, dt = old_h - part * step_h, old_t - part * step_t
-    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / book.base[4])
+    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
 
 
 @njit(error_model="numpy", **LEAN)
-def pressed(begin, k, load, pointed, book, rub):
-    """Contact at a sample whose heave and pitch stand in begin (5,): (piece, load [N], moment [N m]); the energy and
-    the pull of the preloaded contact into the rest of `begin`. The load stays where no contact set fits: piece < 0."""
-    k = locate(book, k, -begin[0], begin[1])
+def pressed(begin, k, load, pointed, sets, rub):
+    """Contact at a sample whose heave and pitch stand in begin (5,): (set, load [N], moment [N m]); the energy and
+    the pull of the preloaded contact into the rest of `begin`. The load stays where no contact set fits: set < 0."""
+    k = locate(sets, k, -begin[0], begin[1])
     if k < 0:
-        return k, load, book.base[1]
-    begin[2], begin[3], begin[4] = pull(book, k, begin[0], begin[1])
+        return k, load, sets.base[1]
+    begin[2], begin[3], begin[4] = pull(sets, k, begin[0], begin[1])
     if pointed:
-        press_state(book, k, -begin[0], begin[1], rub.now)
-    return k, max(book.base[0] - begin[3], 0.0), book.base[1] - begin[4]
+        press_state(sets, k, -begin[0], begin[1], rub.now)
+    return k, max(sets.base[0] - begin[3], 0.0), sets.base[1] - begin[4]
 
 
 @njit(error_model="numpy", **LEAN)
-def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub, book, goal, force, turn, out):
+def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub, sets, goal, force, turn, out):
     """Friction and normal contact over a step, each under the mean force of the other: (dq [m], mean friction force
-    [N], piece at its end, iterations, True where they disagree); piece < 0 where no contact set fits.
+    [N], set at its end, iterations, True where they disagree); set < 0 where no contact set fits.
 
     after [N]: load at the end, NaN where the contact says it; coupling: 0 where the load does not follow the motion, 1
     where it follows heave and pitch alone, 2 where friction moves them too. Then the secant, kept inside its bracket,
@@ -115,15 +115,15 @@ def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub,
             rub.now[0] = after
             mean = 0.5 * (load + after)
         elif coupling > 0:
-            end, its, wrong = press_step(book, k, begin, free[1] - beta[1, 0] * guess, free[2] - beta[2, 0] * guess,
+            end, its, wrong = press_step(sets, k, begin, free[1] - beta[1, 0] * guess, free[2] - beta[2, 0] * guess,
                                          beta, ports.arm, turn, out)
             if end < 0:
                 return dq, used, end, count, True
             force[1], force[2] = out[0], out[1]
             count += its
-            mean = max(book.base[0] - out[0], 0.0)
+            mean = max(sets.base[0] - out[0], 0.0)
             if pointed:
-                press_state(book, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
+                press_state(sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
         slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
         press_all(kind, rub)
         if rub.b.size:
@@ -177,11 +177,11 @@ def last_force(used, dq, v1, load, state, kind, plant, rub, ports, force, at, ta
 
 
 @njit(error_model="numpy", cache=True)
-def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind, rub, book, loads, goal, travel, ledger,
-                 rows):
+def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, sets, loads, goal, travel, ledger,
+          rows):
     """March `steps` steps from row `first` of the table of the drive.
 
-    held (2,): last friction force, mean force of the step before; at_piece (1,): slot of the present piece; rub:
+    held (2,): last friction force, mean force of the step before; at_set (1,): slot of the present set; rub:
     `dynamics.march.varying_friction_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the steps,
     empty where the contact says it;
     ledger as in `dynamics.march.loop_kernels.march`; rows (steps + 1, 2 n + 11) as there, then load, moment,
@@ -195,19 +195,19 @@ def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind,
     given, pointed = loads.size > 0, not (kind == COULOMB or kind == RATE)
     apart = given or (beta[1, 1] == 0 and beta[2, 2] == 0)
     coupling = 0 if apart else (2 if beta[0, 1] != 0 or beta[0, 2] != 0 else 1)
-    load, k = book.base[0], at_piece[0]
+    load, k = sets.base[0], at_set[0]
     for i in range(steps + 1):
         q, v, stroke = sample(rows[i], state, slide, plant.output)
         begin[0], begin[1] = place_of(state, ports.rows, 1), place_of(state, ports.rows, 2)
-        moment = book.base[1]
+        moment = sets.base[1]
         if given:
             load = loads[i]
             rub.now[0] = load
         else:
-            k, load, moment = pressed(begin, k, load, pointed or i == steps, book, rub)
+            k, load, moment = pressed(begin, k, load, pointed or i == steps, sets, rub)
             if k < 0:
                 return i, 4
-        at_piece[0] = k
+        at_set[0] = k
         rows[i, 2 * n + 6], rows[i, 2 * n + 7], rows[i, 2 * n + 8] = load, moment, begin[2]
         rows[i, 2 * n + 9], rows[i, 2 * n + 10] = begin[0], begin[1]
         bound = load * (np.inf if pointed else rub.force[0]) if load > 0 else 0.0
@@ -225,7 +225,7 @@ def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind,
         for j in range(rub.now.size if pointed else 0):
             rub.before[j] = rub.now[j]
         dq, used, end, count, bad = agreed(free, k, load, loads[i + 1] if given else np.nan, v, held, begin, coupling,
-                                           plant.dt, kind, ports, rub, book, goal, force, turn, out)
+                                           plant.dt, kind, ports, rub, sets, goal, force, turn, out)
         if end < 0:
             return i, 4
         force[0] = used
@@ -248,7 +248,7 @@ def march_wrench(first, steps, state, held, at_piece, plant, ports, table, kind,
         if given:
             load = loads[i + 1]
         elif not apart:
-            load = max(book.base[0] - out[3], 0.0)
+            load = max(sets.base[0] - out[3], 0.0)
             force[1], force[2] = out[3], out[4]
         held[0] = last_force(used, dq, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare)
     return steps, 0

@@ -1,4 +1,4 @@
-"""Fields of the pressed and sliding pieces: VTKHDF, VTU and PVD files, pictures, an interactive view.
+"""Fields of the pressed and sliding pieces as files: VTKHDF, VTU and PVD.
 
 Read `bodies` first.
 """

@@ -4,15 +4,17 @@ from pathlib import Path
 
 import numpy as np
 
+from ...elasticity import coating_bond, elasticity, substructure
+from ...elasticity.elasticity import Piece, von_mises
+from ...elasticity.recovery import cells_of, indicator, recovery
+from .vtkhdf import bodies, write_series
+
 
 def write_fields(result, path: Path) -> dict:
     """Write both bodies and the interface of one pair, frame by frame.
 
     Returns the pressed state for the report's picture, which is drawn for tensor grids only.
     """
-    from ...elasticity.elasticity import Piece
-    from .vtkhdf import bodies, write_series
-
     patch, fields = result.patch, result.fields
     times = fields["time"]
     interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
@@ -56,8 +58,6 @@ def _loads(patch, fields: dict, side: str) -> tuple:
 
 def _motions(patch, loads: list) -> list:
     """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
-    from ...elasticity import elasticity, substructure
-
     pair = patch.pair
     how = elasticity.displacement if isinstance(pair.piece, elasticity.Piece) else substructure.displacement
     if pair.upper is pair.piece:
@@ -69,10 +69,6 @@ def _motions(patch, loads: list) -> list:
 def _body(patch, fields: dict, side: str, u) -> dict:
     """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
     u: of `_motions`."""
-    from ...elasticity import coating_bond
-    from ...elasticity.elasticity import von_mises
-    from ...elasticity.recovery import cells_of, indicator, recovery
-
     lower = side == "lower"
     piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
     sign = -1.0 if lower else 1.0
@@ -96,13 +92,10 @@ def _body(patch, fields: dict, side: str, u) -> dict:
 def _inside(piece, grid, u) -> tuple:
     """Inside of a piece displaced by u: (points (n, 2) as x and depth, blocks of cells, interface nodes, cell
     stress)."""
-    from ...elasticity import elasticity
-
     if isinstance(piece, elasticity.Piece):
         rows = grid.depth.size
         points = np.stack([np.repeat(grid.x, rows), np.tile(grid.depth, grid.x.size)], axis=1)
         return points, [piece.cells], np.arange(0, len(points), rows), elasticity.cell_stress(piece, u)[0]
-    from ...elasticity import substructure
 
     blocks = [block for block in (grid.triangles, grid.quads) if len(block)]
     return grid.points, blocks, grid.interface, substructure.cell_stress(piece, u)[0]

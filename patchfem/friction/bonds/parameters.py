@@ -6,6 +6,7 @@ from math import exp, log
 import numpy as np
 
 LONG = 1e100  # exponents of growth beyond which nothing changes any more
+LONGEST = 600.0  # seconds that a list of bonds may take before a run is refused
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,11 +60,11 @@ def bond_step(m, z, s2, dq, sigma, eps):
     f1, _, e = shape(x)
     a1, young = x * f1, sigma - m
     a2, a3, a4 = moments(x, e)
-    burnt = s2 * a1 + 2 * g * z * eps * a2 + m * eps * eps * a3 + sigma * eps * eps * a4
+    dissipated = s2 * a1 + 2 * g * z * eps * a2 + m * eps * eps * a3 + sigma * eps * eps * a4
     m1 = sigma - young * e
     z1 = z * e + g * eps * (sigma * a1 - young * x * e)
     s21 = e * (s2 + 2 * g * z * path + m * path * path) + sigma * eps * eps * a3
-    return m1, z1, s21, burnt
+    return m1, z1, s21, dissipated
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -99,8 +99,8 @@ def loose_step(m, z, s2, play, half, dq, sigma, eps):
     free, play = free_part(play, dq, half)
     s2 += free * (2 * z + m * free)
     z += m * free
-    m, z, s2, burnt = bond_step(m, z, s2, dq - free, sigma, eps)
-    return m, z, s2, play, burnt
+    m, z, s2, dissipated = bond_step(m, z, s2, dq - free, sigma, eps)
+    return m, z, s2, play, dissipated
 
 
 @njit(error_model="numpy", **LEAN)
@@ -142,13 +142,13 @@ def rigid_step(dq, weight, bonds, source, eps):
     f1, _, e = shape(x)
     a1 = x * f1
     a2, a3, a4 = moments(x, e)
-    burnt, far, left, two = 0.0, eps * eps, x * e, 2 * g * eps * a2
+    dissipated, far, left, two = 0.0, eps * eps, x * e, 2 * g * eps * a2
     for j in range(weight.size):
         m, z, s2, sigma = bonds[0, j], bonds[1, j], bonds[2, j], source[j]
         young = sigma - m
-        burnt += weight[j] * (s2 * a1 + two * z + far * (m * a3 + sigma * a4))
+        dissipated += weight[j] * (s2 * a1 + two * z + far * (m * a3 + sigma * a4))
         bonds[0, j] = sigma - young * e
         bonds[1, j] = z * e + g * eps * (sigma * a1 - young * left)
         bonds[2, j] = e * (s2 + 2 * g * z * path + m * path * path) + sigma * far * a3
         bonds[3, j] += dq
-    return burnt / 2
+    return dissipated / 2

@@ -92,8 +92,8 @@ def advance(bonds, dq, sigma, eps):
     out = np.stack([sigma - young * e,
                     z * e + g * eps * (sigma * a1 - young * x * e),
                     e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * a3])
-    burnt = s2 * a1 + 2 * g * z * eps * a2 + m * eps**2 * a3 + sigma * eps**2 * a4
-    return out, mean, slope, burnt
+    dissipated = s2 * a1 + 2 * g * z * eps * a2 + m * eps**2 * a3 + sigma * eps**2 * a4
+    return out, mean, slope, dissipated
 
 
 def stretch(bonds, dq):
@@ -111,17 +111,17 @@ def moved(law: Bonds, bonds, play, dq, sigma, eps) -> tuple:
     if len(bonds) == 3:
         free, damaging, play = elastic_part(law, play, dq, eps)
         loose = stretch(bonds, free)
-        out, mean, _, burnt = advance(loose, damaging, sigma, eps)
+        out, mean, _, dissipated = advance(loose, damaging, sigma, eps)
         if np.any(free):
             mean = free / dq * (bonds[1] + loose[1]) / 2 + damaging / dq * mean
-        return out, mean, burnt, play
+        return out, mean, dissipated, play
     path, e = direction(dq)
     along = e @ bonds[1:3]
     across = bonds[1:3] - e[:, None] * along
     f1, _, decay = shape_functions(path / eps)
-    out, mean, _, burnt = advance(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
+    out, mean, _, dissipated = advance(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
     z = e[:, None] * out[1] + across * decay
-    return np.stack([out[0], *z, out[2]]), e[:, None] * mean + across * f1, burnt, play
+    return np.stack([out[0], *z, out[2]]), e[:, None] * mean + across * f1, dissipated, play
 
 
 def pressed(law: Bonds, bonds, s0, s1):
@@ -168,9 +168,9 @@ class Recursion:
         path = direction(np.atleast_1d(dq))[0]
         speed = path / dt if dt > 0 else 0.0
         middle = grow(law, state.eps, speed, speed, path / 2, dt / 2)
-        out, mean, burnt, play = moved(law, state.bonds, state.play, dq, (s0 + s1) / 2, middle)
+        out, mean, dissipated, play = moved(law, state.bonds, state.play, dq, (s0 + s1) / 2, middle)
         scale = law.static / law.length
-        spent = scale * burnt / 2
+        spent = scale * dissipated / 2
         lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
         if lost.any():
             spent = spent + np.where(lost, scale * out[-1] / 2, 0.0)

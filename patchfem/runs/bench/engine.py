@@ -12,7 +12,7 @@ from ...core import Missing, PatchfemError
 from ...effects import has, listed
 from ...friction.bonds.engines import Choice
 from ...friction.bonds.engines import choose as choose_sum
-from ..rig.numerics import LONGEST
+from ...friction.bonds.parameters import LONGEST
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",

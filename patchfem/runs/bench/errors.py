@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...response.coarser import Rung, estimate, space_rung
 from ...response.errors import change, step_error
-from ..errors import Rung, estimate, space_rung
 from . import bench
 from .engine import LIST
 from .watch import Watch

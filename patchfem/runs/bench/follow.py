@@ -51,12 +51,12 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
     turns = _new_pace(time) if paced else np.zeros(0, int)
     last = slide.size - 1
     edges = np.unique(np.concatenate([np.arange(0, last, BLOCK), at, turns, [last]]))
-    forces, burnt = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
+    forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
     states, missed, told = [], 0, 0
     for a, b in pairwise(edges):
         contact = _with_room(contact, model, slide[a:b + 1])
         missed += hub.follow_path(slide[a:b + 1].copy(), float(time[b] - time[a]) / float(b - a), model.kind, contact,
-                                  work, GOAL * model.limit, burnt[a:b + 1], forces[a:b + 1])
+                                  work, GOAL * model.limit, energies[a:b + 1], forces[a:b + 1])
         if missed and hasattr(contact, "bondlist"):
             raise Missing(f"the bond list outgrew {contact.bondlist.shape[1]} entries before sample {b} of the bench; "
                           "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1", "")
@@ -65,7 +65,8 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
         if b == last or b - told >= BLOCK:
             watch.tell(b / last)
             told = b
-    return Followed(slide, forces[:, 0], forces[:, 1], burnt[:, 1], forces[:, 2], burnt[:-1, 0], at, states, missed)
+    return Followed(slide, forces[:, 0], forces[:, 1], energies[:, 1], forces[:, 2], energies[:-1, 0], at, states,
+                    missed)
 
 
 def _with_room(contact, model, slide):

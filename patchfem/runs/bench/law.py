@@ -3,6 +3,8 @@
 import numpy as np
 
 from ...effects import has
+from ...friction.bonds.quadrature import Quadrature
+from ...friction.bonds.recursion import Recursion
 
 
 def law_for(model, patch=None):
@@ -16,8 +18,6 @@ def law_for(model, patch=None):
         from ...friction.record import law_from
 
         return law_from(f, patch.pressure.load if patch is not None else model.point.load)
-    from ...friction.bonds.quadrature import Quadrature
-    from ...friction.bonds.recursion import Recursion
 
     law = model.bonds
     engine = model.accuracy.quadrature

@@ -4,6 +4,8 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...effects import carries, refusal
+from ...friction.bonds.quadrature import Quadrature
+from ...friction.bonds.recursion import Recursion
 from .ledger import Slid, frame_numbers, ledger_of, split
 from .stepped import refuse_costly
 from .watch import BLOCK, Watch
@@ -68,10 +70,7 @@ def law_for(model):
     """The law object in two directions."""
     law = model.bonds
     if law.reading == "stretch" and law.order == 1:
-        from ...friction.bonds.recursion import Recursion
-
         return Recursion(law)
-    from ...friction.bonds.quadrature import Quadrature
 
     tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
     return Quadrature(law, tail)

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...core import Measure
 from ...mesh.tensor import TensorGrid
+from ..results.patch_rows import TABLE
 from .press import Patch, pressed, solve
-from .rows import TABLE
 from .values import edge_cells, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
-from ...slip.shear_modes import SHEAR_MODES
+from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from .condensed import Pair, condensed
 
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
@@ -149,8 +149,6 @@ def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
 
 def shear_of(patch: Patch, law, count: int | None, tolerance: float):
     """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for."""
-    from ...slip.shear_modes import enough_modes, shear_modes
-
     limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:

@@ -2,10 +2,12 @@
 
 import numpy as np
 
+from ...contact.skin_laws import LinearSkin
 from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from ...contact.strips_solve import smooth
 from ...core import Compliance, Pressure, frozen_array
-from .skin import borne
+from ...slip import shear_modes
+from .skin import borne, skin_law
 
 
 def in_strips(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
@@ -32,10 +34,7 @@ def skin_of(asked):
     if asked.skin is None:
         return None
     if asked.skin.law == "linear":
-        from ...contact.skin_laws import LinearSkin
-
         return LinearSkin(asked.skin.normal_stiffness)
-    from .skin import skin_law
 
     return skin_law(asked)
 
@@ -45,8 +44,6 @@ def rotational_stiffness(state, c, x, weight) -> float:
 
     c: (m, m) [m/N] and weight: (m,) [m2] of one strip.
     """
-    from ...slip import shear_modes
-
     out = 0.0
     for strip, force in enumerate(state.force):
         stiff = None if state.stiffness is None else state.stiffness[strip] * weight

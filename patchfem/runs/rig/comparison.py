@@ -7,7 +7,10 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Outcome, PatchfemError
+from ...dynamics.comparison import point_laws
+from ...dynamics.comparison.point_laws import Coulomb
 from ...dynamics.march.march import hermite_extremes
+from ...dynamics.march.models import load_kernels
 from ...effects import carries, has, refusal
 from ...friction.record import law_from
 from ...response import run_events
@@ -23,8 +26,6 @@ TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
 
 def laws_of(model, load: float) -> list:
     """A law of dynamics.point_laws per interface; PatchfemError for laws with a memory of bonds."""
-    from ...dynamics.comparison import point_laws
-
     out, accuracy = [], model.accuracy
     for one in model.rig.interfaces:
         f, bears = one.numbers, load if one.load is None else one.load
@@ -40,8 +41,6 @@ def laws_of(model, load: float) -> list:
 
 def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=None):
     """Solution of a comparison method at numerics.steps per cycle; arguments as `march.run_march`."""
-    from ...dynamics.march.models import load_kernels
-
     load_kernels(say)
     rig, modes, drive = model.rig, model.rig.modes, model.rig.drive
     laws, begin = laws_of(model, borne(model, patch)), perf_counter()
@@ -80,8 +79,6 @@ def _integrated(model, numerics, laws):
     accuracy, modes, drive, start = model.accuracy, model.rig.modes, model.rig.drive, model.rig.start
     duration = numerics.cycles * drive.period
     if not laws:
-        from ...dynamics.comparison.point_laws import Coulomb
-
         laws = [Coulomb(1e-300, 1e-300)] * len(modes.interfaces)
     if accuracy.method == "duhamel":
         from ...dynamics.comparison import duhamel

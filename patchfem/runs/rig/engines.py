@@ -11,8 +11,8 @@ from typing import NamedTuple
 from ...core import PatchfemError
 from ...effects import LAWS, has, listed
 from ...model.model import Model
+from ...response.coarser import Rung, space_rung
 from ...response.errors import change, step_error
-from ..errors import Rung, space_rung
 
 
 class Variant(NamedTuple):

@@ -6,6 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import BaseSine, Outcome, Start
+from ...dynamics.events.histories import simulate
 from ...effects import has
 from ...response import run_events
 from ...response.levels import Level
@@ -85,7 +86,6 @@ def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
             load("dynamics.one_mode.event_kernels", say)
         return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
                              start, fast)
-    from ...dynamics.events.histories import simulate
 
     return simulate(modes, drive, *forces, cycles, window, travel, progress, start)
 

@@ -3,11 +3,14 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...dynamics.march import models
 from ...effects import carries, has, named, refusal
+from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import law_from
 from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
+from ...slip.shear_modes import jenkins_set
 from ...structure.drive_sizes import omega_of
 from .numerics import Numerics, quadrature_of
 from .strips import strip_loads
@@ -42,16 +45,12 @@ def _element(one: Rubbing, load: float, speed: float) -> Element:
     if not carries(f, "joints"):
         raise PatchfemError(f"{named(f)} beside other interfaces: {refusal('joints')}", f"{one.key}.law")
     if has(f.law, "bonds"):
-        from ...friction.laws.stretch import points_element
-
         return points_element(bonds_of(f, speed, 1e-12), [1.0], [load])
     return law_from(f, load).element(load)
 
 
 def contact_model(model: Model, numerics: Numerics, patch):
     """The ContactModel of the one interface of a rig; patch: the solved Patch or None under [normal]."""
-    from ...dynamics.march import models
-
     f, soft = model.friction, model.soft
     if f is None:
         return models.coulomb_model(0.0, 0.0)
@@ -69,7 +68,6 @@ def contact_model(model: Model, numerics: Numerics, patch):
     one = law_from(f, load).element(load)
     if not soft:
         return models.element_model(one)
-    from ...slip.shear_modes import jenkins_set
 
     if has(f.law, "set-valued") and f.kinetic < f.static:
         raise PatchfemError(f"friction.kinetic below static with {soft}: not yet built; the exact set of elements "
@@ -80,8 +78,6 @@ def contact_model(model: Model, numerics: Numerics, patch):
 
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
-    from ...dynamics.march import models
-
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if found.engine != "recursion":
         from ...friction.bonds.quadrature import cutoff

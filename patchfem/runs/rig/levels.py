@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from ...core import Measure
+from ...response.errors import step_error
 from ...response.levels import KEPT, Level, bracket, hysteresis, jump
 
 MOST = 40  # halvings of the bracket of an onset
@@ -28,8 +29,6 @@ def rows(sizes, marks, values, held: float | None) -> tuple:
 
 def with_errors(fine, half, quarter, steps: int) -> tuple:
     """The levels with the error of the time step as `response.errors.step_error` has it."""
-    from ...response.errors import step_error
-
     return tuple(replace(a, errors=step_error(a.values, b.values, c.values, steps))
                  for a, b, c in zip(fine, half, quarter))
 

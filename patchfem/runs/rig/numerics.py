@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import Missing
 from ...effects import has
+from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import fastest, omega_of, sinusoidal
 from .engines import COMPARED, engine_of
@@ -14,7 +15,6 @@ from .engines import COMPARED, engine_of
 MOST_STEPS = 6400  # finest automatic march, steps per cycle
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 LEAST_KEPT = 100  # samples of a run that has no cycles
-LONGEST = 600.0  # seconds that a shared bond list may take before the run is refused
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,11 @@
 from math import inf, pi
 
 from ...effects import has
+from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
-from .numerics import LONGEST, choose, list_cost, quadrature_of
+from .numerics import choose, list_cost, quadrature_of
 
 
 def chain(rig) -> dict:

@@ -7,13 +7,15 @@ import numpy as np
 from ...core import Outcome, PatchfemError
 from ...effects import has, listed
 from ...friction.record import law_from
+from ...response.coarser import estimate
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
-from ..errors import estimate
-from ..fields import element_fields, point_fields
-from ..result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
+from ...slip.fields import element_fields, point_fields
+from ..results.result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
+from . import levels
 from .engines import ENGINES, Variant
+from .levels import with_errors as level_errors
 from .march import created_warning
 from .numerics import MOST_STEPS, choose, refuse_costly
 from .solution import curve_measures
@@ -41,8 +43,6 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if numerics.engine not in ("exact", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
-        from . import levels
-
         lowest = levels.onset(raw.levels, raw.slips, model.accuracy.tolerance)
         found, extra = found | levels.measures(raw.levels, lowest), extra | {"levels": raw.levels}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
@@ -115,8 +115,6 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
 def _level_errors(found, rung, made: dict, numerics):
     """The levels of a Solution with the errors of the time step."""
-    from .levels import with_errors as level_errors
-
     half, quarter = (made[variant].levels for variant in rung.runs[:2])
     return level_errors(found.levels, half, quarter, numerics.steps)
 
@@ -134,9 +132,9 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
 
     sigma, f = patch.pressure.sigma_n, model.friction
     if model.rig.load_varies:
-        from .varying_load import frames_of as wrench_frames
+        from .varying_load import frames_of as varying_frames
 
-        return wrench_frames(model, patch, raw)
+        return varying_frames(model, patch, raw)
     if numerics.engine == "exact" or not raw.snapshots:
         at = np.linspace(max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
                          len(raw.window.time) - 1, FRAMES).round().astype(int)

@@ -4,6 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...response.events import stuck_time
+from ...response.measures import slip_measures
+from ...response.run_events import of_log
+
 
 def strip_loads(patch) -> np.ndarray:
     """Normal load of every strip of a solved patch (s,) [N]."""
@@ -44,13 +48,8 @@ def other_measures(window, drive, steps: int, log=None) -> dict:
     """Measures of the interfaces after the first, their number behind the name: slip_amplitude_2, stick_fraction_2,
     friction_force_peak_2, loop_area_2 (by the trapezoidal rule, which leaves nothing out where the friction is constant
     in slip). With the log of an exact run the stick fraction is that of its events."""
-    from ...response.events import stuck_time
-    from ...response.measures import slip_measures
-
     out, events = {}, None
     if log is not None and "slides" in window.extra:
-        from ...response.run_events import of_log
-
         events = of_log(log)
     for k, one in enumerate(other_windows(window), 2):
         found, length = slip_measures(one, drive, steps), one.time[-1] - one.time[0]

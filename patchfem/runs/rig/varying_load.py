@@ -1,59 +1,56 @@
-"""A scene whose contact acts on the modes with its whole wrench, or whose load is prescribed in time."""
+"""A scene whose contact pushes and turns the modes as well as it rubs, or whose load is prescribed in time."""
 
 import numpy as np
 
 from ...core import PatchfemError
+from ...dynamics.march import varying_load as march
 from ...model.model import Model
 
 
 def rubbing_of(model: Model):
     """The dynamics.march.varying_load.Rubbing of the law of a model."""
-    from ...dynamics.march import varying_load as wrench
-
     f = model.friction
     if f.law == "coulomb":
-        return wrench.coulomb(f.static, f.kinetic)
+        return march.coulomb(f.static, f.kinetic)
     if f.law == "tanh":
-        return wrench.rate(f.static, f.reference_speed)
+        return march.rate(f.static, f.reference_speed)
     if f.law == "elastic-plastic":
-        return wrench.plastic(f.static, f.bond_length)
+        return march.plastic(f.static, f.bond_length)
     if f.law != "nonlocal":
         raise PatchfemError(f"friction.law: '{f.law}' under a load that changes: not yet built", "")
-    return wrench.bonds(model.bonds)
+    return march.bonds(model.bonds)
 
 
 def model_of(model: Model, patch, count: int | None = None):
-    """The WrenchModel of a rig whose load changes; patch: the solved Patch or None under [normal]; count: how many
+    """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]; count: how many
     shear modes stand for pieces that give way, None: by the tolerance."""
-    from ...dynamics.march import varying_load as wrench
-
-    load, atlas = (model.point.at, None) if patch is None else (None, wrench.atlas_of(patch, model.patch.spring))
+    load, sets = (model.point.at, None) if patch is None else (None, march.sets_of(patch, model.patch.spring))
     law, shear = rubbing_of(model), None
     if model.soft:
         weight = patch.pieces.interface.weight
-        shear = wrench.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, count,
+        shear = march.shear_of(patch.giving, law, patch.pressure.sigma_n * weight, weight, count,
                                 model.accuracy.tolerance)
-    return wrench.wrench_model(model.rig.modes, law, atlas, load, shear)
+    return march.model_of(model.rig.modes, law, sets, load, shear)
 
 
 def shear_note(model: Model, contact) -> list:
     """The sentence on the shear modes of a run whose load changes; empty where none stand for the pieces."""
     if contact is None or contact.reduction is None:
         return []
-    kept, nodes = contact.reduction.stiffness.size, contact.atlas.x.size
+    kept, nodes = contact.reduction.stiffness.size, contact.sets.x.size
     return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
             f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
 
 
 def frames_of(model: Model, patch, raw) -> dict:
     """Interface frames (f, x) of a run, the pressed state first; status 0 open, 1 stick, 2 slip."""
-    law, atlas, weight = raw.contact.law, raw.contact.atlas, patch.pieces.interface.weight
+    law, sets, weight = raw.contact.law, raw.contact.sets, patch.pieces.interface.weight
     shots = raw.snapshots
     time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
     nodal = np.stack([patch.pressure.sigma_n * weight] + [shot["nodal"] for shot in shots])
     lift = np.array([0.0] + [shot["heave"] for shot in shots])[:, None]
     turn = np.array([0.0] + [shot["turn"] for shot in shots])[:, None]
-    gap = np.maximum(atlas.opening + lift + turn * atlas.x + nodal @ atlas.c, 0.0)
+    gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
     tau, local = np.zeros_like(nodal), np.zeros_like(nodal)
@@ -69,12 +66,10 @@ def frames_of(model: Model, patch, raw) -> dict:
 
 def _shear(law, shot, nodal) -> tuple:
     """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
-    from ...dynamics.march import varying_load as wrench
-
     top, bottom, _ = shot["memory"]
-    if law.kind == wrench.PLASTIC:
+    if law.kind == march.PLASTIC:
         return law.static * top, law.length * np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0)
-    if law.kind == wrench.POINTS:
+    if law.kind == march.POINTS:
         return law.static / law.length * bottom, np.divide(bottom, top, out=np.zeros_like(top), where=top > 0)
     total = nodal.sum()
     return (shot["force"] / total * nodal if total > 0 else 0 * nodal), np.zeros_like(nodal)

@@ -7,7 +7,7 @@ what was written. A rule says every mistake it finds and stays silent about valu
 from __future__ import annotations
 
 from ...effects import has
-from ..tables import Friction
+from ..keys.tables import Friction
 from .accuracy import _method, _quadrature
 from .contact import _contact, _load_line
 from .draft import SLIDES, Draft, _needs

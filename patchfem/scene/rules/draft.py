@@ -5,8 +5,8 @@ from typing import Any, Protocol
 from pydantic import BaseModel
 
 from ... import effects
-from ..tables import Tables
-from ..types import keys
+from ..keys.tables import Tables
+from ..keys.types import keys
 
 # selector value -> keys it needs, keys it can use; a key of the table that stands in neither list is not used
 LAWS: dict[str, tuple[str, str]] = {name: law.keys for name, law in effects.LAWS.items()}

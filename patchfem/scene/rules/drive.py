@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .draft import Draft
 from .structure import drives_mass
-
-if TYPE_CHECKING:
-    from .draft import Draft
 
 # waveform -> keys it needs, keys it can use
 WAVEFORMS: dict[str, tuple[str, str]] = {

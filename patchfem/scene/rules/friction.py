@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ...effects import has, takes, using
-from ..tables import Friction
+from ..keys.tables import Friction
 from .draft import LAWS, Draft, _needs
-
-if TYPE_CHECKING:
-    from .draft import Draft
 
 
 def check_spread(draft: Draft, at: str, law: Friction) -> None:

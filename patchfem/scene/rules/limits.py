@@ -6,13 +6,11 @@ Each message says what serves meanwhile and ends in "not yet built". Building on
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...effects import carries, has, listed, named, refusal
-from ..tables import Contact, Friction, Tables
-
-if TYPE_CHECKING:
-    from .draft import Draft
+from ..keys.tables import Contact, Friction, Tables
+from .draft import Draft
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..types import choices
-
-if TYPE_CHECKING:
-    from .draft import Draft
+from ..keys.types import choices
+from .draft import Draft
 
 MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
 PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")

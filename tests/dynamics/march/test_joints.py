@@ -212,9 +212,9 @@ def test_exact_iwan_elements_wipe_out_a_minor_loop():
     element = parallel(np.full(100, 0.01), (np.arange(100) + 0.5) / 100)
     num, mem, forces, lost = element.numbers[None], element.memory[None].copy(), [], 0.0
     for dq in np.diff([0, 0.8, 0.2, 0.6, 0.2, 0.8, -0.8, 0.8]):
-        burnt = kernels.commit(num, mem, 0, dq, 0.0, 0.0, 0.0, 1.0, 0.0)
+        dissipated = kernels.commit(num, mem, 0, dq, 0.0, 0.0, 0.0, 1.0, 0.0)
         forces.append(kernels.state(num, mem, 0, 0.0, 0.0)[0])
-        lost = lost + burnt if dq in (-1.6, 1.6) else 0.0
+        lost = lost + dissipated if dq in (-1.6, 1.6) else 0.0
     assert forces == pytest.approx([0.48, -0.03, 0.33, -0.03, 0.48, -0.48, 0.48], abs=1e-12)
     assert lost == pytest.approx(0.34136, abs=1e-12)
 

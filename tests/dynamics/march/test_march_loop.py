@@ -32,13 +32,13 @@ def test_exact_prescribed_path_of_points_is_the_recursion(growth):
     law = Bonds(0.4, 1.0, initial=0.7, **growth)
     area, sigma = np.array([0.5, 1.0, 0.25]), np.array([2.0, 1.0, 3.0])
     path = random_walk(2, 80, 0.6)
-    forces, burnt, bad, _ = follow(points_model(law, area, sigma), path)
+    forces, energies, bad, _ = follow(points_model(law, area, sigma), path)
     run = walk(Recursion(law), path, upper_pressure(sigma), 0.3)
     assert bad == 0
     assert forces[1:, 0] == pytest.approx(run.traction @ area, abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean @ area, abs=1e-12)
-    assert burnt[:-1, 0] == pytest.approx(run.dissipated @ area, abs=1e-12)
-    assert burnt[1:, 1] == pytest.approx(run.stored @ area, abs=1e-12)
+    assert energies[:-1, 0] == pytest.approx(run.dissipated @ area, abs=1e-12)
+    assert energies[1:, 1] == pytest.approx(run.stored @ area, abs=1e-12)
 
 
 @pytest.mark.parametrize("order", [0.0, 1.0])
@@ -75,9 +75,9 @@ def dense_steps(law, compliance, area, sigma, path):
                     break
                 part /= 2
             new = new - part * change
-        bonds, mean, _, burnt = advance(bonds, dq - (new - d), sigma, law.length)
+        bonds, mean, _, dissipated = advance(bonds, dq - (new - d), sigma, law.length)
         d = new
-        rows.append((weight @ mean, weight @ bonds[1], weight @ burnt / 2))
+        rows.append((weight @ mean, weight @ bonds[1], weight @ dissipated / 2))
     return np.array(rows), d
 
 
@@ -89,12 +89,12 @@ def test_exact_shear_modes_are_the_full_tangential_compliance(stiffness):
     area, sigma = np.full(24, 1 / 24), 1 + 0.8 * x
     modes = shear_modes(compliance, law.static * area * sigma, law.length, 24)
     path = random_walk(11, 60, 0.8)
-    forces, burnt, bad, contact = follow(points_model(law, area, sigma, modes), path)
+    forces, energies, bad, contact = follow(points_model(law, area, sigma, modes), path)
     want, deflection = dense_steps(law, compliance, area, sigma, path)
     assert bad == 0
     assert forces[:-1, 1] == pytest.approx(want[:, 0], abs=1e-10)
     assert forces[1:, 0] == pytest.approx(want[:, 1], abs=1e-9)
-    assert burnt[:-1, 0] == pytest.approx(want[:, 2], abs=1e-9)
+    assert energies[:-1, 0] == pytest.approx(want[:, 2], abs=1e-9)
     assert contact.b @ contact.psi == pytest.approx(deflection, abs=1e-9)
 
 
@@ -104,11 +104,11 @@ def test_exact_ledger_with_shear_modes():
     compliance, x = half_plane(24)
     modes = shear_modes(compliance, law.static * np.full(24, 1 / 24) * (1 + x), law.length, 8)
     path = random_walk(12, 80, 0.7)
-    forces, burnt, bad, _ = follow(points_model(law, np.full(24, 1 / 24), 1 + x, modes), path)
+    forces, energies, bad, _ = follow(points_model(law, np.full(24, 1 / 24), 1 + x, modes), path)
     work = forces[:-1, 1] * np.diff(path)
     assert bad == 0
-    assert work == pytest.approx(burnt[:-1, 0] + np.diff(burnt[:, 1]), abs=1e-10)
-    assert burnt[:-1, 0].min() >= -1e-13
+    assert work == pytest.approx(energies[:-1, 0] + np.diff(energies[:, 1]), abs=1e-10)
+    assert energies[:-1, 0].min() >= -1e-13
 
 
 def test_exact_masing_loop_of_a_jenkins_set():
@@ -116,14 +116,14 @@ def test_exact_masing_loop_of_a_jenkins_set():
     elements = jenkins_set(half_plane(16)[0], np.full(16, 0.4 / 16), 0.1)
     amplitude = 0.6 * elements.yield_slide.max()
     path = amplitude * np.concatenate([np.linspace(0, 1, 6), np.linspace(1, -1, 8)[1:], np.linspace(-1, 1, 8)[1:]])
-    forces, burnt, _, _ = follow(jenkins_model(elements.stiffness, elements.yield_slide), path)
+    forces, energies, _, _ = follow(jenkins_model(elements.stiffness, elements.yield_slide), path)
     slips = elements.yield_slide < amplitude
     k, s = elements.stiffness, elements.yield_slide
     assert 0 < slips.sum() < slips.size
     assert forces[-1, 0] == pytest.approx(k @ np.minimum(s, amplitude), rel=1e-12)
     area = 4 * (k[slips] * s[slips]) @ (amplitude - s[slips])
     assert forces[5:-1, 1] @ np.diff(path[5:]) == pytest.approx(area, rel=1e-12)
-    assert burnt[5:-1, 0].sum() == pytest.approx(area, rel=1e-12)
+    assert energies[5:-1, 0].sum() == pytest.approx(area, rel=1e-12)
 
 
 # ---- marches

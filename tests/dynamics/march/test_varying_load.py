@@ -21,16 +21,16 @@ from patchfem.model.structure import strip_rows
 @pytest.mark.parametrize("row", [0, 1])
 def test_order_small_heave_and_pitch_swing_at_the_frequency_of_the_tangent(row):
     """z = A cos(sqrt(omega^2 + K r^2/m) t) on the flat full contact, K = K_n or K_rot; the error falls as dt^2."""
-    atlas, part = elastic(), [1.0, 300.0][row]
+    sets, part = elastic(), [1.0, 300.0][row]
     basis = modes([200.0], [0.0], [part * (row == 0)], [part * (row == 1)], base=[0.0])
-    stiff = np.linalg.inv(atlas.c)
-    k = stiff.sum() if row == 0 else atlas.x @ stiff @ atlas.x
+    stiff = np.linalg.inv(sets.c)
+    k = stiff.sum() if row == 0 else sets.x @ stiff @ sets.x
     omega = np.sqrt((400 * np.pi)**2 + k * part**2 / MASS)
-    assert varying_load.contact_frequencies(basis, atlas) == pytest.approx([omega], rel=1e-12)
-    size = 1e-8 / part if row == 0 else 1e-8 / (part * atlas.x[-1])
+    assert varying_load.contact_frequencies(basis, sets) == pytest.approx([omega], rel=1e-12)
+    size = 1e-8 / part if row == 0 else 1e-8 / (part * sets.x[-1])
     errors = []
     for steps in (200, 400, 800):
-        done = varying_load.march(basis, BaseSine(0.0, 2000 * np.pi), atlas, LAWS["coulomb"], 1, steps, 1,
+        done = varying_load.march(basis, BaseSine(0.0, 2000 * np.pi), sets, LAWS["coulomb"], 1, steps, 1,
                             start=Start([size], [0.0]))
         response = done.response
         errors.append(np.abs(response.modal[:, 0] - size * np.cos(omega * response.time)).max() / size)
@@ -54,13 +54,13 @@ def test_exact_energy_stays_while_the_block_bounces():
 
 def test_exact_nodal_forces_are_those_of_the_unilateral_solve():
     """At every frame of a ramp of tilt: the forces of a fresh solve at the approach and rotation of the moment."""
-    atlas, slow = crowned(), BaseSine(200.0, 2 * np.pi * 2)
+    sets, slow = crowned(), BaseSine(200.0, 2 * np.pi * 2)
     basis = modes([40.0], [1.0], [0.0], [400.0], 0.5)
-    done = varying_load.march(basis, slow, atlas, LAWS["plastic"], 1, 200, 1, frames=40)
+    done = varying_load.march(basis, slow, sets, LAWS["plastic"], 1, 200, 1, frames=40)
     sets = set()
     for shot in done.snapshots:
-        gap = atlas.opening + shot["heave"] + shot["turn"] * atlas.x
-        want = solve_forces(atlas.c, atlas.x, gap, np.zeros(0))[0]
+        gap = sets.opening + shot["heave"] + shot["turn"] * sets.x
+        want = solve_forces(sets.c, sets.x, gap, np.zeros(0))[0]
         assert np.abs(shot["nodal"] - want).max() <= 1e-12 * LOAD
         sets.add((want > 0).tobytes())
     assert len(done.snapshots) == 40 and len(sets) >= 4 and done.outcome is None
@@ -85,14 +85,14 @@ def brute_block(basis, drive, stiff, mu, start, cycles, steps):
 
 def test_exact_coulomb_block_under_a_swinging_load():
     """A block that sticks and slips while its heave swings the load to zero, against small steps of another scheme."""
-    atlas = elastic()
-    stiff = float(np.linalg.inv(atlas.c).sum())
+    sets = elastic()
+    stiff = float(np.linalg.inv(sets.c).sum())
     basis = modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
     basis = ModalBasis(basis.names, basis.omega, np.array([0.02, 0.0]), basis.slide, basis.base, basis.output, MASS,
                        normal=basis.normal, pitch=basis.pitch)
     drive, start = BaseSine(8 * 9.80665 * 0.5, 2 * np.pi * 143), 0.9 * LOAD / stiff
     want = brute_block(basis, drive, stiff, 0.3, start, 2, 100_000)
-    done = varying_load.march(basis, drive, atlas, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0]))
+    done = varying_load.march(basis, drive, sets, LAWS["coulomb"], 2, 6400, 2, start=Start([0.0, start], [0.0, 0.0]))
     size = np.abs(want).max()
     at = np.round(done.response.time * 100_000 / drive.period).astype(int)[1:] - 1
     assert np.abs(done.response.slide[1:] - want[at]).max() <= 1e-3 * size

@@ -24,23 +24,23 @@ def giving(x, depth: float = 3e-8) -> np.ndarray:
     return depth * (0.5 * np.exp(-np.abs(x[:, None] - x) / 2e-3) + 0.3 * np.eye(x.size))
 
 
-def reduced(atlas, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3):
-    """Shear modes on the nodes of an atlas, as many as there are nodes where no count is given."""
-    force = atlas.reference.forces(0.0, 0.0)
-    count = atlas.x.size if count is None else count
-    return varying_load.shear_of(giving(atlas.x, depth), law, force, np.ones(force.size), count or None, tolerance)
+def reduced(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3):
+    """Shear modes on the nodes of contact sets, as many as there are nodes where no count is given."""
+    force = sets.reference.forces(0.0, 0.0)
+    count = sets.x.size if count is None else count
+    return varying_load.shear_of(giving(sets.x, depth), law, force, np.ones(force.size), count or None, tolerance)
 
 
-def dense(basis, drive, law, atlas, response, steps: int) -> tuple:
+def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     """Slides, friction forces and energy lost by a march on the nodes themselves: displacements u (m,) of the pieces
     behind the stiffness C^-1, bench laws, a general root finder; the nodal forces from heave and turn of a run."""
     p = propagator(basis, drive, steps)
     table, beta = p.tables(drive, 0, steps), p.beta[0, 0]
-    stiff = np.linalg.inv(giving(atlas.x))
+    stiff = np.linalg.inv(giving(sets.x))
     motion = zip(-response.extra["heave"], response.extra["turn"])
-    loads = np.array([atlas.at(d, t).forces(d, t) for d, t in motion])
+    loads = np.array([sets.at(d, t).forces(d, t) for d, t in motion])
     z = v = 0.0
-    u, state, slides, forces = np.zeros(atlas.x.size), law.start(loads[0]), [0.0], [0.0]
+    u, state, slides, forces = np.zeros(sets.x.size), law.start(loads[0]), [0.0], [0.0]
     bonds = isinstance(law, Recursion)
 
     def moved(state, xi, load):
@@ -81,11 +81,11 @@ def dense(basis, drive, law, atlas, response, steps: int) -> tuple:
 def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
     basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
-    drive, atlas, law, steps = BaseSine(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
-    done = varying_load.march(basis, drive, atlas, law, 1, steps, 1, start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
-                        shear=reduced(atlas, law))
+    drive, sets, law, steps = BaseSine(120.0, 2 * np.pi * 143), crowned(), LAWS[name], 60
+    done = varying_load.march(basis, drive, sets, law, 1, steps, 1, start=Start([0, 5e-7, 5e-7], [0, 0, 0]),
+                        shear=reduced(sets, law))
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
-    slides, forces, loads = dense(single, drive, SOFT[name], atlas, done.response, steps)
+    slides, forces, loads = dense(single, drive, SOFT[name], sets, done.response, steps)
     r, sets = done.response, (loads > 0).sum(axis=1)
     assert sets.min() < 10 and sets.max() == 21 and np.abs(r.force).max() > 0.9 * 0.3 * LOAD
     assert r.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
@@ -98,8 +98,8 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
     """normal = 1e-9: bonds as by shear modes of the preloaded set, elastic-plastic as by its exact parallel elements.
     The two differ by what springs back, which falls with the square of the step, to 3e-8 at 3200 steps a cycle."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
-    drive, atlas, law = BaseSine(40.0, 2 * np.pi * 300), crowned(), LAWS[name]
-    force, soft = atlas.reference.forces(0.0, 0.0), giving(crowned().x)
+    drive, sets, law = BaseSine(40.0, 2 * np.pi * 300), crowned(), LAWS[name]
+    force, soft = sets.reference.forces(0.0, 0.0), giving(crowned().x)
     if name == "plastic":
         group = jenkins_set(soft, 0.3 * force, 1e-6)
         model = models.jenkins_model(group.stiffness, group.yield_slide)
@@ -107,7 +107,7 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
         bonds = {"bonds": Bonds(0.3, 1e-6), "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5)}
         model = models.points_model(bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21))
     want = plain.march(basis, drive, model, 3, 1600, 3).response
-    got = varying_load.march(basis, drive, atlas, law, 3, 1600, 3, shear=reduced(atlas, law)).response
+    got = varying_load.march(basis, drive, sets, law, 3, 1600, 3, shear=reduced(sets, law)).response
     assert np.abs(got.force).max() > 0.7 * 0.3 * LOAD and 3e-6 < np.abs(got.slide).max() < 2e-5
     assert got.slide == pytest.approx(want.slide, abs=1e-6 * np.abs(want.slide).max())
     assert got.force == pytest.approx(want.force, abs=5e-6 * 0.3 * LOAD)
@@ -157,7 +157,7 @@ def test_exact_a_fork_goes_on_by_itself(count):
     basis = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
     law, drive = LAWS["bonds"], BaseSine(60.0, 2 * np.pi * 143)
     shear = reduced(crowned(), law, count) if count else None
-    run = plain.fresh(basis, drive, varying_load.wrench_model(basis, law, crowned(), None, shear), 200)
+    run = plain.fresh(basis, drive, varying_load.model_of(basis, law, crowned(), None, shear), 200)
     run.cycle(200, 0, [])
     twin = run.fork(drive)
     first, second = run.cycle(200, 0, [])[1], twin.cycle(200, 0, [])[1]
@@ -168,11 +168,11 @@ def test_refuses_shear_beside_a_set_valued_law():
     law = LAWS["plastic"]
     for other in ("coulomb", "tanh"):
         with pytest.raises(PatchfemError, match="elastic-plastic"):
-            varying_load.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
+            varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
                                 shear=reduced(crowned(), law, 4))
     few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
     with pytest.raises(PatchfemError, match="span every node"):
-        varying_load.wrench_model(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
+        varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
 
 
 @pytest.mark.parametrize("name", ["plastic", "bonds"])

@@ -60,13 +60,13 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     path = random_walk(7, 80, 0.4)
     model = points_model(law, [1.0], [1.0])
     contact, work = model.build()
-    burnt, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
-    assert load_kernels().follow_path(path, 1.0, model.kind, contact, work, 1e-12, burnt, forces) == 0
+    energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
+    assert load_kernels().follow_path(path, 1.0, model.kind, contact, work, 1e-12, energies, forces) == 0
     run = walk(Recursion(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
-    assert burnt[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)
-    assert burnt[1:, 1] == pytest.approx(run.stored[:, 0], abs=1e-12)
+    assert energies[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)
+    assert energies[1:, 1] == pytest.approx(run.stored[:, 0], abs=1e-12)
 
 
 @given(st.floats(0, 2), st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1), st.floats(-3, 3), st.floats(0.2, 2))

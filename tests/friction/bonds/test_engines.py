@@ -21,7 +21,7 @@ from patchfem.runs.rig.march import created_warning
 from patchfem.runs.rig.numerics import choose as settings_of
 from patchfem.runs.rig.numerics import quadrature_of
 from patchfem.scene import scene
-from patchfem.scene.tables import Accuracy
+from patchfem.scene.keys.tables import Accuracy
 
 TEXT = """title = "one mass"
 [normal]
@@ -90,11 +90,11 @@ def test_exact_reading_report_creates_energy_in_the_loop():
     assert path[0] == path[-1] == 0
     for reading, want in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
         law = Bonds(1.0, 1.0, 1.0, reading, initial=0.0)
-        forces, burnt, bad, contact = follow(list_model(law, 1.0, np.inf, 0.0), path, 1.0)
+        forces, energies, bad, contact = follow(list_model(law, 1.0, np.inf, 0.0), path, 1.0)
         work = forces[:-1, 1] @ np.diff(path)
         assert bad == 0 and work / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
         created, dissipated = contact.tally[6:8]
-        assert work == pytest.approx(dissipated - created + burnt[-1, 1], abs=1e-15)
+        assert work == pytest.approx(dissipated - created + energies[-1, 1], abs=1e-15)
         assert (created > 1e-4) == (reading == "report") and (created == 0) == (reading == "stretch")
 
 

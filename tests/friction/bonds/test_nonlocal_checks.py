@@ -432,11 +432,11 @@ def worst_of_kernel(seed, paths, count=60):
             middle = point_kernels.grow(eps, v, v, abs(dq) / 2, dt / 2, numbers)[0]
             work = point_kernels.bond_mean(m, z, dq, s, middle)[0] * dq
             before, formed = s2 / 2, m
-            m, z, s2, burnt = point_kernels.bond_step(m, z, s2, dq, s, middle)
+            m, z, s2, dissipated = point_kernels.bond_step(m, z, s2, dq, s, middle)
             eps = point_kernels.grow(eps, v, v, abs(dq), dt, numbers)[0]
             size = abs(work) + before + 1e-300
-            worst[0], worst[1] = min(worst[0], burnt / 2 / size), min(worst[1], s2 / size)
-            worst[2] = max(worst[2], abs(work + before - s2 / 2 - burnt / 2) / (size + (s + formed) * abs(dq)))
+            worst[0], worst[1] = min(worst[0], dissipated / 2 / size), min(worst[1], s2 / size)
+            worst[2] = max(worst[2], abs(work + before - s2 / 2 - dissipated / 2) / (size + (s + formed) * abs(dq)))
             if s == 0:
                 m = z = s2 = 0.0
     return worst

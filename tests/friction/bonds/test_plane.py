@@ -208,25 +208,25 @@ def worst_gain(seed, paths, legs=24):
         path = random_path(rng, legs)
         path[-1] = path[0]
         pressures = rng.uniform(0, 2, (legs + 1, 4)) * (rng.uniform(size=(legs + 1, 4)) > 0.1)
-        mean, _, burnt, stored, _ = along(law, path, dt=10**rng.uniform(-2, 1), pressures=pressures)
+        mean, _, dissipated, stored, _ = along(law, path, dt=10**rng.uniform(-2, 1), pressures=pressures)
         power = np.einsum("kcm,kc->km", mean, np.diff(path, axis=0))
         scale = np.abs(power).sum(axis=0)
         worst[0] = min(worst[0], (np.cumsum(power, axis=0) / scale).min())
-        worst[1] = min(worst[1], (burnt / scale).min())
-        worst[2] = max(worst[2], (np.abs(power.sum(axis=0) - stored[-1] - burnt.sum(axis=0)) / scale).max())
+        worst[1] = min(worst[1], (dissipated / scale).min())
+        worst[2] = max(worst[2], (np.abs(power.sum(axis=0) - stored[-1] - dissipated.sum(axis=0)) / scale).max())
     return worst
 
 
 def test_always_random_paths_take_energy():
     """100 paths of 4 points with steps in the pressure, lost contact and changing bond length."""
-    work, burnt, ledger = worst_gain(1, 100)
-    assert work >= -1e-12 and burnt >= -1e-12 and ledger < 1e-12
+    work, dissipated, ledger = worst_gain(1, 100)
+    assert work >= -1e-12 and dissipated >= -1e-12 and ledger < 1e-12
 
 
 @pytest.mark.slow
 def test_always_twenty_thousand_random_paths_take_energy():
-    work, burnt, ledger = worst_gain(2, 20_000)
-    assert work >= -1e-12 and burnt >= -1e-12 and ledger < 1e-12
+    work, dissipated, ledger = worst_gain(2, 20_000)
+    assert work >= -1e-12 and dissipated >= -1e-12 and ledger < 1e-12
 
 
 @pytest.mark.parametrize("law", [Bonds(1.0, 1.0, 2.0), Bonds(1.0, 1.0, 3.0), Bonds(1.0, 1.0, 0.0)])

@@ -203,6 +203,6 @@ def test_exact_a_scene_without_these_effects_imports_none_of_them(tmp_path):
     (tmp_path / "scene.toml").write_text(BENCH.replace("coulomb", "nonlocal").replace(
         "static", 'bond_length = "2 um"\nstatic'), "utf-8")
     others = {"friction.bonds.temperature", "friction.bonds.spread", "friction.laws.convolution",
-              "friction.bonds.plane", "friction.bonds.plane_quadrature", "runs.bench.two_directions", "runs.heat",
-              "runs.bench.averaged"}
+              "friction.bonds.plane", "friction.bonds.plane_quadrature", "runs.bench.two_directions",
+              "runs.results.heat", "runs.bench.averaged"}
     assert not {f"patchfem.{name}" for name in others} & loaded(FROM_PYTHON, tmp_path / "scene.toml")

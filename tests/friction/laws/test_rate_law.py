@@ -109,10 +109,10 @@ def test_exact_the_compiled_step_is_the_plain_one():
     hub, model = load_kernels(None), rate_model(2.5, 1e-3)
     contact, work = model.build(hub)
     path, dt = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7, 1e-4
-    burnt, forces = np.zeros((400, 2)), np.zeros((400, 3))
-    assert hub.follow_path(path, dt, model.kind, contact, work, 1e-12, burnt, forces) == 0
+    energies, forces = np.zeros((400, 2)), np.zeros((400, 3))
+    assert hub.follow_path(path, dt, model.kind, contact, work, 1e-12, energies, forces) == 0
     law, one = Rate(2.5, 1e-3), np.ones(1)
     plain = [law.step(one, move, one, one, dt) for move in np.diff(path)]
     assert forces[:-1, 1] == pytest.approx(np.array([step.mean[0] for step in plain]), rel=1e-13, abs=1e-16)
-    assert burnt[:-1, 0] == pytest.approx(np.array([step.dissipated[0] for step in plain]), rel=1e-13, abs=1e-22)
-    assert (burnt[:-1, 0] >= 0).all()
+    assert energies[:-1, 0] == pytest.approx(np.array([step.dissipated[0] for step in plain]), rel=1e-13, abs=1e-22)
+    assert (energies[:-1, 0] >= 0).all()

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..scene.materials import MATERIALS, THERMAL
+from ...friction.bonds.temperature import surface_rise
+from ...scene.keys.materials import MATERIALS, THERMAL
 
 
 def heating(model, patch, work: float, duration: float) -> list:
@@ -18,7 +19,6 @@ def heating(model, patch, work: float, duration: float) -> list:
     if known is None:
         return ["the warming by friction is not estimated: the conductivity of contact.substrate is not known; name a "
                 f"material of the table ({', '.join(THERMAL)})"]
-    from ..friction.bonds.temperature import surface_rise
 
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):

@@ -1,9 +1,9 @@
-"""What each key of a scene means, in one sentence, by the table of `scene.tables` that holds it.
+"""What each key of a scene means, in one sentence, by the table of `tables` that holds it.
 
 The first word is not a capital unless it is a name; a default that follows from other keys stands in the sentence.
 """
 
-from ..effects import LAW_KEYS
+from ...effects import LAW_KEYS
 
 MEANINGS = {
     "Tables": {"title": "a line of text that stands over the results"},
@@ -231,4 +231,4 @@ def meaning(model: type, key: str) -> str:
     for one in model.__mro__:
         if key in MEANINGS.get(one.__name__, {}):
             return MEANINGS[one.__name__][key]
-    raise KeyError(f"no meaning of {model.__name__}.{key} in scene/meanings.py")
+    raise KeyError(f"no meaning of {model.__name__}.{key} in scene/keys/meanings.py")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import NamedTuple
 
-from ..response.errors import change
+from .errors import change
 
 
 class Rung(NamedTuple):

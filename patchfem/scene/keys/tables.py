@@ -1,6 +1,6 @@
 """The tables of a scene as frozen pydantic models: one model per table, one attribute per key, floats in SI.
 
-What a key means stands in `scene.meanings`; here stand its kind, its limits and its default. Whether keys fit together
+What a key means stands in `meanings`; here stand its kind, its limits and its default. Whether keys fit together
 is the business of `scene.rules.check`, reading a file that of `scene`.
 """
 
@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from ..effects import LAWS
+from ...effects import LAWS
 from .materials import MATERIALS
 from .types import Table, choices, number, quantity, whole
 

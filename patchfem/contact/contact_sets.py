@@ -1,4 +1,4 @@
-"""The contact map: normal contact as a piecewise linear function of approach delta and rotation theta of the holder.
+"""Contact sets: normal contact as a piecewise linear function of approach delta and rotation theta of the holder.
 
 The unilateral contact of `unilateral`, w = g + theta x - delta + C f >= 0, f >= 0, f . w = 0, is affine in (delta,
 theta) as long as its set of touching nodes stays. So the plane falls into convex polygons, one for each contact set.
@@ -18,13 +18,13 @@ from .unilateral import solve_forces
 
 NOISE = 1e-13  # of the largest term: what counts as nothing
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
-ROOM = 64e6  # bytes of kept pieces
+ROOM = 64e6  # bytes of kept contact sets
 SIDES = 16  # most sides of a polygon, as in `polygon_kernels`
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Piece:
-    """One contact set of the map, with its forces and gaps as affine functions of the motion.
+class ContactSet:
+    """One contact set, with its forces and gaps as affine functions of the motion.
 
     on: (m,) the nodes that touch; rows: (3, m) force [N] where they touch and gap [m] where not, per (1, d, t); energy:
     (6,) of the preloaded contact, E - E0 - N0 d + M0 t, the coefficients of 1, d, t, d^2/2, d t, t^2/2.
@@ -58,8 +58,8 @@ class Piece:
         return float((np.maximum(here[falls], 0.0) / -rate[falls]).min(initial=np.inf))
 
 
-class Atlas:
-    """Contact map of a pair of bodies around a solved state; contact sets are worked out when first met and kept.
+class ContactSets:
+    """Contact sets of a pair of bodies around a solved state; each is worked out when first met and kept.
 
     c: (m, m) [m/N]; x: (m,) [m]; opening: (m,) [m], g + theta0 x - delta0 of the state, below zero where the bodies
     would overlap without forces; on: (m,) bool, the contact set of the state. load N0 [N] and moment M0 [N m] are those
@@ -68,7 +68,7 @@ class Atlas:
 
     def __init__(self, c, x, opening, on):
         self.c, self.x, self.opening = frozen_array(c), frozen_array(x), frozen_array(opening)
-        self.pieces, self.load, self.moment, self.energy = {}, 0.0, 0.0, 0.0
+        self.kept, self.load, self.moment, self.energy = {}, 0.0, 0.0, 0.0
         self.size = float(np.abs(self.opening).max())
         self.reference = self._made(np.asarray(on, bool))
         self.reference = found = self.at(0.0, 0.0)
@@ -77,19 +77,19 @@ class Atlas:
         self.size += float(np.abs(self.c @ force).max())
         if not self.load > 0:
             raise PatchfemError("contact: the motion starts from a contact under load; raise contact.load")
-        self.pieces = {}
-        self.reference = self.piece(found.on)
+        self.kept = {}
+        self.reference = self.contact_set(found.on)
 
-    def piece(self, on: np.ndarray) -> Piece:
-        """The piece of a contact set (m,) bool."""
+    def contact_set(self, on: np.ndarray) -> ContactSet:
+        """The contact set whose nodes `on` (m,) bool touch; made when first asked for."""
         key = on.tobytes()
-        if key not in self.pieces:
-            if len(self.pieces) * 3 * on.size * 8 > ROOM:
-                self.pieces.pop(next(iter(self.pieces)))
-            self.pieces[key] = self._made(on)
-        return self.pieces[key]
+        if key not in self.kept:
+            if len(self.kept) * 3 * on.size * 8 > ROOM:
+                self.kept.pop(next(iter(self.kept)))
+            self.kept[key] = self._made(on)
+        return self.kept[key]
 
-    def _made(self, on) -> Piece:
+    def _made(self, on) -> ContactSet:
         index = np.flatnonzero(on)
         right = np.stack([self.opening, -np.ones(self.x.size), self.x], axis=1)
         force = np.zeros_like(right)
@@ -102,40 +102,40 @@ class Atlas:
         square = (square + square.T) / 2
         energy = np.array([square[0, 0] / 2 - self.energy, square[0, 1] - self.load, square[0, 2] + self.moment,
                            square[1, 1], square[1, 2], square[2, 2]])
-        return Piece(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
+        return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
 
-    def at(self, d: float, t: float, start: Piece | None = None) -> Piece:
-        """The piece that holds at (d, t) [m, rad], searched from `start`; NotConverged where none was found."""
-        piece = self.reference if start is None else start
+    def at(self, d: float, t: float, start: ContactSet | None = None) -> ContactSet:
+        """The contact set that holds at (d, t) [m, rad], searched from `start`; NotConverged where none was found."""
+        touching = self.reference if start is None else start
         for count in range(BLOCKS + 10 * self.x.size):
-            value = piece.values(d, t)
-            terms = np.abs(piece.rows[0]) + np.abs(d * piece.rows[1]) + np.abs(t * piece.rows[2])
-            least = np.where(piece.on, NOISE * terms[piece.on].max(initial=0.0),
+            value = touching.values(d, t)
+            terms = np.abs(touching.rows[0]) + np.abs(d * touching.rows[1]) + np.abs(t * touching.rows[2])
+            least = np.where(touching.on, NOISE * terms[touching.on].max(initial=0.0),
                              NOISE * (self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()))
             fails = value < -least
             if not fails.any():
-                return piece
+                return touching
             if count >= BLOCKS:
                 fails &= np.cumsum(fails) == 1
-            piece = self.piece(piece.on != fails)
+            touching = self.contact_set(touching.on != fails)
         force, _, _ = solve_forces(self.c, self.x, self.opening - d + t * self.x, np.zeros(0))
-        piece = self.piece(force > 0)
-        if self.flaw(piece, d, t) > 1e-12:
+        touching = self.contact_set(force > 0)
+        if self.flaw(touching, d, t) > 1e-12:
             raise NotConverged("contact: no contact set fits the motion; raise the load or check the mesh")
-        return piece
+        return touching
 
-    def flaw(self, piece: Piece, d: float, t: float) -> float:
+    def flaw(self, touching: ContactSet, d: float, t: float) -> float:
         """Largest relative violation of contact at (d, t), recomputed from the definition.
 
         Gaps are measured in the size of the openings, pulls in the load.
         """
-        force = np.where(piece.on, piece.values(d, t), 0.0)
+        force = np.where(touching.on, touching.values(d, t), 0.0)
         opening = self.opening - d + t * self.x + self.c @ force
         size = self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()
         pulls = max(-force.min(initial=0.0), 0.0) / max(np.abs(force).sum(), 1e-300)
-        return float(max(np.abs(opening[piece.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
+        return float(max(np.abs(opening[touching.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
 
-    def resultant(self, d: float, t: float, start: Piece | None = None) -> tuple:
+    def resultant(self, d: float, t: float, start: ContactSet | None = None) -> tuple:
         """Load N [N], moment M [N m] and energy [J] of the preloaded contact at (d, t)."""
         q = self.at(d, t, start).energy
         by_d, by_t = q[3] * d + q[4] * t, q[4] * d + q[5] * t
@@ -143,7 +143,7 @@ class Atlas:
                 float(q[0] + d * (q[1] + by_d / 2) + t * (q[2] + by_t / 2)))
 
     def arrays(self, room: float = ROOM) -> dict:
-        """The map as arrays of `press_kernels.Book`, nothing in it yet but the reference set in `wanted`.
+        """The sets as arrays of `press_kernels.SetArrays`, nothing in it yet but the reference set in `wanted`.
 
         room: bytes that its contact sets may take.
         """

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..pictures import axis_unit
+from ..fields.vtkhdf import Frame, Series
 from .panels import Panel, borders, curves, panels
-from .vtkhdf import Frame, Series
+from .pictures import axis_unit
 
 ENDINGS = (".png", ".svg", ".pdf")
 SECONDS = 60  # for the child

@@ -4,9 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core import Measure, Outcome
-from .patch.rows import TABLE as STATIC
-from .plan import Plan
+from ...core import Measure, Outcome
+from .patch_rows import TABLE as STATIC
 
 FRAMES = 16  # of the interface, in the last cycle
 
@@ -15,11 +14,11 @@ FRAMES = 16  # of the interface, in the last cycle
 class Result:
     """Everything that a run found.
 
-    measures: name -> Measure; response: kept histories or None; patch: the solved patch or None; fields: (frame, x)
-    arrays by name with `time`; seconds by part; extra: engine, steps, notes for the report.
+    plan: the Plan that was run; measures: name -> Measure; response: kept histories or None; patch: the solved patch or
+    None; fields: (frame, x) arrays by name with `time`; seconds by part; extra: engine, steps, notes for the report.
     """
 
-    plan: Plan
+    plan: object
     outcome: Outcome
     measures: dict
     response: object
@@ -46,7 +45,7 @@ def meaning(name: str, apart: str = "interface") -> str:
     """Meaning of a measure by its name in a summary; slip_amplitude_2 is that of the second interface."""
     if name in STATIC:
         return STATIC[name].text
-    from ..response.rows import of_first, row_of  # a static patch needs none of them
+    from ...response.rows import of_first, row_of
 
     first = of_first(name)
     return row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
@@ -95,7 +94,7 @@ def without_errors(found: dict, estimate: bool) -> dict:
 
 def unripe(law, speed: float) -> list:
     """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
-    from ..friction.bonds.parameters import ripening
+    from ...friction.bonds.parameters import ripening
 
     a = ripening(law, speed) if law.reading == "report" else 0.0
     if a <= 0.3:

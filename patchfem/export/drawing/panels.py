@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..pictures import axis_unit
-from .vtkhdf import Frame
+from ..fields.vtkhdf import Frame
+from .pictures import axis_unit
 
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way
 VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap in it takes

@@ -5,9 +5,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ..pictures import BLUE, ORANGE, STYLE, axis_unit
+from ..fields.vtkhdf import Frame
 from .panels import Panel, borders, curves, panels
-from .vtkhdf import Frame
+from .pictures import BLUE, ORANGE, STYLE, axis_unit
 
 
 def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
