@@ -113,6 +113,8 @@ EFFECTS = {
     "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic.harmonic",
                                        "x = Re sum X_k exp(i k w t); Coulomb: the map of "
                                        "events over a period"),
+    "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds per point, or tau ds of form 'energy'",
+                   ("pressure", "traction")),
     "measured": Effect("", "overlay of measured rows"),
 }
 
@@ -120,12 +122,9 @@ EFFECTS = {
 EFFECTS |= {f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
             for name, effect in EFFECTS.items() if name.startswith(("friction.law=", "friction.reading="))}
 
-NOT_YET_BUILT = ("wear",)
-
-
 def absent(named) -> list:
-    """Every effect that is not among `named`, built or not, in the order of the chain."""
-    return [name for name in (*EFFECTS, *NOT_YET_BUILT) if name not in set(named)]
+    """Every effect that is not among `named`, in the order of the chain."""
+    return [name for name in EFFECTS if name not in set(named)]
 
 LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
         if name.startswith("friction.law=")}

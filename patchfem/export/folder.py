@@ -137,7 +137,7 @@ def dataset(result: Result):
     histories, modal = _histories(result)
     patch, extra = result.patch, result.extra
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
-    fields = {k: v for k, v in result.fields.items() if k != "holder_slide"}
+    fields = {k: v for k, v in result.fields.items() if not k.startswith("holder_")}
     strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
     levels = _levels(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
@@ -150,6 +150,8 @@ def dataset(result: Result):
         data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
     if "curve" in extra:
         data = netcdf.with_curve(data, extra["curve"])
+    if "wear" in extra:
+        data = netcdf.with_wear(data, extra["wear"], {name: m.unit for name, m in result.measures.items()})
     if "regime" in extra:
         data = data.assign_attrs(regime=extra["regime"], largest_multiplier=_multiplier(extra))
     return netcdf.described(data, summary_of(result), result.plan.model.source.resolved, versions())

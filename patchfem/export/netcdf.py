@@ -29,6 +29,7 @@ LONG = {
     "gap": ("m", "remaining gap"),
     "shear_stress": ("Pa", "frictional shear stress, positive against positive slip"),
     "slip": ("m", "irreversible local slip"),
+    "worn_depth": ("m", "worn depth, both pieces together"),
     "weight": ("m2", "nodal area of all pairs"),
 }
 
@@ -114,6 +115,14 @@ def with_curve(data: xr.Dataset, curve: dict) -> xr.Dataset:
         out["curve_fold"] = ("fold", np.asarray(curve["folds"], float),
                              {"units": unit, "long_name": f"{over} at which the curve turns back"})
     return data.assign(out)
+
+
+def with_wear(data: xr.Dataset, history: dict, units: dict) -> xr.Dataset:
+    """Add the measures over the cycles of wear to a dataset: history name -> (j,), with `cycle`; units by name."""
+    out = {f"wear_{name}": ("wear_cycle", values, {"units": units[name], "long_name": name.replace("_", " ")})
+           for name, values in history.items() if name in units}
+    count = {"units": "1", "long_name": "cycles of wear so far"}
+    return data.assign(out).assign_coords({"wear_cycle": ("wear_cycle", history["cycle"], count)})
 
 
 def _attributes(name: str, dimensions: int = 1) -> dict:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .patch import PatchModel
     from .rig import Rig
     from .slide import SlidePath
+    from .wear import WearModel
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,7 +27,7 @@ class Model:
     kind: "patch", "bench", "rig" or "linear". patch or point, whichever carries the load, the other None. friction:
     keys of the law as they act, of the first interface; heat: surface temperature table or None; spread [m] of the pad
     (2.15) or None; pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
-    reading factor) or None. absent: effects that the scene does not name.
+    reading factor) or None. wear: over many cycles, or None. absent: effects that the scene does not name.
     """
 
     source: Source
@@ -41,6 +42,7 @@ class Model:
     rig: Rig | None
     accuracy: Accuracy
     measured: tuple | None
+    wear: WearModel | None
     absent: tuple
 
     def __repr__(self) -> str:
@@ -112,9 +114,17 @@ def build(scene: Scene) -> Model:
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
                   (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
-                  tuple(absent(named)))
+                  _wear(scene), tuple(absent(named)))
     source = Source(scene.path, scene.title, scene.text, resolved(scene, found), named, tuple(scene.remarks))
     return replace(found, source=source)
+
+
+def _wear(scene: Scene) -> WearModel | None:
+    if scene.wear is None:
+        return None
+    from .wear import wear_asked
+
+    return wear_asked(scene.wear)
 
 
 def _law(scene: Scene) -> tuple:

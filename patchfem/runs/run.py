@@ -53,7 +53,17 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
                         seconds, warnings, {})
     else:
+        evolved = None
+        if model.wear is not None and patch is not None:
+            from .wear.evolve import evolve
+
+            evolved = evolve(model, patch, coarse, progress)
+            patch, coarse = evolved.patch, evolved.coarse
         result = _KINDS[what.kind](what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        if model.wear is not None:
+            from .wear.measures import worn
+
+            result = worn(result, evolved, estimate)
     seconds["total"] = perf_counter() - begin
     apart = "strip" if model.patch is not None else "interface"
     return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + _loose(result))

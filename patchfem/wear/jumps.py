@@ -36,7 +36,8 @@ class Worn:
 
     depth (m,) [m] and force (m,) [N] then; path (m,) [m]: slip path of the next cycle; trend (m,): change of the path
     per cycle over the last jump; length [cycles]: of the next automatic jump; rough (m,) [m]: the depth by the same
-    jumps undivided; strayed [m]: sum of what the slip path's change within the jumps may have cost.
+    jumps undivided; strayed [m]: sum of what the slip path's change within the jumps may have cost; used (m,) [m]:
+    slip path that the last jump took.
     """
 
     cycle: float
@@ -47,6 +48,7 @@ class Worn:
     length: float
     rough: np.ndarray
     strayed: float
+    used: np.ndarray
 
     @property
     def error(self) -> float:
@@ -57,7 +59,7 @@ class Worn:
 def start(asked: Wearing) -> Worn:
     """The state before any wear."""
     zero = np.zeros_like(asked.area)
-    return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero, 0.0)
+    return Worn(0.0, zero, asked.press(zero, zero), asked.path(zero), zero, FIRST * asked.cycles, zero, 0.0, zero)
 
 
 def after(asked: Wearing, state: Worn, tolerance: float, count: int | None = None) -> Worn:
@@ -91,7 +93,8 @@ def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: fl
         return found, miss
     again, miss = _halved(asked, state, (state.path + path) / 2, length, tolerance)
     shift = float(np.abs(again.depth - found.depth).max()) / 6
-    here = shift / (tolerance * max(float((again.depth - state.depth).max()), 1e-300))
+    worn = max(float((again.depth - state.depth).max()), 1e-3 * float(again.depth.max()))  # little is worn in shakedown
+    here = shift / max(tolerance * worn, 1e-300)
     return replace(again, path=path, trend=(path - state.path) / length, strayed=state.strayed + shift), max(miss, here)
 
 
@@ -102,12 +105,14 @@ def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) 
         depth, force = explicit_jump(asked.press, state.depth, rate, length)
         rough, _ = explicit_jump(asked.press, state.rough, rate, length / 2)
         rough, _ = explicit_jump(asked.press, rough, rate, length / 2)
-        return replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough), 0.0
+        return replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough,
+                       used=path), 0.0
     once, least = jump(asked.press, state.depth, rate, length)
     half, _ = jump(asked.press, state.depth, rate, length / 2)
     depth, force = jump(asked.press, half, rate, length / 2)
     rough, _ = jump(asked.press, state.rough, rate, length) if state.rough is not state.depth else (once, least)
-    found = replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough)
+    found = replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough,
+                    used=path)
     scale, load = 2**ORDER - 1, float(force.sum())
     miss = float(np.abs(depth - once).max()) / scale / _allowed(found, tolerance)
     return found, max(miss, float(np.abs(force - least).sum()) / scale / (tolerance * load) if load > 0 else 0.0)
@@ -115,3 +120,16 @@ def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) 
 
 def _allowed(found: Worn, tolerance: float) -> float:
     return tolerance * max(float(found.depth.max()), 1e-300)
+
+
+def replayed(press: Callable, area, coefficient: float, legs) -> np.ndarray:
+    """Worn depth (m,) [m] on other nodes by the jumps of an earlier run.
+
+    press and area (m,) [m2] as in `Wearing`; legs: (cycles, slip path (m,) [m] on these nodes) of every jump.
+    """
+    depth = np.zeros_like(area)
+    for cycles, path in legs:
+        rate = rates(coefficient, path, area)
+        for _ in range(2):
+            depth, _ = jump(press, depth, rate, cycles / 2)
+    return depth

@@ -294,7 +294,7 @@ UNBUILT = [
     (RIG, ["structure.mode.axial.pitch=1 rad/m", "contact.tilt.on=lower"], "contact.tilt.on"),
     (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz",
                                              "friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),
-    (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10"], "wear"),
+    (RIG, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=10", "structure.mode.axial.normal=0.1"], "wear"),
 ]
 
 

@@ -17,7 +17,7 @@ def write_fields(result, path: Path) -> dict:
     """
     patch, fields = result.patch, result.fields
     times = fields["time"]
-    interface = {k: v for k, v in fields.items() if k not in ("time", "holder_slide")}
+    interface = {k: v for k, v in fields.items() if k != "time" and not k.startswith("holder_")}
     loads = [_loads(patch, fields, side) for side in ("lower", "upper")]
     low, high = (_body(patch, fields, side, motion) for side, motion in zip(("lower", "upper"), _motions(patch, loads)))
     for one, other in ((low, high), (high, low)):
@@ -26,7 +26,7 @@ def write_fields(result, path: Path) -> dict:
         [_moved(interface, patch.x, body.x) for body in (patch.pair.grid, patch.pair.upper_grid)]
     points, blocks, point_data, cell_data = bodies(low, high, *joined)
     units = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "part": "1", "material": "1",
-             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1",
+             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1", "worn_depth": "m",
              "stress_error": "1", "normal_bond": "Pa", "shear_bond": "Pa"}
     used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
     write_series(path, points, blocks, times, point_data, cell_data, used)
@@ -53,6 +53,8 @@ def _loads(patch, fields: dict, side: str) -> tuple:
     shear = patch.pair.forces(np.concatenate([np.zeros((1, force.size)), -sign * tau * force]))[at]
     normal = np.zeros_like(shear)
     normal[0] = patch.pair.forces(patch.pressure.sigma_n * force)[at]
+    if "holder_closing" in fields:  # the pressed state changes from frame to frame
+        normal[1:] = patch.pair.forces((fields["normal_stress"] - patch.pressure.sigma_n) * force)[at]
     return shear, normal
 
 
@@ -80,9 +82,14 @@ def _body(patch, fields: dict, side: str, u) -> dict:
         bonded["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
     move, stress = u * [1.0, sign], stress * np.array([1.0, 1.0, 1.0, sign])
     if not lower:
-        p = patch.pressure
-        move[..., 0] += fields.get("holder_slide", np.zeros(len(move)))[:, None] - p.rotation * points[:, 1]
-        move[..., 1] += p.rotation * points[:, 0] - p.approach
+        same = np.ones((len(move), 1))
+        rotation = patch.pressure.rotation * same if "holder_rotation" not in fields else \
+            fields["holder_rotation"][:, None]
+        closing = patch.pressure.approach * same if "holder_closing" not in fields else \
+            fields["holder_closing"][:, None]
+        slide = fields["holder_slide"][:, None] if "holder_slide" in fields else 0.0
+        move[..., 0] += slide - rotation * points[:, 1]
+        move[..., 1] += rotation * points[:, 0] - closing
     blocks = [block if not lower else block[:, ::-1] for block in blocks]
     return {"points": points * [1.0, sign], "blocks": blocks, "interface": interface, "displacement": move,
             "material": grid.is_coating if hasattr(grid, "is_coating") else piece.is_coating, "stress": stress,

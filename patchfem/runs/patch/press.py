@@ -78,6 +78,23 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
 
 
+def presser(asked, pair: Pair):
+    """A function of (worn (m,) [m], softening (m,) [m/N]) -> contact forces (m,) [N] of a `PatchModel`.
+
+    worn adds to the gap, softening to the diagonal of the compliance; what they share is made once. PatchfemError where
+    a profile does not fit the mesh.
+    """
+    gap, _, _ = asked.gap.at(pair.compliance.interface.x)
+    gap, bare = gap + pair.rise, pair.compliance
+    how = _closed_by if asked.approach is not None and (asked.rotates or asked.spring > 0) else _under
+
+    def press(worn, softening):
+        soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
+        return how(asked, soft, gap + worn)[1].sigma_n * bare.interface.weight
+
+    return press
+
+
 def _under(asked, pieces: Compliance, gap) -> tuple:
     """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
     strips)."""

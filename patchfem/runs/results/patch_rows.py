@@ -16,6 +16,8 @@ ROWS = (
     Row("tangential_stiffness", "N m-1", 0.0, "change of the friction force with the slide while all of it sticks"),
     Row("rotational_stiffness", "N m rad-1", 0.0, "change of the moment with the rotation at held approach"),
     Row("pressure_centre_lateral", "m", 1e-12, "place of the resultant of the pressure over the width, of strips"),
+    Row("worn_volume", "m3", 0.0, "volume worn off both pieces together"),
+    Row("worn_depth_max", "m", 1e-15, "largest worn depth on the interface, both pieces together"),
     Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, of strips that roll"),
 )
 TABLE = {row.name: row for row in ROWS}

@@ -55,7 +55,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         from ..patch.measures import measures
 
         found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
-        fields = _rig_fields(model, numerics, patch, raw)
+        fields = rig_fields(model, numerics, patch, raw)
     extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
@@ -127,7 +127,7 @@ def _enough(model, numerics, found, measures) -> bool:
         or found.outcome is Outcome.EXCEEDS_TRAVEL
 
 
-def _rig_fields(model, numerics, patch, raw) -> dict:
+def rig_fields(model, numerics, patch, raw) -> dict:
     """Interface frames of the last cycle."""
 
     sigma, f = patch.pressure.sigma_n, model.friction

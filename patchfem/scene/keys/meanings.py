@@ -183,10 +183,12 @@ MEANINGS = {
         "file": "record of the drive, a table with units or UFF",
     },
     "Wear": {
-        "coefficient": "volume worn per load and slip path",
-        "upper_share": "share of the wear that the upper piece bears",
-        "cycles": "number of cycles over which material is removed",
-        "jumps": "number of steps in which the cycles are taken, or chosen",
+        "coefficient": "volume worn per load and slip path, of both pieces together; form 'energy': per friction work",
+        "upper_share": "share of the worn depth that the upper piece bears",
+        "cycles": "number of cycles over which material is removed, each like the converged last cycle",
+        "jumps": "number of equal steps in which the cycles are taken; by the tolerance unless given",
+        "form": "'archard': depth by pressure and slip path; 'energy': by friction work per area",
+        "scheme": "'explicit' takes the pressure from the start of a step and is refused beyond its critical length",
     },
     "Accuracy": {
         "tolerance": "relative error that every measure is to keep to; every numerical choice follows from it",

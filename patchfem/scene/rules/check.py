@@ -14,6 +14,7 @@ from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
 from .friction import _frictions
 from .structure import check_structure
+from .wear import check_wear
 
 
 def check(draft: Draft) -> str:
@@ -21,7 +22,7 @@ def check(draft: Draft) -> str:
     for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_method, _quadrature, _sliding, check_length):
+    for rule in (_method, _quadrature, _sliding, check_length, check_wear):
         rule(draft, kind)
     return kind
 

@@ -15,7 +15,6 @@ from .draft import Draft
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
     "structure.mode.lateral": "",
-    "wear": "",
 }
 
 

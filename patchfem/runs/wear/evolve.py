@@ -1,0 +1,137 @@
+"""The patch over many cycles of wear: contact, motion and worn depth advance together, jump by jump."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ...wear.depth import critical_jump, rates, refuse_explicit
+from ...wear.jumps import Wearing, Worn, after, replayed, start
+from ..patch.press import pressed, presser
+from ..patch.values import values
+from ..rig.numerics import choose
+from .slip import Rubbed, even, frames_for, rubbed
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Moment:
+    """The interface after `cycle` cycles.
+
+    depth [m] worn so far; used [m]: slip path per cycle of the last jump; pressure [Pa]; gap [m] that remains; all
+    (m,); values: measures of patch and motion by name.
+    """
+
+    cycle: float
+    depth: np.ndarray
+    used: np.ndarray
+    pressure: np.ndarray
+    gap: np.ndarray
+    values: dict
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Evolved:
+    """A wear run: the worn patch with those on coarser meshes (None where there are none), and the way there.
+
+    state: at the end; moments: after every jump, the first before any wear; depths: worn depth (k,) [m] on the coarser
+    meshes, each on its own nodes; miss: relative error of the slip path by its frames; stopped: why the cycles ended
+    early, else "".
+    """
+
+    patch: object
+    coarse: tuple
+    state: Worn
+    moments: tuple
+    depths: tuple
+    miss: float
+    seconds: float
+    stopped: str
+
+
+class _Unbounded(Exception):
+    """The motion has no cycle to repeat."""
+
+
+class _Motion:
+    """Slip paths of a model on its worn patch, each found once; a motion that wear cannot change is found once."""
+
+    def __init__(self, model, patch):
+        self.model, self.pair = model, patch.pair
+        self.frames = frames_for(model.accuracy.tolerance)
+        self.same = even(model, model.rig is not None and choose(model).per_point)
+        self.last: Rubbed | None = None
+
+    def __call__(self, worn) -> np.ndarray:
+        if self.last is None or not self.same:
+            found = rubbed(self.model, pressed(self.model.patch, self.pair, worn), self.frames)
+            if found.outcome is not None:
+                raise _Unbounded(found.outcome.sentence)
+            self.last = found
+        return self.last.path
+
+
+def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep=None) -> Evolved:
+    """The patch of a model with [wear] after all its cycles.
+
+    patch, coarse: the pressed patch and those on coarser meshes, new. progress: called with the share of the cycles
+    that is done. begin: (state, moments) of an interrupted run; keep(state, moments): called after every jump.
+    PatchfemError for an explicit jump beyond the critical one and for a slide in two directions.
+    """
+    if model.slide is not None and model.slide.across is not None:
+        raise PatchfemError("beside a slide in two directions: leave out [wear] or the lateral column; not yet built",
+                            "wear")
+    clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
+    asked = Wearing(presser(model.patch, patch.pair), motion, patch.pieces.interface.weight, wear.coefficient,
+                    wear.cycles, wear.explicit)
+    try:
+        state, moments = begin if begin is not None else _first(model, patch, asked, motion)
+    except _Unbounded as why:
+        return Evolved(patch, tuple(coarse), None, (), (), 0.0, perf_counter() - clock, f"nothing was worn: {why}")
+    while state.cycle < wear.cycles:
+        try:
+            state = after(asked, state, model.accuracy.tolerance, wear.jumps)
+        except _Unbounded as why:
+            stopped = f"wear was followed to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
+            break
+        patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
+        moments = (*moments, _moment(patch, state, motion))
+        if keep is not None:
+            keep(state, moments)
+        if progress is not None:
+            progress(state.cycle / wear.cycles)
+    others = [one for one in coarse if one is not None]
+    depths = tuple(_on(model, patch, other, moments) for other in others)
+    worn = [pressed(model.patch, other.pair, frozen_array(depth)) for other, depth in zip(others, depths)]
+    return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths,
+                   0.0 if motion.last is None else motion.last.miss, perf_counter() - clock, stopped)
+
+
+def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
+    """(state, moments) before any wear; an explicit jump that is too long is refused here."""
+    state = start(asked)
+    if asked.explicit:
+        refuse_explicit(asked.cycles / model.wear.jumps, _critical(model, patch, state))
+    return state, (_moment(patch, state, motion),)
+
+
+def _moment(patch, state: Worn, motion: _Motion) -> Moment:
+    area = patch.pieces.interface.weight
+    worn = {"worn_volume": float(state.depth @ area), "worn_depth_max": float(state.depth.max(initial=0.0))}
+    moved = {} if motion.last is None else motion.last.values
+    return Moment(state.cycle, state.depth, state.used, patch.pressure.sigma_n, patch.pressure.gap,
+                  values(patch) | moved | worn)
+
+
+def _on(model, patch, other, moments) -> np.ndarray:
+    """Worn depth on a coarser mesh by the same jumps and slip paths."""
+    legs = [(two.cycle - one.cycle, np.interp(other.x, patch.x, two.used)) for one, two in pairwise(moments)]
+    return replayed(presser(model.patch, other.pair), other.pieces.interface.weight, model.wear.coefficient, legs)
+
+
+def _critical(model, patch, state: Worn) -> float:
+    """Longest stable explicit jump [cycles] on the new patch."""
+    asked, rate = model.patch, rates(model.wear.coefficient, state.path, patch.pieces.interface.weight)
+    held = "approach" if asked.approach is not None else "moment" if asked.rotates else "load"
+    return critical_jump(patch.pieces.normal, rate, patch.active, held, patch.x)

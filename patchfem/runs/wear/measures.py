@@ -1,0 +1,116 @@
+"""What was worn, as measures with their errors, and its way there as arrays over the cycles."""
+
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core import Measure
+from ..patch.measures import remainder
+from ..results.patch_rows import TABLE
+from .slip import rubbed
+
+FRAMES = 24  # of the interface on the way
+HOLDER = {"closing": "approach", "rotation": "rotation"}
+
+
+def worn(result, found, estimate: bool = True):
+    """The Result of a run on the worn patch with what was worn; found: the `Evolved`, None for one point."""
+    model = result.plan.model
+    if found is None:
+        return replace(result, measures=result.measures | of_point(model, result.measures, estimate))
+    seconds = result.seconds | {"wear": found.seconds}
+    warnings = [*result.warnings, *([found.stopped] if found.stopped else [])]
+    if found.state is None:
+        return replace(result, seconds=seconds, warnings=warnings)
+    return replace(result, measures=result.measures | of_patch(found, result.measures, estimate),
+                   fields=frames(found, result.fields, period_of(model, result)), seconds=seconds,
+                   warnings=[*warnings, *_deep(model, found)], extra=result.extra | {"wear": history(found)})
+
+
+def period_of(model, result) -> float:
+    """Length of one cycle of wear [s]: of the drive, of the slide, of the whole path where it does not repeat."""
+    if model.rig is not None:
+        return model.rig.drive.period
+    return model.slide.period or float(result.response.time[-1])
+
+
+def _deep(model, found) -> list:
+    """Warnings of a worn depth that the pieces as meshed no longer stand for."""
+    depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
+    for share, piece, name in ((model.wear.upper_share, asked.upper, "upper"),
+                               (1 - model.wear.upper_share, asked.lower, "lower")):
+        if piece.coating is not None and share * depth > piece.thickness:
+            out.append(f"the coating of the {name} piece, {piece.thickness:.3g} m, is worn through: it lost up to "
+                       f"{share * depth:.3g} m; from there on the substrate would rub")
+        elif share * depth > 0.2 * (piece.thickness or piece.height):
+            out.append(f"the {name} piece lost up to {share * depth:.3g} m, more than 0.2 of its "
+                       f"{'coating' if piece.coating is not None else 'height'}: its stiffness is still that of the "
+                       "unworn piece")
+    return out
+
+
+def slip_miss(measures: dict) -> float:
+    """Relative error of the slip of a run: that of its slip amplitude, of its displacement where it has none."""
+    for name in ("slip_amplitude", "relative_displacement_amplitude"):
+        found = measures.get(name)
+        if found is not None and found.value and found.error is not None:
+            return abs(found.error / found.value)
+    return 0.0
+
+
+def of_patch(found, motion: dict, estimate: bool = True) -> dict:
+    """worn_volume and worn_depth_max of an `Evolved`; motion: measures of the run on the worn patch."""
+    state, area = found.state, found.patch.pieces.interface.weight
+    share = found.miss + slip_miss(motion)
+    values, *others = [{"worn_volume": float(depth @ weight), "worn_depth_max": float(depth.max(initial=0.0))}
+                       for depth, weight in [(state.depth, area), *((depth, one.pieces.interface.weight)
+                                             for one, depth in zip(found.coarse, found.depths))]]
+    jumps = {"worn_volume": float(np.abs(state.depth - state.rough) @ area) + state.strayed * float(area.sum()),
+             "worn_depth_max": state.error}
+    out = {}
+    for name, value in values.items():
+        error = None
+        if others and estimate:
+            steps = [one[name] - two[name] for one, two in zip([values, *others], others)]
+            error = jumps[name] + share * value + 3 * remainder(*(*steps, 0.0)[:2]) + 1e-12 * value
+        out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
+    return out
+
+
+def of_point(model, measures: dict, estimate: bool = True) -> dict:
+    """worn_volume of one point under [normal]: coefficient times load times slip path, over all cycles."""
+    found, wear = rubbed(model, None, 0), model.wear
+    value = wear.coefficient * model.point.load * float(found.path[0]) * wear.cycles
+    error = (slip_miss(measures) + 1e-12) * value if estimate else None
+    return {"worn_volume": Measure(value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor)}
+
+
+def frames(found, fields: dict, period: float) -> dict:
+    """Fields (frame, x) of the way and of the last cycle: states after some of the jumps first, then the motion.
+
+    The time of a state is its cycle times the period [s], the last cycle follows on.
+    """
+    pick = np.unique(np.linspace(0, len(found.moments) - 1, FRAMES).round().astype(int))
+    shown = [found.moments[k] for k in pick[:-1]] if len(pick) > 1 else []
+    count, m = len(shown), found.patch.x.size
+    depth = np.repeat(found.state.depth[None], len(fields["time"]), axis=0)
+    states = {"time": np.array([one.cycle for one in shown]) * period,
+              "normal_stress": np.array([one.pressure for one in shown]).reshape(count, m),
+              "gap": np.array([one.gap for one in shown]).reshape(count, m),
+              "status": np.array([one.pressure > 0 for one in shown], np.int8).reshape(count, m),
+              "worn_depth": np.array([one.depth for one in shown]).reshape(count, m)}
+    moving = fields | {f"holder_{name}": np.full(len(fields["time"]), getattr(found.patch.pressure, of))
+                       for name, of in HOLDER.items()}
+    states |= {f"holder_{name}": np.array([one.values[of] for one in shown]) for name, of in HOLDER.items()}
+    moving |= {"time": fields["time"] + found.state.cycle * period, "worn_depth": depth}
+    return {name: np.concatenate([states.get(name, np.zeros((count, *np.shape(values)[1:]))), values])
+            for name, values in moving.items()}
+
+
+def history(found) -> dict:
+    """Measures over the cycles: name -> (j,), with `cycle`, of every name that all moments have."""
+    moments = found.moments
+    names = [name for name in moments[-1].values if all(name in one.values for one in moments)]
+    return {"cycle": np.array([one.cycle for one in moments])} | \
+        {name: np.array([one.values[name] for one in moments], float) for name in names}

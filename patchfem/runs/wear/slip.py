@@ -1,0 +1,110 @@
+"""Slip path of every interface point in one cycle of a converged bench or rig."""
+
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import Measure, Outcome
+from ...response.outcome import settle
+from ..bench import bench
+from ..rig.engines import ENGINES
+from ..rig.numerics import choose
+from ..rig.rig import rig_fields
+
+UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.NOT_CONVERGED)
+LEAST_FRAMES, MOST_FRAMES = 64, 800
+
+
+class Rubbed(NamedTuple):
+    """What one cycle of a motion does to the interface.
+
+    path (m,) [m]: slip path of each node, or with form 'energy' its friction work per area over its pressure; miss: its
+    relative error by the frames it is read from; values: measures of the motion; outcome: why no cycle repeats, else
+    None.
+    """
+
+    path: np.ndarray
+    miss: float
+    values: dict
+    outcome: Outcome | None
+
+
+def frames_for(tolerance: float) -> int:
+    """Frames of a cycle from which its slip path has an error of a tenth of the tolerance.
+
+    A reversal between two of k frames of a sine hides up to (pi/k)^2/2 of the amplitude.
+    """
+    return int(np.clip(2 * ceil(np.pi / sqrt(0.8 * tolerance)), LEAST_FRAMES, MOST_FRAMES))
+
+
+def even(model, per_point: bool = False) -> bool:
+    """Whether every point of the patch slides alike, so that wear does not change the motion."""
+    return not model.soft and not per_point and model.side == "upper"
+
+
+def rubbed(model, patch, frames: int) -> Rubbed:
+    """One converged cycle of a model on a patch; frames: how many of the interface it is read from.
+
+    patch None: one point under [normal], whose path is weighted with its load where that changes.
+    """
+    return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
+
+
+def _bench(model, patch, frames: int) -> Rubbed:
+    cycles = max(1, round(model.slide.cycles))
+    steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
+    shaped = patch is not None and not even(model)
+    found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
+    if shaped:
+        last = found.frames >= found.first
+        local, tau = found.local[last], found.tau[last]
+        if found.first == 0:
+            local, tau = (np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau))
+        return _read(model, patch, local, tau, False, found.values, None)
+    return _alike(model, patch, found.slip[found.first:], found.force[found.first:], found.load[found.first:],
+                  found.values, None)
+
+
+def _rig(model, patch, frames: int) -> Rubbed:
+    numerics = choose(model)
+    shaped = patch is not None and not even(model, numerics.per_point)
+    found = ENGINES[numerics.engine].run(model, numerics, patch, frames if shaped else 0, None, None)
+    amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
+    ended, _ = settle(found, {"relative_displacement_amplitude": amplitude}, model.accuracy.tolerance, model.rig.drive)
+    outcome = ended if ended in UNBOUNDED else None
+    if shaped:
+        fields = rig_fields(model, numerics, patch, found)
+        return _read(model, patch, fields["slip"][1:], fields["shear_stress"][1:], True, found.values, outcome)
+    window = found.window
+    last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
+    load = np.full(window.time.size, patch.pressure.load if patch is not None else model.point.load)
+    return _alike(model, patch, window.slip[last], window.force[last], load[last], found.values, outcome)
+
+
+def _alike(model, patch, slip, force, load, values: dict, outcome) -> Rubbed:
+    """The path of a slide that is the same at every point, from its samples (k,)."""
+    weight = np.abs(force) if model.wear.energy else load  # friction opposes the slip, also where a step reverses it
+    path = float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2)) / load[0] if load[0] > 0 else 0.0
+    return Rubbed(np.full(1 if patch is None else patch.x.size, path), 0.0, values, outcome)
+
+
+def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:
+    """The path of every node from frames (f, m) of local slip [m] and shear stress [Pa]; closed: the last frame is
+    followed by the first."""
+    path = _path(model, patch, local, tau, closed)
+    coarse = _path(model, patch, local[::2], tau[::2], closed)
+    total = path @ patch.pressure.sigma_n
+    miss = abs(total - coarse @ patch.pressure.sigma_n) / 3 / total if total > 0 else 0.0
+    return Rubbed(path, float(miss), values, outcome)
+
+
+def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
+    if closed:
+        local, tau = (np.concatenate([part[-1:], part]) for part in (local, tau))
+    steps = np.abs(np.diff(local, axis=0))
+    if not model.wear.energy:
+        return steps.sum(axis=0)
+    sigma = patch.pressure.sigma_n
+    work = np.sum(steps * (np.abs(tau[1:]) + np.abs(tau[:-1])) / 2, axis=0)
+    return np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)

@@ -1,0 +1,171 @@
+"""Scenes with [wear]: volumes in closed form, the patch after wear, shakedown, what is refused and what is written."""
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli, loaded
+from pieces import bare, refined_middle
+from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE, mistakes, only
+
+import patchfem as pf
+from patchfem.closed_forms import hertz_half_width, hertz_peak
+from patchfem.contact.unilateral import solve_forces
+from patchfem.core import Compliance, Interface
+from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.scene.scene import loads
+from patchfem.slip.partial_slip import Step, advance, operators_of, start
+from patchfem.wear.jumps import Wearing, after
+from patchfem.wear.jumps import start as unworn
+
+TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
+SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
+WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
+LOAD, KAPPA, CYCLES = 26 * 4.4482216152605, 1e-14, 135723
+SOFT_RIG = TILTED + SHEAR + NONLOCAL + MODE + \
+    '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
+
+
+def ran(text, **sets):
+    return pf.run(loads(text, "wear.toml"), **sets)
+
+
+def test_exact_bench_volume_is_coefficient_load_path():
+    found = ran(TILTED + COULOMB + SINE + WEAR)
+    volume = found.measures["worn_volume"]
+    assert volume.value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
+    assert 0 < volume.error <= 1e-3 * volume.value
+    new = ran(TILTED + COULOMB + SINE)
+    assert found.measures["contact_fraction"].value > 1.4 * new.measures["contact_fraction"].value
+    assert found.measures["pressure_peak"].value < 0.6 * new.measures["pressure_peak"].value
+    assert found.measures["loop_area"].value == pytest.approx(new.measures["loop_area"].value, rel=1e-12)
+
+
+@pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
+def test_exact_one_point_wears_by_its_load_and_path(motion):
+    found = ran(POINT + COULOMB + motion + WEAR)
+    amplitude = found.measures["slip_amplitude"].value
+    assert found.measures["worn_volume"].value == pytest.approx(KAPPA * LOAD * 4 * amplitude * CYCLES, rel=2e-3)
+    assert "worn_depth_max" not in found.measures
+
+
+def test_exact_energy_form_is_archard_with_coefficient_times_friction():
+    one = ran(TILTED + COULOMB + SINE + WEAR)
+    two = ran(TILTED + COULOMB + SINE + WEAR.replace('1e-14', repr(KAPPA / 0.3)) + 'form = "energy"\n')
+    for name in ("worn_volume", "worn_depth_max", "pressure_peak"):
+        assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
+
+
+def test_always_a_rig_under_partial_slip_wears_where_it_slips():
+    """Slip paths of a march with shear modes: local, found anew after every jump, less than the holder's everywhere."""
+    found = ran(SOFT_RIG + WEAR, **{"accuracy.tolerance": "1e-2"})
+    history, amplitude = found.extra["wear"], found.measures["slip_amplitude"].value
+    volume = found.measures["worn_volume"]
+    assert 0.9 < volume.value / (KAPPA * LOAD * 4 * amplitude * CYCLES) < 1.0
+    assert (np.diff(history["contact_fraction"]) >= -1e-12).all() and (np.diff(history["worn_volume"]) > 0).all()
+    assert history["relative_displacement_amplitude"][0] != history["relative_displacement_amplitude"][-1]
+    finer = ran(SOFT_RIG + WEAR, **{"accuracy.tolerance": "3e-3"})
+    for name in ("worn_volume", "worn_depth_max"):
+        one, two = found.measures[name], finer.measures[name]
+        assert abs(one.value - two.value) <= one.error + two.error
+    assert len(finer.extra["wear"]["cycle"]) >= len(history["cycle"])
+
+
+def test_exact_files_hold_the_way_of_the_wear(tmp_path):
+    scene = tmp_path / "worn.toml"
+    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
+    with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
+        load = (data.weight * data.normal_stress).sum("x")
+        assert load.values == pytest.approx(LOAD, rel=1e-10)
+        depth = data.worn_depth.values
+        assert (np.diff(depth, axis=0) >= -1e-20).all() and not depth[0].any() and depth[-1].max() > 0
+        volume = data.wear_worn_volume.values
+        assert volume == pytest.approx(KAPPA * LOAD * 40e-6 * data.wear_cycle.values, rel=1e-12)
+        assert data.wear_cycle.values[[0, -1]].tolist() == [0.0, CYCLES]
+        assert (np.diff(data.frame_time.values) > 0).all()
+
+
+def test_exact_bodies_close_over_the_worn_gap_in_every_frame(tmp_path):
+    """What separates both interfaces changes from frame to frame as the gap that remains, less what was worn off."""
+    scene = tmp_path / "worn.toml"
+    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
+    with h5py.File(tmp_path / "out" / "fields.vtkhdf") as file, \
+            xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
+        root, (frames, nodes) = file["VTKHDF"], data.gap.shape
+        points = root["Points"][: root["NumberOfPoints"][0]]
+        moves = root["PointData/displacement"][:].reshape(frames, len(points), 3)[..., 1]
+        flat = np.flatnonzero(np.abs(points[:, 1]) < 1e-12)
+        low, high, _ = np.split(flat, 3)  # lower body, upper body, the line between them
+        assert low.size == nodes and points[: high[0], 1].min() < 0 == points[: high[0], 1].max()
+        apart, expected = moves[:, high] - moves[:, low], data.gap.values - data.worn_depth.values
+        change = np.ptp(expected, axis=0).max()
+        assert np.abs((apart - apart[0]) - (expected - expected[0])).max() < 1e-5 * change
+
+
+def test_exact_shakedown_of_a_crown_under_a_tangential_force():
+    """Cattaneo-Mindlin with Q = 0.6 mu P: the stick zone c = a0 sqrt(0.4) stays, all pressure moves into it, and its
+    middle tends to c/a0 + 0.6 P/(pi c p0) of the Hertz peak: Hertz under 0.4 P and a flat punch under the rest.
+    Normal and tangential compliance are alike, as of two half-planes (Ciavarella and Hills, 1999)."""
+    width, radius, line, mu, young, cells = 10e-3, 0.05, 1e5, 0.5, 121e9, 24
+    half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
+    peak, stick = hertz_peak(line, radius, young / (1 - 0.32**2) / 2), half * np.sqrt(0.4)
+    grid = refined_middle(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
+    nn, _, _ = interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32))))
+    x, area, gap, load = grid.x, grid.tributary() * width, grid.x**2 / 2 / radius, line * width
+    pair = Compliance(Interface(x, area, width), 2 * nn / width, 2 * nn / width)
+    operators = operators_of(pair)
+
+    def press(worn, softening):
+        return solve_forces(pair.normal + np.diag(softening), x, gap + worn, np.array([load]))[0]
+
+    def path(worn):
+        state = advance(start(operators, gap + worn), operators, Step(load=load, shear=0.0), mu)
+        state = advance(state, operators, Step(load=load, shear=0.6 * mu * load), mu)
+        return 4 * np.abs(state.slip) * state.active
+
+    asked = Wearing(press, path, area, 1e-13, 1e9)
+    state, count = unworn(asked), 0
+    at_first = state.path @ state.force
+    while state.cycle < asked.cycles:
+        state, count = after(asked, state, 1e-2), count + 1
+    inside = np.abs(x) < stick
+    assert count < 60
+    assert (state.path[inside] == 0).all() and not state.depth[inside].any()
+    assert state.force[inside].sum() == pytest.approx(load, rel=1e-9)
+    assert state.path @ state.force < 1e-9 * at_first
+    found = (state.force / area)[np.argmin(np.abs(x))] / peak
+    assert found == pytest.approx(stick / half + 0.6 * line / (np.pi * stick * peak), abs=2e-3)
+
+
+def test_refuses_what_wear_does_not_go_with():
+    text = TILTED + COULOMB + SINE + WEAR
+    assert "scheme 'explicit' needs" in only(text + 'scheme = "explicit"\n')
+    assert any("contact.strips" in line for line in mistakes(text + "[contact.strips]\ncount = 4\n"))
+    assert any("wear" in line for line in mistakes(TILTED + WEAR))
+    free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
+    assert "steady motion" in only(free)
+    with pytest.raises(pf.PatchfemError, match=r"wear\.scheme: .*longer than the critical"):
+        ran(text + 'scheme = "explicit"\njumps = 2\n')
+
+
+def test_exact_explicit_jumps_below_the_critical_one_agree_with_implicit_ones():
+    text = TILTED + COULOMB + SINE + WEAR.replace("135723", "2000")
+    one, two = ran(text), ran(text + 'scheme = "explicit"\njumps = 40\n')
+    assert two.measures["worn_depth_max"].value == pytest.approx(one.measures["worn_depth_max"].value, rel=2e-2)
+
+
+def test_always_a_motion_without_bounds_wears_nothing():
+    text = TILTED + COULOMB + MODE.replace("0.003", "0.0") + \
+        '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "9 g"\ncycles = 100\n' + WEAR
+    found = ran(text)
+    assert found.outcome == "grows" and "worn_volume" not in found.measures
+    assert any("nothing was worn" in line for line in found.warnings)
+
+
+def test_exact_a_scene_without_wear_imports_nothing_of_it(tmp_path):
+    scene = tmp_path / "new.toml"
+    scene.write_text(TILTED + COULOMB + SINE)
+    code = "import json, sys, patchfem as pf; pf.run(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
+    assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear"))}
