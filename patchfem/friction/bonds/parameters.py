@@ -33,7 +33,7 @@ class Bonds:
 
     @property
     def grows(self) -> bool:
-        """Whether the bond length evolves."""
+        """Whether the bond length evolves by eq. 2.10; without rates it stays at eps_0."""
         return self.rest_growth is not None
 
 
@@ -85,6 +85,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> 
 
     if max(abs(v0), abs(v1)) < floor:
         rest = law.rest_growth * dt / floor
+    # closer speeds: their difference loses its digits, and the mean speed is as good
     elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
         rest = law.rest_growth * dt * (primitive(v1) - primitive(v0)) / (v1 - v0)
     else:
