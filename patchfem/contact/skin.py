@@ -61,7 +61,7 @@ class Control(NamedTuple):
     scale: np.ndarray
 
     def lack(self, force, q) -> np.ndarray:
-        """Load that is missing in each balance (r,) [N]."""
+        """Load that is missing in each balance, target - R^T f - H q (r,) [N]; force (m,) [N], q (r,) [m]."""
         return self.target - self.rigid.T @ force - self.hold @ q
 
 
