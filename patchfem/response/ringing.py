@@ -147,7 +147,7 @@ def _grown(time, value, forced, rest) -> tuple | None:
         tries = [_refined(time, value, forced, np.append(poles, start))
                  for start in _starts(time, value, forced, poles, rest)]
         new = min(tries, key=lambda one: one[2])
-        if not np.isfinite(new[2]) or new[2] > last / 2:
+        if not np.isfinite(new[2]) or new[2] > last / 2:  # less gain is noise
             break
         best, last = new, new[2]
         rest = _share(time, value, forced, best[0])[0]
