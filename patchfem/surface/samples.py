@@ -40,7 +40,7 @@ def _evened(path, x, factor: float) -> tuple:
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
     """
-    if x.size < 10:
+    if x.size < 10:  # too few to judge the spacing by
         return x, ()
     count = np.arange(x.size) - (x.size - 1) / 2
     step = float(count @ x / (count @ count))
