@@ -49,7 +49,11 @@ class Patch:
 
 
 def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
-    """Assemble, condense and press the pieces of a `PatchModel`: bodies of `bodies_of`, the upper None where alike."""
+    """Assemble, condense and press the pieces of a `PatchModel`.
+
+    grid, upper_grid: bodies of `bodies_of`, the upper None where it is alike; fresh: operators kept on disk are not
+    used. Refusals as in `pressed` and of the contact.
+    """
     return pressed(asked, condensed(asked, grid, upper_grid, fresh))
 
 
