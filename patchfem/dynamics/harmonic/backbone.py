@@ -32,7 +32,7 @@ def stuck_mode(modes: ModalBasis, rows, stiffness, mode: int) -> tuple:
     k = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
     values, vectors = np.linalg.eigh(k)
     shape = vectors[:, mode]
-    if abs(shape[mode]) < 1e-6:
+    if abs(shape[mode]) < 1e-6:  # modes have changed places: take the one with most of this coordinate
         shape = vectors[:, int(np.argmax(np.abs(vectors[mode])))]
         mode_value = values[int(np.argmax(np.abs(vectors[mode])))]
         return float(np.sqrt(mode_value)), shape / shape[mode]

@@ -108,6 +108,6 @@ def is_stable(found) -> bool:
 def kind_of_loss(found) -> str:
     """How a motion that is not stable leaves: "fold" or "branch" (through +1), "doubling" (through -1), "torus"."""
     worst = found[0]
-    if abs(worst.imag) > 1e-6 * abs(worst):
+    if abs(worst.imag) > 1e-6 * abs(worst):  # a pair off the real axis, beyond round-off
         return "torus"
     return "doubling" if worst.real < 0 else "fold"

@@ -110,7 +110,7 @@ class Balance:
     def __init__(self, modes: ModalBasis, rows, contact):
         rows = np.asarray(rows, float)
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
-        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
+        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0  # round-off of rows that depend on others
         if rank == 0:
             raise PatchfemError("structure.mode.slide: no mode moves the interface, so there is nothing to balance; "
                                 "give one a slide")
@@ -212,6 +212,7 @@ class Balance:
         push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (self.modes.mass * omega**2)
         for part, own in ((slice(0, low), size), (slice(low, None), push)):
             scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
+            # a true root leaves round-off, a minimum of the residual more
             if float(np.linalg.norm(left[part])) > 1e-7 * scale:
                 return False
         return True
@@ -246,7 +247,7 @@ def solve_linear(matrix):
     """A function b -> matrix^-1 b; least squares where the matrix (N, N) is singular (a mean that nothing holds)."""
     factors, pivots, _ = dgetrf(matrix)
     sizes = np.abs(np.diag(factors))
-    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():
+    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():  # else singular to round-off
         return lambda b: dgetrs(factors, pivots, b)[0]
     if not np.isfinite(matrix).all():
         return lambda b: np.full(b.shape, np.nan)
@@ -276,6 +277,8 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal
             left = float(np.linalg.norm(solve(there.residual)))
             if best is None or left < best[0]:
                 best = (left, tried, there)
+            # natural monotonicity (Deuflhard): the next simplified step is shorter; a tiny step is taken as
+            # it is
             if left <= (1 - share / 4) * length or share < 0.02 or not length > 1e-8 * size:
                 break
             share /= 2
