@@ -133,7 +133,7 @@ def _write_netcdf(result: Result, path: Path) -> None:
 
 
 def dataset(result: Result):
-    """The xarray.Dataset of result.nc: histories, interface frames, levels, events, curve, provenance."""
+    """The xarray.Dataset of result.nc in SI: histories, interface frames, levels, events, curve, provenance."""
     histories, modal = _histories(result)
     patch, extra = result.patch, result.extra
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)

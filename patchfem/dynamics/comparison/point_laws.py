@@ -100,7 +100,7 @@ def kernels_of(laws) -> tuple:
 
 
 def loops(laws):
-    """The compiled loops of the comparison methods for these laws."""
+    """The compiled loops of the comparison methods for these laws, an instance of `comparison_kernels`."""
     smooth = tuple(name for name in kernels_of(laws) if name != COULOMB)
     law = law_of(smooth or (COULOMB,), ("at_end",))
     return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})

@@ -152,7 +152,11 @@ def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
 
 
 def shear_of(patch: Patch, law, count: int | None, tolerance: float):
-    """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for."""
+    """ShearModes of the pressed patch for a bond law.
+
+    law: its Bonds; count: how many, None: as many as a tenth of the tolerance asks for. PatchfemError where a weakening
+    patch could jump by itself.
+    """
     limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:

@@ -53,7 +53,10 @@ def _element(one: Rubbing, load: float, speed: float) -> Element:
 
 
 def contact_model(model: Model, numerics: Numerics, patch):
-    """The ContactModel of the one interface of a rig; patch: the solved Patch or None under [normal]."""
+    """The ContactModel of the one interface of a rig, by its law, load and what gives way.
+
+    patch: the solved Patch or None under [normal]. PatchfemError for what is not built.
+    """
     f, soft = model.friction, model.soft
     if f is None:
         return models.coulomb_model(0.0, 0.0)

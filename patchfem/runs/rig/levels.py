@@ -28,7 +28,10 @@ def rows(sizes, marks, values, held: float | None) -> tuple:
 
 
 def with_errors(fine, half, quarter, steps: int) -> tuple:
-    """The levels with the error of the time step as `response.errors.step_error` has it."""
+    """The levels with the error of the time step, from runs at `steps`, half and a quarter of them per cycle.
+
+    The rule is that of `response.errors.step_error`.
+    """
     return tuple(replace(a, errors=step_error(a.values, b.values, c.values, steps))
                  for a, b, c in zip(fine, half, quarter))
 
