@@ -92,7 +92,7 @@ def _bordered(c, gap, rigid, target, spring, active) -> tuple:
 def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
     seen, bend, least = set(), np.abs(c).max(), 1 if spring.any() else target.size
-    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)
+    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)  # round-off of an opening
     for count in range(1, limit + 1):
         if active.sum() < least:
             active = np.ones(gap.shape, bool)

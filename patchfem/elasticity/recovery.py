@@ -118,6 +118,7 @@ def _planes(near, at, middle) -> tuple:
     mean = gram[:, 0, 1:] / counts[:, None]
     apart = offset - mean[row]
     spread = np.add.reduceat(apart[:, :, None] * apart[:, None], starts)
+    # cells in one line fix no slope across it: the pseudo-inverse leaves that one out
     slope = np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=1e-8, hermitian=True), -mean)
     share = 1 / counts[row] + np.einsum("ni,ni->n", apart, slope[row])
     return csr_matrix((share, near.indices, near.indptr), shape=near.shape), thin

@@ -206,7 +206,7 @@ def _one_by_one(block, reference, limit, total, slide) -> tuple:
             if total is not None:
                 motion = (total - wanted.sum() - both[:, 0].sum()) / both[:, 1].sum()
             wanted[stuck] = both[:, 0] + motion * both[:, 1]
-        over = stuck & (np.abs(wanted) > limit * (1 + 1e-13) + ROUND * limit.max())
+        over = stuck & (np.abs(wanted) > limit * (1 + 1e-13) + ROUND * limit.max())  # beyond round-off
         if over.any():
             way = np.where(over, wanted - force, 1.0)
             share = np.where(over, (np.sign(wanted) * limit - force) / np.where(way == 0, 1.0, way), np.inf)

@@ -175,4 +175,5 @@ def _signs(phi, output) -> np.ndarray:
     there = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
     size = np.abs(output) @ np.abs(phi)
+    # at a node of the shape the output is round-off
     return np.where(np.where(np.abs(there) > 1e-9 * size, there, largest) < 0, -1.0, 1.0)

@@ -191,7 +191,7 @@ class Quadrature:
         old, now = (state.damage, state.now[2]) if stretched else (state.path / self.law.length,
                                                                    state.now[1] / self.law.length)
         first = int(np.searchsorted(old, now - reach))
-        if first < max(64, len(state.q) // 2):
+        if first < max(64, len(state.q) // 2):  # copying the rest is worth it only when half of it is gone
             return state
         kept = {name: getattr(state, name)[first:] for name in (*COLUMNS, "sigma")}
         return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0),
