@@ -34,7 +34,7 @@ class Cost:
 
 
 def knobs_of(model: Model) -> list:
-    """Knobs that change what a model computes."""
+    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps and its shear modes."""
     out = ["element_size"] if model.patch is not None else []
     if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
         engine = plan(model).engine
@@ -147,7 +147,7 @@ def _split_file(model: Model, level: int) -> tuple:
 
 
 def turned_by(runs: list) -> list:
-    """Measures that the knob changes at all, in the order of the runs."""
+    """Names of the measures that the knob changes at all, beyond 1e-11 of their value, in the order of the runs."""
     return [name for name, value in runs[0].values.items()
             if any(one.errors.get(name, 0.0) > 1e-11 * abs(one.values[name]) for one in runs[:-1])]
 

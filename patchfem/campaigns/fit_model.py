@@ -11,7 +11,11 @@ from ..scene.scene import Scene, SceneError, loads
 
 
 class BenchModel:
-    """The bench of a scene along the measured rows, as a function of the free values."""
+    """The bench of a scene along the measured rows, as a function of the free values; a call gives the reading (k,).
+
+    scene: with its [slide]; loop: the measured one; wanted: ranges of the free values; say: function for a line of
+    progress, or None.
+    """
 
     def __init__(self, scene: Scene, loop: Loop, wanted: list, say):
         self.scene, self.loop, self.wanted, self.say = scene, loop, wanted, say

@@ -12,14 +12,18 @@ from scipy.special import xlogy
 
 
 def positive(**values) -> None:
-    """ValueError naming the first of `values` that is not positive throughout."""
+    """Raise ValueError, naming the first of `values` that is not positive throughout; numbers or arrays by name."""
     for name, value in values.items():
         if not np.all(np.asarray(value, float) > 0):
             raise ValueError(f"{name} must be positive, got {value}")
 
 
 def combined_modulus(young, poisson, young_lower=None, poisson_lower=None) -> float:
-    """E* [Pa] of two bodies in plane strain, 1/E* = (1 - nu^2)/E of both; alike where the lower is left out."""
+    """E* [Pa] of two bodies in plane strain, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2.
+
+    young [Pa], poisson [1] of the upper body; young_lower, poisson_lower of the lower one, alike where left out.
+    ValueError unless both moduli are positive.
+    """
     young_lower = young if young_lower is None else young_lower
     poisson_lower = poisson if poisson_lower is None else poisson_lower
     positive(young=young, young_lower=young_lower)
@@ -37,7 +41,7 @@ def hertz_half_width(line_load, radius, modulus):
 
 
 def hertz_peak(line_load, radius, modulus):
-    """Largest pressure [Pa] of the line contact, 2 P/(pi a); arguments as in `hertz_half_width`."""
+    """Largest pressure [Pa] of the line contact, p_0 = 2 P/(pi a) (Hertz 1882); arguments as in `hertz_half_width`."""
     return 2 * line_load / (np.pi * hertz_half_width(line_load, radius, modulus))
 
 
@@ -183,13 +187,19 @@ def westergaard_pressure(x, mean, wavelength, amplitude, modulus):
 
 
 def westergaard_approach(mean, wavelength, amplitude, modulus):
-    """Mean gap closed [m] by the mean pressure: A f (1 - ln f), f = p/p*, and A from full contact on."""
+    """Mean gap closed [m] by the mean pressure: A f (1 - ln f), f = p/p*, and A from full contact on.
+
+    Arguments and refusals as in `westergaard_half_width`.
+    """
     share = np.minimum(_wave_share(mean, wavelength, amplitude, modulus), 1)
     return amplitude * share * (1 - np.log(share))
 
 
 def westergaard_stiffness(mean, wavelength, amplitude, modulus):
-    """Slope dp/d(mean gap closed) [Pa/m]: pi E*/(lambda ln(p*/p)), infinite from full contact on."""
+    """Slope dp/d(mean gap closed) [Pa/m]: pi E*/(lambda ln(p*/p)), infinite from full contact on.
+
+    Arguments and refusals as in `westergaard_half_width`.
+    """
     share = np.minimum(_wave_share(mean, wavelength, amplitude, modulus), 1)
     with np.errstate(divide="ignore"):
         return np.pi * modulus / (wavelength * np.log(1 / share))

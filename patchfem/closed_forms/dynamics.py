@@ -23,7 +23,10 @@ def decay_half_cycles(start, friction) -> int:
 
 
 def decay_rest(start, friction, omega) -> tuple:
-    """Time [s] and place [m] at which a Coulomb oscillator released at `start` comes to rest; arguments of `decay`."""
+    """Time [s] and place [m] at which a Coulomb oscillator released at `start` comes to rest (eq. 3.11).
+
+    Arguments and refusals as in `decay`.
+    """
     positive(omega=omega)
     count = decay_half_cycles(start, friction)
     sign = 1.0 if start >= 0 else -1.0
@@ -47,7 +50,7 @@ def decay(time, start, friction, omega):
 
 
 def bounded_input(friction):
-    """Largest base acceleration that friction alone keeps bounded at resonance: a = (4/pi) f (same unit as f)."""
+    """Largest base acceleration that friction alone keeps bounded at resonance, a = (4/pi) f, in the unit of f."""
     return friction / COULOMB_RESONANCE
 
 

@@ -175,5 +175,8 @@ def jenkins_loop(amplitude, length, limit=1.0):
 
 
 def coulomb_loop_area(amplitude, limit=1.0):
-    """Area [J] of the loop of rigid Coulomb friction, 4 limit A."""
+    """Area [J] of the loop of rigid Coulomb friction, 4 limit A (eq. 2.1).
+
+    amplitude A [m], half the range of the slide; limit mu N [N].
+    """
     return 4 * limit * np.asarray(amplitude, float)

@@ -35,7 +35,7 @@ class Ask(NamedTuple):
 
     @property
     def least(self) -> int:
-        """Fewest touching nodes that determine the rigid motion."""
+        """Fewest touching nodes that determine the rigid motion: 2 where the rotation is free and unsprung, else 1."""
         return 2 if self.moment is not None and self.spring == 0 else 1
 
 
@@ -171,7 +171,7 @@ def supported(ask: Ask, active: np.ndarray) -> np.ndarray:
 
 
 def flaw(found: Found) -> float:
-    """Largest relative violation of contact: openings and overlaps over their scale, pulls over the load."""
+    """Largest relative violation of contact [1]: openings and overlaps over their scale, pulls over the load."""
     share = found.opening / np.where(found.scale > 0, found.scale, 1.0)
     inside = np.abs(share[found.force != 0]).max(initial=0.0)
     pull = -found.force.min() / max(found.force.sum(), 1e-300)
@@ -179,7 +179,11 @@ def flaw(found: Found) -> float:
 
 
 def polished(operator, ask, active, found: Found) -> Found:
-    """The answer on the same set, refined once where its openings show round-off."""
+    """The answer on the same set, refined once where its openings show round-off, if that lowers its `flaw`.
+
+    active: (m,) contact set of `found`.
+    """
+    # a tenth of the bound at which a node enters the set
     off = np.abs(found.opening[active]) > ROUND / 10 * found.scale[active]
     if not off.any():
         return found
@@ -242,7 +246,7 @@ def nested_set(operator: Operator, ask: Ask, every: int = 4) -> tuple:
     coarse = Operator(operator.part(kept))
     question = ask._replace(x=ask.x[kept], gap=ask.gap[kept])
     start, before = nested_set(coarse, question, every)
-    found, active, count = settle(coarse, question, start, 30)
+    found, active, count = settle(coarse, question, start, 30)  # a coarse answer is only a start
     touched = np.zeros(blocks, bool)
     touched[kept[active] // every] = True
     spread = np.repeat(touched, every)[:m]

@@ -35,11 +35,11 @@ class ContactSet:
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """Forces [N] on the set and gaps [m] off it at (d [m], t [rad]), (m,)."""
+        """Forces [N] on the set and gaps [m] off it, (m,), at a motion d [m], t [rad] beyond the reference."""
         return self.rows[0] + d * self.rows[1] + t * self.rows[2]
 
     def forces(self, d: float, t: float) -> np.ndarray:
-        """Nodal forces (m,) [N] at (d [m], t [rad]); round-off below zero is cut off."""
+        """Nodal forces (m,) [N], >= 0, at a motion d [m], t [rad] beyond the reference; round-off is cut off."""
         return np.where(self.on, np.maximum(self.values(d, t), 0.0), 0.0)
 
     @property
@@ -52,7 +52,10 @@ class ContactSet:
         return np.array([[dd, dt], [-dt, -tt]])
 
     def share(self, d: float, t: float, dd: float, dt: float) -> float:
-        """Share of an increment (dd, dt) from (d, t) after which the contact set changes; inf where it never does."""
+        """Share [1] of an increment after which the contact set changes, inf where it never does.
+
+        d [m], t [rad]: where the increment starts; dd [m], dt [rad]: the increment.
+        """
         here, rate = self.values(d, t), dd * self.rows[1] + dt * self.rows[2]
         falls = rate < 0
         return float((np.maximum(here[falls], 0.0) / -rate[falls]).min(initial=np.inf))
@@ -81,7 +84,10 @@ class ContactSets:
         self.reference = self.contact_set(found.on)
 
     def contact_set(self, on: np.ndarray) -> ContactSet:
-        """The contact set whose nodes `on` (m,) bool touch; made when first asked for."""
+        """The contact set whose nodes `on` (m,) bool touch, made when first asked for.
+
+        Beyond `ROOM` bytes the oldest one gives way.
+        """
         key = on.tobytes()
         if key not in self.kept:
             if len(self.kept) * 3 * on.size * 8 > ROOM:
@@ -95,7 +101,7 @@ class ContactSets:
         force = np.zeros_like(right)
         if index.size:
             low = cho_factor(self.c[np.ix_(index, index)], lower=True)
-            for _ in range(2):
+            for _ in range(2):  # the second pass is one step of iterative refinement
                 force[index] -= cho_solve(low, (right + self.c @ force)[index])
         rows = np.where(on[:, None], force, right + self.c @ force).T
         square = -(force.T @ right)
@@ -105,7 +111,12 @@ class ContactSets:
         return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
 
     def at(self, d: float, t: float, start: ContactSet | None = None) -> ContactSet:
-        """The contact set that holds at (d, t) [m, rad], searched from `start`; NotConverged where none was found."""
+        """The contact set that holds at a motion d [m], t [rad] beyond the reference.
+
+        start: set to search from, None the reference. Nodes that fail are exchanged, all of them in the first `BLOCKS`
+        sets, then the first alone, which ends for every positive definite C (Murty 1974). Behind it stands
+        `unilateral.solve_forces`. NotConverged where that misses as well. Compiled twin: `press_kernels.locate`.
+        """
         touching = self.reference if start is None else start
         for count in range(BLOCKS + 10 * self.x.size):
             value = touching.values(d, t)
@@ -120,7 +131,7 @@ class ContactSets:
             touching = self.contact_set(touching.on != fails)
         force, _, _ = solve_forces(self.c, self.x, self.opening - d + t * self.x, np.zeros(0))
         touching = self.contact_set(force > 0)
-        if self.flaw(touching, d, t) > 1e-12:
+        if self.flaw(touching, d, t) > 1e-12:  # as `unilateral.SOLVED`
             raise NotConverged("contact: no contact set fits the motion; raise the load or check the mesh")
         return touching
 
@@ -136,7 +147,10 @@ class ContactSets:
         return float(max(np.abs(opening[touching.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
 
     def resultant(self, d: float, t: float, start: ContactSet | None = None) -> tuple:
-        """Load N [N], moment M [N m] and energy [J] of the preloaded contact at (d, t)."""
+        """Load N [N], moment M [N m] and energy [J] of the preloaded contact at a motion beyond the reference.
+
+        d [m], t [rad]: the motion; start: set to search from. The energy is E - E0 - N0 d + M0 t.
+        """
         q = self.at(d, t, start).energy
         by_d, by_t = q[3] * d + q[4] * t, q[4] * d + q[5] * t
         return (float(self.load + q[1] + by_d), float(self.moment - q[2] - by_t),
@@ -148,6 +162,7 @@ class ContactSets:
         room: bytes that its contact sets may take.
         """
         m = self.x.size
+        # 25 m + 400 bytes: rows, set, polygon and names of one set
         count = int(max(16, min(room / (25 * m + 400), 100_000)))
         names = np.random.default_rng(5).integers(-2**63, 2**63, m, dtype=np.int64)
         return {"c": self.c.copy(), "x": self.x.copy(), "b": self.opening.copy(), "tableau": np.zeros((m, m + 3)),
@@ -160,12 +175,12 @@ class ContactSets:
                 "meta": np.zeros(5, np.int64), **sides(count)}
 
     def name(self, arrays: dict) -> int:
-        """64-bit name of the reference set in these arrays: the exclusive or of the names of its nodes."""
+        """64-bit name of the reference set in `arrays`: the exclusive or of the names of its nodes."""
         return int(np.bitwise_xor.reduce(arrays["node"][self.reference.on], initial=0))
 
 
 def sides(count: int) -> dict:
-    """Empty arrays for the polygons of `count` contact sets."""
+    """Empty arrays for the polygons of `count` contact sets, by their names in `press_kernels.SetArrays`."""
     return {"sides": np.zeros(count, np.int64), "edge": np.zeros((count, SIDES), np.int64),
             "beside": np.zeros((count, SIDES), np.int64), "limit": np.zeros((count, 2)),
             "corner": np.zeros((2, 3, 4 * SIDES))}

@@ -46,7 +46,7 @@ def nearest(force: np.ndarray, rigid: np.ndarray, sums: np.ndarray, limit: int =
     if not sums.size:
         return np.maximum(force, 0.0)
     most, raised = rigid.T @ rigid, force
-    most += 1e-3 * np.trace(most) * np.eye(sums.size)
+    most += 1e-3 * np.trace(most) * np.eye(sums.size)  # for motions that the nodes in force do not fix
     for _ in range(limit):
         out = np.maximum(raised, 0.0)
         lack = sums - rigid.T @ out
@@ -89,7 +89,7 @@ def gradients(operator: Operator, ask: Ask, tolerance: float = 1e-11, limit: int
     for count in range(1, limit + 1):
         sunk = bent(force)
         energy = force @ (gap + sunk / 2)
-        if energy > least + 1e-13 * np.abs(force * gap).sum() + 1e-13 * (force @ sunk):
+        if energy > least + 1e-13 * np.abs(force * gap).sum() + 1e-13 * (force @ sunk):  # 1e-13: round-off of the sums
             force = nearest(held - safe * (gap + bent(held)), rigid, sums)  # this one always falls
             keep, least = 0.0, np.inf
             continue

@@ -134,5 +134,6 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
             pressure[entering] -= step * opening[entering]
         scale = mean / pressure.mean()
         pressure *= scale
+        # carried on while the pressure moves along one direction; every 50 steps anew, as round-off adds up
         sunk = None if clipped or enters or count % 50 == 0 else (sunk - step * answer) * scale
     return pressure, float(closing), limit

@@ -29,16 +29,20 @@ class Operator:
         self.c, self.base, self.index, self.low, self.answers = c, None, None, None, {}
 
     def part(self, rows: np.ndarray) -> np.ndarray:
-        """Copy of the block of `rows` (sorted indices), C-ordered."""
+        """Copy (n, n) [m/N] of the block of `rows` (n,), sorted indices of nodes, C-ordered."""
         if rows[-1] - rows[0] == rows.size - 1:
             return self.c[rows[0]:rows[-1] + 1, rows[0]:rows[-1] + 1].copy()
         return self.c[rows[:, None], rows]
 
     def solver(self, active: np.ndarray):
-        """Function (n, k) -> (n, k) that solves with the block of the n nodes that are set in `active` (m,)."""
+        """Function (n, k) -> (n, k) that solves with the block of the n nodes that are set in `active` (m,) bool.
+
+        The factor is kept for the next set. LinAlgError where the block is not positive definite.
+        """
         index = np.flatnonzero(active)
         if self.base is not None and index.size > SMALL:
             changed = np.flatnonzero(active != self.base)
+            # a changed node costs a few solves, a new factor n^3/3: the change pays while few nodes do
             if changed.size * 12 <= index.size:
                 return self._changed(active, changed) if changed.size else self._same
         self.base, self.index, self.low, self.answers = active, index, factor(self.part(index)), {}
@@ -84,6 +88,6 @@ class Operator:
         return solve
 
     def bent(self, force: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """Displacement C f (m,) of forces that vanish outside the sorted nodes `index`."""
+        """Displacement C f (m,) [m] of forces f (m,) [N] that vanish outside the sorted nodes `index`."""
         span = slice(index[0], index[-1] + 1)
         return self.c[:, span] @ force[span]

@@ -131,7 +131,7 @@ def refine(sets):
             tableau[i, m], tableau[i, m + 1], tableau[i, m + 2] = s0, s1, s2
             left[0, i], left[1, i], left[2, i] = 0.0, 0.0, 0.0
     worst = max(off0 / top0 if top0 > 0 else 0.0, off1 / top1, off2 / top2 if top2 > 0 else 0.0)
-    for i in range(m if worst > 1e-15 else 0):
+    for i in range(m if worst > 1e-15 else 0):  # nothing to refine at round-off
         s0, s1, s2 = 0.0, 0.0, 0.0
         line = tableau[i]
         for j in range(m):
@@ -196,7 +196,11 @@ def to_wanted(sets):
 
 @njit(error_model="numpy", **LEAN)
 def build(sets, name):
-    """Work out the set `wanted` and return its slot; -1 where the compliance is not positive definite on it."""
+    """Work out the set `wanted` and return its slot; -1 where the compliance is not positive definite on it.
+
+    name: of the set. The tableau is pivoted to it, m^2 multiplications a node; where it has lost its digits it is
+    written anew and pivoted once more.
+    """
     if not to_wanted(sets) or refine(sets) > FLAW:
         renew(sets)
         if not to_wanted(sets) or refine(sets) > FLAW:
@@ -206,7 +210,7 @@ def build(sets, name):
 
 @njit(error_model="numpy", **LEAN)
 def find(sets, name):
-    """Slot of the set `wanted`; -1 where it is not kept."""
+    """Slot of the set `wanted` with this `name`; -1 where it is not kept. Equal names are told apart node by node."""
     k = sets.heads[name & (sets.heads.size - 1)]
     while k >= 0:
         if sets.names[k] == name:
@@ -223,7 +227,10 @@ def find(sets, name):
 
 @njit(error_model="numpy", fastmath=LEAST, **LEAN)
 def holds(sets, k, d, t):
-    """Whether no node of set k fails at (d, t), and the force and the gap below which a node counts as failing."""
+    """Whether no node of set k fails at (d [m], t [rad]), and the bounds below which a node counts as failing.
+
+    The bounds are a force [N] for nodes that touch and a gap [m] for open ones, both <= 0.
+    """
     r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     top, pull, deep = 0.0, 0.0, 0.0
     for i in range(on.size):
@@ -275,7 +282,7 @@ def locate(sets, k, d, t):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def begin(sets, name):
-    """Work out the set `wanted` from the empty set; its slot, -1 as in `build`."""
+    """Work out the set `wanted` under its `name` from the empty set and return its slot; -1 as in `build`."""
     renew(sets)
     return build(sets, name)
 
@@ -293,7 +300,10 @@ def pull(sets, k, h, turn):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def press_state(sets, k, d, t, force):
-    """Load N, moment M and energy of set k at (d, t); writes its nodal forces (m,), none below zero."""
+    """Load N [N], moment M [N m] and energy [J] of set k at (d [m], t [rad]); its nodal forces are written.
+
+    force: (m,) [N] to write to; none is below zero.
+    """
     energy, slope, turn = pull(sets, k, -d, t)
     for i in range(force.size):
         y = sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t

@@ -9,7 +9,10 @@ from .press_kernels import LEAST, holds, locate, pull
 
 @njit(error_model="numpy", fastmath=LEAST, **LEAN)
 def reach(sets, k, d, t, dd, dt, force, gap):
-    """Share of the increment (dd, dt) from (d, t) at which the first node of set k falls to its bound."""
+    """Share [1] of the increment (dd [m], dt [rad]) from (d, t) at which the first node of set k falls to its bound.
+
+    force [N], gap [m]: the bounds of touching and of open nodes, <= 0, as `press_kernels.holds` gives them.
+    """
     r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     out = np.inf
     for i in range(on.size):
@@ -22,7 +25,10 @@ def reach(sets, k, d, t, dd, dt, force, gap):
 
 @njit(error_model="numpy", **LEAN)
 def across(sets, k, side, d, t):
-    """Slot of the contact set beyond a side of set k at (d, t); -1 where none was found. side -1: any side."""
+    """Slot of the contact set beyond a side of set k at (d [m], t [rad]), -1 where none was found; side -1: any side.
+
+    The set found is noted beside the side, so that the next crossing costs no search.
+    """
     if side >= 0:
         following = sets.beside[k, side]
         name = sets.names[k] ^ sets.node[sets.edge[k, side]]
@@ -45,8 +51,8 @@ def path_mean(sets, k, h, turn, dh, dt, out):
     discrete gradient), and it is itself the gradient of a convex function.
     """
     out[:] = 0.0
-    at, small = 0.0, 1e-10
-    for _ in range(20 * sets.x.size + 100):
+    at, small = 0.0, 1e-10  # share by which the next set is looked up beyond a border, above its round-off
+    for _ in range(20 * sets.x.size + 100):  # guard against a path that goes round in circles
         end, side = 1.0, -1
         if not within(sets, k, -(h + dh), turn + dt):
             d, t = -(h + at * dh), turn + at * dt
@@ -74,7 +80,7 @@ def path_mean(sets, k, h, turn, dh, dt, out):
         following = across(sets, k, side, -(h + beyond * dh), turn + beyond * dt)
         if following < 0:
             return following
-        small = 10 * small if following == k else 1e-10
+        small = 10 * small if following == k else 1e-10  # the same set again: step farther
         if following == k:
             at = beyond
         k = following

@@ -61,7 +61,7 @@ class Control(NamedTuple):
     scale: np.ndarray
 
     def lack(self, force, q) -> np.ndarray:
-        """Load that is missing in each balance (r,) [N]."""
+        """Load that is missing in each balance, target - R^T f - H q (r,) [N]; force (m,) [N], q (r,) [m]."""
         return self.target - self.rigid.T @ force - self.hold @ q
 
 
@@ -114,6 +114,7 @@ def _newton(skin, c, weight, gap, control, s, q, limit: int) -> tuple | None:
         q, folds = q + motion, -change * fall
         share = np.exp(np.minimum(0.0, np.maximum(log, log + folds) - log.max()))
         depth = np.ptp(gap) + np.abs(c @ force).max() + 2 * np.abs(q[1:]).max(initial=0.0)
+        # the goal, and the last digit of a separation as a change of log P at the nodes that carry
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
         if max(lack, np.max(share * np.abs(folds))) <= noise:
             follow = np.exp(np.minimum(log + folds, 600.0))  # what carries next to nothing takes its law

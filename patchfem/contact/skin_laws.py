@@ -21,7 +21,7 @@ class LinearSkin:
     k: float
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
-        """Pressure P (m,) [Pa] at the separations s (m,) [m]."""
+        """Pressure P = k max(0, -s) (m,) [Pa] at the separations s (m,) [m]."""
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
@@ -30,16 +30,19 @@ class LinearSkin:
 
 
 class Smooth:
-    """Shared by the laws with P > 0 everywhere, each of which has `log_pressure`, `separation` and `softened`."""
+    """Base of the skin laws with P > 0 everywhere, which gives P and -dP/ds from the logarithm of P.
+
+    Each law has `log_pressure`, `separation` and `softened`.
+    """
 
     __slots__ = ()
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
-        """Pressure P (m,) [Pa] at the separations s (m,) [m]."""
+        """Pressure P (m,) [Pa] at the separations s (m,) [m]; held at exp(700) Pa, before numbers overflow."""
         return np.exp(np.minimum(self.log_pressure(np.asarray(s, float))[0], 700.0))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m]."""
+        """Stiffness -dP/ds = P times the fall of log P, (m,) [Pa/m], at the separations s (m,) [m]."""
         return self.pressure(s) * self.log_pressure(np.asarray(s, float))[1]
 
 
@@ -55,15 +58,15 @@ class ExponentialSkin(Smooth):
     reference: float | None = None
 
     def log_pressure(self, s: np.ndarray) -> tuple:
-        """log P and its fall per separation -d(log P)/ds [1/m], (m,) each."""
+        """log P = log reference - s/u0 at s (m,) [m], P in Pa, and its fall -d(log P)/ds = 1/u0 [1/m], (m,) each."""
         return np.log(self.reference) - s / self.u0, np.full(np.shape(s), 1 / self.u0)
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
-        """Separation s [m] that carries `pressure` [Pa] > 0."""
+        """Separation s = -u0 log(P/reference) [m] that carries `pressure` [Pa] > 0."""
         return -self.u0 * np.log(pressure / self.reference)
 
     def softened(self, factor: float) -> "ExponentialSkin":
-        """The law P(s/factor)."""
+        """The law P(s/factor), `factor` times as long; `skin` comes to a hard law by way of such ones."""
         return replace(self, u0=self.u0 * factor)
 
 
@@ -86,7 +89,7 @@ class HertzSkin(Smooth):
         return np.log(4 / 3 * self.modulus * self.density * self.radius**0.5 * self.deviation**1.5)
 
     def log_pressure(self, s: np.ndarray) -> tuple:
-        """log P and its fall per separation -d(log P)/ds [1/m], (m,) each."""
+        """log P at s (m,) [m], P in Pa, and its fall -d(log P)/ds [1/m], (m,) each, by `peak_integral`."""
         log, fall = peak_integral(np.asarray(s, float) / self.deviation)
         return self._level + log, fall / self.deviation
 
@@ -105,7 +108,7 @@ class HertzSkin(Smooth):
         return h * self.deviation
 
     def softened(self, factor: float) -> "HertzSkin":
-        """The law P(s/factor)."""
+        """The law P(s/factor), `factor` times as long: wider heights and fewer peaks; see ExponentialSkin.softened."""
         return replace(self, deviation=self.deviation * factor, density=self.density * factor**-1.5)
 
 

@@ -53,23 +53,29 @@ class StripsState:
 
     @property
     def note(self) -> str:
-        """A sentence on what the answer leaves out."""
+        """The sentence for users on what the answer leaves out: the shear between the strips."""
         return NEGLECTED
 
     def yaw_moment(self, friction: float) -> float:
-        """Yaw moment mu sum f y [N m] about +z of friction on the upper piece while all of it slides towards +x."""
+        """Yaw moment mu sum f y [N m] about +z on the upper piece while all of it slides towards +x; friction is mu."""
         return friction * self.roll_moment
 
 
 def strip_offsets(width: float, count: int) -> np.ndarray:
-    """Centres y (count,) [m] of equal strips over `width` [m] of one pair, 0 in the middle."""
+    """Centres y (count,) [m] of `count` equal strips over `width` [m] of one pair, 0 in the middle.
+
+    PatchfemError for less than one strip or no width.
+    """
     if not (count >= 1 and width > 0):
         raise PatchfemError(f"contact.strips.count: {count} strips over {width:.6g} m; at least one is wanted")
     return (np.arange(count) + 0.5) * (width / count) - width / 2
 
 
 def one_strip(pieces: Compliance, count: int) -> tuple:
-    """One of `count` equal strips: normal and tangential compliance (m, m) [m/N] and nodal areas (m,) [m2]."""
+    """One of `count` equal strips: normal and tangential compliance (m, m) [m/N] and nodal areas (m,) [m2].
+
+    A strip is `count` times as compliant as the whole width, as strips do not feel each other.
+    """
     return pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
 
 
@@ -132,7 +138,7 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
             force, s, motion, count = loaded(skin, c, x, weight, gap, target, spring, start, rotation)
     delta, free = float(motion[0]), -float(motion[1]) if motion.size > 1 else 0.0
     checks = residuals(skin, c, x, weight, gap, force, delta, free, load, moment, spring)
-    bearing = (force > 1e-12 * force.max()).any(axis=0).sum()
+    bearing = (force > 1e-12 * force.max()).any(axis=0).sum()  # less is round-off
     if motion.size > 1 and spring == 0 and not smooth(skin) and bearing < 2:
         raise NotConverged("contact.strips: the contact set does not determine the rotation; raise the load or name "
                            "contact.holder.rotational_stiffness")

@@ -15,12 +15,15 @@ from .unilateral import solve_forces
 
 
 def smooth(skin) -> bool:
-    """Whether a law of the skin carries something at every separation; False for None and the linear skin."""
+    """Whether a skin law carries something at every separation: False for None (bare) and for the linear skin."""
     return skin is not None and not isinstance(skin, LinearSkin)
 
 
 def softer(skin, c, weight) -> np.ndarray:
-    """Compliance (m, m) with the linear skin in series, so that bare contact of it is contact through the skin."""
+    """Compliance (m, m) [m/N] with the linear skin in series, C + diag(1/(k A)); C itself under any other skin.
+
+    So bare contact of it is contact through the linear skin. c: (m, m) [m/N]; weight: nodal areas A (m,) [m2].
+    """
     return c + np.diag(1 / (skin.k * weight)) if isinstance(skin, LinearSkin) else c
 
 
@@ -89,7 +92,7 @@ def _bordered(c, gap, rigid, target, spring, active) -> tuple:
 def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
     seen, bend, least = set(), np.abs(c).max(), 1 if spring.any() else target.size
-    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)
+    span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)  # round-off of an opening
     for count in range(1, limit + 1):
         if active.sum() < least:
             active = np.ones(gap.shape, bool)
@@ -148,7 +151,11 @@ def _newton(skin, c, weight, gap, rigid, target, spring, s, q, limit: int = 60) 
 
 
 def by_strip(skin, c, x, weight, gap) -> tuple:
-    """Forces (s, m), the slope -A P' (s, m) of a smooth skin or which nodes carry, steps; all motion is in the gap."""
+    """Every strip solved by itself: forces (s, m) [N], where they give way, and steps.
+
+    gap: (s, m) [m] with all motion in it. Second: of a smooth skin the slope -A P' (s, m) [N/m], else which nodes carry
+    (s, m) bool. PatchfemError and NotConverged as in `skin.solve` and `unilateral.solve_forces`.
+    """
     force, steps = np.zeros(gap.shape), 0
     if smooth(skin):
         states = [solve_skin(skin, c, x, weight, row, approach=0.0) for row in gap]
@@ -185,6 +192,7 @@ def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span:
             *trial, steps = at(q + length * way)
             total += steps
             push = -np.inf if trial[0] is None else trial[2] @ way  # > 0: further
+            # a trial beyond the bottom counts as well where it halves the least lack so far
             halved = trial[0] is not None and np.abs(trial[2]).max() <= 0.5 * record
             if push >= 0 or halved:
                 best, low = (*trial, q + length * way), length

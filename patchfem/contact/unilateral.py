@@ -48,6 +48,7 @@ def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
     if found is not None and flaw(found) <= SOLVED:
         return found, first
     force, second = gradients(operator, ask)
+    # less is what the gradients did not yet clear
     found, _, third = settle(operator, ask, force > 1e-9 * force.max(), limit)
     if found is not None and flaw(found) <= SOLVED:
         return found, first + second + third
@@ -63,7 +64,7 @@ def _balanced_on_one(operator: Operator, ask: Ask, lean: float) -> Found | None:
     """
     line = ask.moment / ask.load
     k = int(np.argmin(np.abs(ask.x - line)))
-    if abs(ask.x[k] - line) > 1e-15 * np.ptp(ask.x):
+    if abs(ask.x[k] - line) > 1e-15 * np.ptp(ask.x):  # a line beside the node needs a second one
         return None
     column = operator.c[:, k] * ask.load
     height, arm = ask.gap - ask.gap[k] + column - column[k], ask.x - ask.x[k]
@@ -142,7 +143,11 @@ def residuals(c, x, gap, force, delta: float, theta: float, load: float, moment:
 
 
 def refuse(x, gap, load: float, moment: float | None, spring: float) -> None:
-    """Raise PatchfemError, with the key of the scene, for a contact problem that has no answer."""
+    """Raise PatchfemError, with the key of the scene, for a contact problem that has no answer.
+
+    Refused: a load [N] below zero, too small or not finite, a gap (m,) [m] that is not finite, a moment [N m] or a
+    spring [N m/rad] that is not finite, and a load line outside the patch where no spring holds it.
+    """
     if not (0 <= load <= 1 / LEAST and np.isfinite(gap).all()):
         raise PatchfemError(f"contact.load: the load ({load:.6g} N) must be >= 0 and the gap finite")
     if 0 < load < LEAST:
@@ -213,7 +218,10 @@ def _pressed(pieces: Compliance, ask: Ask, start, touch: float, rotation: float)
 
 
 def checked(c, ask: Ask, out: Solved) -> tuple:
-    """Openings (m,) [m] and residuals of an answer; NotConverged where a residual exceeds 1e-12."""
+    """Openings (m,) [m] >= 0 and relative residuals of an answer; NotConverged where a residual exceeds 1e-12.
+
+    c: compliance (m, m) [m/N]; the gap of a problem under a load is counted from first touch.
+    """
     gap = ask.gap if ask.load is None else ask.gap - ask.gap.min()
     load = float(out.force.sum()) if ask.load is None else ask.load
     checks = residuals(c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring)

@@ -57,10 +57,14 @@ class Propagator:
 
 
 def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
-    """Coefficients of `steps_per_cycle` equal steps of the drive's period; rows: ports (p, n), None: the interfaces."""
+    """Coefficients of `steps_per_cycle` equal steps of the drive's period, exact for the modes.
+
+    rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points.
+    """
     dt = drive.period / steps_per_cycle
     rows = np.array(modes.interfaces if rows is None else rows, float)
     fastest = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
+    # two points more for each radian of the fastest motion
     count = int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST))
     x, w = np.polynomial.legendre.leggauss(count)
     nodes, weight = dt * (1 + x) / 2, dt * w / 2

@@ -20,7 +20,7 @@ PARTS = ("nn", "tt", "nt")
 
 
 def folder() -> Path:
-    """Folder of the kept compliances: below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
+    """Folder of the kept compliances: patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
     base = os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(base) / "patchfem" / "operators"
 
@@ -30,7 +30,11 @@ MESH_SOURCE = ("elasticity.py", "stiffness.py", "dissect.py", "factor.py", "fron
 
 
 def key_of(x, depth, coating_rows: int, layers) -> str:
-    """Content hash of one piece: x (nx,), depth (ny,) [m], rows of coating, its Layers."""
+    """Content hash (32 hexadecimal digits) of one piece on a tensor grid.
+
+    x: (nx,), depth: (ny,) [m]; coating_rows: rows of cells in the coating; layers: its Layers. The source texts that
+    make the compliance take part.
+    """
     return _hash((np.asarray(x, np.float64), np.asarray(depth, np.float64)), (int(coating_rows),), layers, GRID_SOURCE)
 
 
@@ -74,7 +78,10 @@ def fetch(key: str, columns: int) -> tuple | None:
 
 
 def keep(key: str, parts: tuple) -> None:
-    """Keep (nn, tt, nt) under `key`; silently does nothing where the folder cannot be written."""
+    """Keep the compliances (nn, tt, nt) [m2/N] under `key`; does nothing where the folder cannot be written.
+
+    The file is written whole and renamed. The files unused for longest are deleted beyond 512 MiB.
+    """
     place = folder()
     try:
         place.mkdir(parents=True, exist_ok=True)

@@ -82,7 +82,7 @@ def at(cells: Cells, bond: Bond | None, x) -> dict:
     if bond is None:
         return {}
     own = cells.points[bond.node, 0]
-    close = 1e-9 * np.ptp(own)
+    close = 1e-9 * np.ptp(own)  # as mortar.CLOSE
     outside = (x < own[0] - close) | (x > own[-1] + close)
     return {name: np.where(outside, np.nan, np.stack([np.interp(x, own, row) for row in values]))
             for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear))}

@@ -27,7 +27,11 @@ class Layers:
 
 
 def lame(young: float, poisson: float, plane: str) -> tuple:
-    """Lamé pair (lambda, mu) [Pa] of the plane problem; in plane stress lambda is E nu / (1 - nu^2)."""
+    """Lame pair (lambda, mu) [Pa] of the plane problem, plane "strain" or "stress".
+
+    young [Pa], poisson [1]. In plane stress lambda is E nu/(1 - nu^2), which makes the plane forms of both problems
+    alike.
+    """
     mu = young / (2 * (1 + poisson))
     if plane == "stress":
         return young * poisson / (1 - poisson**2), mu
@@ -51,7 +55,11 @@ class Piece:
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Assemble one piece held at its far face; x (nx,), depth (ny,) [m]; stiffness per unit width [N/m per m]."""
+    """Assemble one piece held at its far face, with bilinear quadrilaterals on its tensor grid.
+
+    x: (nx,), depth: (ny,) [m]; coating_rows: rows of cells in the coating; layers: its Layers. The stiffness is per
+    unit width [N/m per m].
+    """
     nx, ny = x.size, depth.size
     mesh = MeshQuad.init_tensor(np.asarray(x), np.asarray(depth))
     middle = mesh.p[:, mesh.t].mean(axis=1)[1]
@@ -59,7 +67,7 @@ def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
     lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[coat.astype(int)].T
     basis = Basis(mesh, ElementQuad1(), intorder=2)
     # scikit-fem numbers vertices its own way; ours is column by column, without the far face
-    column = np.searchsorted(x, mesh.p[0] - 1e-12 * np.ptp(x))
+    column = np.searchsorted(x, mesh.p[0] - 1e-12 * np.ptp(x))  # round-off of the places
     row = np.searchsorted(depth, mesh.p[1] - 1e-12 * depth[-1])
     place = np.empty(nx * ny, dtype=np.int64)
     place[basis.nodal_dofs[0]] = np.where(row < ny - 1, column * (ny - 1) + row, -1)
@@ -112,8 +120,11 @@ def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
 
 
 def hooke(exx, eyy, exy, is_coating, layers: Layers) -> tuple:
-    """Stresses of plane strains (..., t) [1] by Hooke's law: (..., t, 4) as xx, yy, zz, xy and von Mises (..., t)
-    [Pa]."""
+    """Stresses (..., t, 4) as xx, yy, zz, xy [Pa] of plane strains by Hooke's law, and von Mises (..., t) [Pa].
+
+    Tension > 0. exx, eyy, exy: (..., t) [1], exy half the engineering shear; is_coating: (t,) bool; layers: the two
+    materials. zz is nu (xx + yy) in plane strain, 0 in plane stress.
+    """
     pick = is_coating.astype(int)
     lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[pick].T
     poisson = np.array([layers.substrate[1], layers.coating[1]])[pick]
@@ -125,15 +136,20 @@ def hooke(exx, eyy, exy, is_coating, layers: Layers) -> tuple:
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Von Mises stress [Pa] (...,) of stresses (..., 4) as xx, yy, zz, xy."""
+    """Von Mises stress (...,) [Pa] of stresses (..., 4) [Pa] as xx, yy, zz, xy."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     return np.sqrt(((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) / 2 + 3 * xy**2)
 
 
 def interface_compliance(piece: Piece) -> tuple:
-    """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (nx, nx) [m2/N], read-only."""
+    """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (nx, nx) [m2/N], read-only.
+
+    nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x. A
+    piece that is its own mirror image costs half (`condense.mirrored_sweep`). LinAlgError where the stiffness is not
+    positive definite.
+    """
     from .condense import mirrored_sweep, sweep
 
-    mirrored = np.abs(piece.x + piece.x[::-1]).max() <= 1e-13 * np.ptp(piece.x)
+    mirrored = np.abs(piece.x + piece.x[::-1]).max() <= 1e-13 * np.ptp(piece.x)  # round-off of x
     both = (mirrored_sweep if mirrored else sweep)(piece.matrix, piece.x.size)
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))

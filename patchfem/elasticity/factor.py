@@ -50,11 +50,14 @@ class SuperLU:
     size: int
 
     def solve(self, load) -> np.ndarray:
-        """Solution (n, r) for the loads (n, r)."""
+        """Solution (n, r) of the stiffness equations for the loads (n, r)."""
         return self.factor.solve(np.ascontiguousarray(load, float))
 
     def compliance(self) -> np.ndarray:
-        """Last diagonal block (k, k) of the inverse, that of the interface."""
+        """Last diagonal block (k, k) of the inverse, that of the interface.
+
+        Where SuperLU changed the order it takes a solve for each of the k unknowns.
+        """
         n, k = self.factor.shape[0], self.size
         order = self.factor.perm_c
         if not (np.array_equal(order[n - k:], np.arange(n - k, n)) and np.array_equal(self.factor.perm_r, order)):
@@ -80,11 +83,11 @@ class Cholmod:
     size: int
 
     def solve(self, load) -> np.ndarray:
-        """Solution (n, r) for the loads (n, r)."""
+        """Solution (n, r) of the stiffness equations for the loads (n, r)."""
         return self.factor(np.asarray(load, float))
 
     def compliance(self) -> np.ndarray:
-        """Last diagonal block (k, k) of the inverse, that of the interface."""
+        """Last diagonal block (k, k) of the inverse, that of the interface; NotConverged where it is singular."""
         low = self.factor.L()
         n = low.shape[0]
         return _inverse(low[n - self.size:, n - self.size:].toarray())
@@ -140,14 +143,14 @@ class Pardiso:
             raise NotConverged(f"the stiffness of the piece cannot be factorised (Pardiso error {fault.value})")
 
     def solve(self, load) -> np.ndarray:
-        """Solution (n, r) for the loads (n, r)."""
+        """Solution (n, r) of the stiffness equations for the loads (n, r); NotConverged where the library fails."""
         load = np.asfortranarray(load, float)
         out = np.zeros_like(load, order="F")
         self._call(33, load, out)
         return np.ascontiguousarray(out)
 
     def compliance(self) -> np.ndarray:
-        """Last diagonal block (k, k) of the inverse, that of the interface."""
+        """Last diagonal block (k, k) of the inverse, that of the interface; NotConverged where it is singular."""
         try:
             return _inverse(np.linalg.cholesky(self.schur))
         except np.linalg.LinAlgError:

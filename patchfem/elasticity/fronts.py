@@ -34,7 +34,7 @@ class Fronts:
 
     @property
     def entries(self) -> int:
-        """Count of the numbers that are kept."""
+        """Count of the numbers that are kept, 8 bytes each."""
         return sum(panel.size for panel in self.panels)
 
     def compliance(self) -> np.ndarray:
@@ -43,7 +43,7 @@ class Fronts:
         return np.tril(both) + np.tril(both, -1).T
 
     def solve(self, load) -> np.ndarray:
-        """Solution (n, r) for the loads (n, r)."""
+        """Solution (n, r) of the stiffness equations for the loads (n, r), front by front, forth and back."""
         x = np.array(load, dtype=float, order="C")
         steps = list(zip(self.panels, self.firsts, self.firsts[1:], self.later))
         for panel, start, stop, later in steps:

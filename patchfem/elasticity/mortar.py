@@ -133,13 +133,16 @@ def _hats(x, cell, place) -> np.ndarray:
 
 
 def tributary(x) -> np.ndarray:
-    """Length that belongs to each node (m,) [m]; the lengths sum to that of the interface."""
+    """Length that belongs to each node of rising x (m,) [m], half of its cells; (m,) [m], with the interface as sum."""
     half = np.diff(x) / 2
     return np.append(half, 0.0) + np.insert(half, 0, 0.0)
 
 
 def overlap(x_lower, x_upper) -> tuple:
-    """Ends [m] of the stretch that both pieces cover; PatchfemError where there is none."""
+    """Ends (begin, end) [m] of the stretch that both pieces cover.
+
+    x_lower, x_upper: rising interface nodes [m]. PatchfemError where there is none.
+    """
     begin, end = max(x_lower[0], x_upper[0]), min(x_lower[-1], x_upper[-1])
     if not end - begin > CLOSE * max(np.ptp(x_lower), np.ptp(x_upper)):
         raise PatchfemError("contact.mesh: the interfaces do not face one another: the lower one runs from "
@@ -149,7 +152,10 @@ def overlap(x_lower, x_upper) -> tuple:
 
 
 def clipped(x, begin: float, end: float) -> np.ndarray:
-    """The nodes x from begin to end, these two included, without nodes nearer to a new end than half their cell."""
+    """The nodes of rising x (n,) [m] from begin to end [m], these two included.
+
+    Nodes nearer to a new end than half their cell are left out, so that no sliver of a cell arises.
+    """
     cut_left, cut_right = (abs(a - b) > CLOSE * (end - begin) for a, b in ((x[0], begin), (x[-1], end)))
     if not (cut_left or cut_right):
         return x
@@ -160,11 +166,11 @@ def clipped(x, begin: float, end: float) -> np.ndarray:
 
 
 def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
-    """A grid (m,) of nodes of two pieces of the same ends: from left to right always on to the farther of the two next
-    nodes.
+    """A grid (m,) [m] of nodes of two pieces of the same ends: from left to right, always on to the farther next node.
 
-    Where one piece is the coarser everywhere these are its nodes. soft_lower, soft_upper: `softness` of each piece at
-    its nodes; where one piece is SOFTER times softer, its nodes alone are taken.
+    x_lower, x_upper: rising nodes [m]. Where one piece is the coarser everywhere these are its nodes. soft_lower,
+    soft_upper: `softness` of each piece at its nodes; where one piece is SOFTER times softer, its nodes alone are
+    taken.
     """
     at, end, out = x_lower[0], x_lower[-1], [x_lower[0]]
     close = CLOSE * (end - at)
@@ -195,7 +201,10 @@ def _triple(x) -> tuple:
 
 
 def softness(x, c, place) -> np.ndarray:
-    """Softness of a body (its nodes x, compliance c) as of `zigzag` at other places."""
+    """Softness (k,) [m2/N] of a body at the scale of a cell (`zigzag`), at other places (k,) [m].
+
+    x: (m,) [m] nodes of the body; c: its compliance (m, m) [m2/N]. It is linear between the nodes.
+    """
     return np.interp(place, x[1:-1], zigzag(x, c))
 
 

@@ -32,21 +32,21 @@ class Cells:
     layers: Layers
 
     def owner(self) -> np.ndarray:
-        """Cell of every corner (corners,), block after block."""
+        """Cell number of every corner (corners,), block after block."""
         sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in self.blocks])
         return np.repeat(np.arange(sizes.size), sizes)
 
     def corners(self) -> np.ndarray:
-        """Node of every corner (corners,), block after block."""
+        """Node number of every corner (corners,), block after block."""
         return np.concatenate([block.ravel() for block in self.blocks])
 
     def middles(self) -> np.ndarray:
-        """Middles of the cells (t, 2) [m]."""
+        """Middles of the cells (t, 2) [m], as x and depth."""
         return np.concatenate([self.points[block].mean(axis=1) for block in self.blocks])
 
 
 def cells_of(piece) -> Cells:
-    """The cells of an assembled piece: elasticity.Piece or substructure.Substructure."""
+    """The cells of an assembled piece, be it an elasticity.Piece or a substructure.Substructure."""
     if hasattr(piece, "mesh"):
         mesh = piece.mesh
         blocks = tuple(block for block in (mesh.triangles, mesh.quads) if len(block))
@@ -118,6 +118,7 @@ def _planes(near, at, middle) -> tuple:
     mean = gram[:, 0, 1:] / counts[:, None]
     apart = offset - mean[row]
     spread = np.add.reduceat(apart[:, :, None] * apart[:, None], starts)
+    # cells in one line fix no slope across it: the pseudo-inverse leaves that one out
     slope = np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=1e-8, hermitian=True), -mean)
     share = 1 / counts[row] + np.einsum("ni,ni->n", apart, slope[row])
     return csr_matrix((share, near.indices, near.indptr), shape=near.shape), thin
@@ -136,7 +137,7 @@ class Quadrature:
     weight: np.ndarray
 
     def strain(self, u) -> tuple:
-        """Plane strains (exx, eyy, exy), each (c, g), of displacements u (N, 2)."""
+        """Plane strains (exx, eyy, exy) [1], each (c, g), of displacements u (N, 2) [m] along x and inward."""
         slope = np.einsum("cgnj,cni->cgij", self.slope, u[self.block], optimize=True)
         return slope[..., 0, 0], slope[..., 1, 1], (slope[..., 0, 1] + slope[..., 1, 0]) / 2
 
@@ -166,7 +167,10 @@ def quadratures(cells: Cells) -> list:
 
 
 def stresses(cells: Cells, rules: list, u) -> list:
-    """Plane stresses (c, g, 3) as xx, yy, xy [Pa] at the points of integration of each block."""
+    """Plane stresses (c, g, 3) as xx, yy, xy [Pa], tension > 0, at the points of integration of each block.
+
+    rules: the `quadratures` of the cells; u: (N, 2) [m] along x and inward.
+    """
     out, first = [], 0
     for rule in rules:
         coat = cells.is_coating[first:first + len(rule.block)]
@@ -190,7 +194,7 @@ class Indicator:
 
     @property
     def relative(self) -> np.ndarray:
-        """Estimated error (frames,) over the whole, both in energy norm [1]; 0 where nothing is loaded."""
+        """Estimated error (frames,) over the whole piece, both in energy norm [1]; 0 where nothing is loaded."""
         return self.shares()[1]
 
     def shares(self, *others) -> tuple:
@@ -273,7 +277,7 @@ def _vertex(offset, value) -> tuple:
     (zero, None) where no top lies in the middle half of the points.
     """
     reach = np.abs(offset).max(axis=0)
-    if len(value) < 6 or not reach.all():
+    if len(value) < 6 or not reach.all():  # a paraboloid has six numbers
         return np.zeros(2), None
     x, y = (offset / reach).T
     c = np.linalg.lstsq(np.column_stack([np.ones(x.size), x, y, x * x, x * y, y * y]), value, rcond=None)[0]
@@ -281,6 +285,6 @@ def _vertex(offset, value) -> tuple:
     if np.linalg.eigvalsh(bend).max() >= 0:
         return np.zeros(2), None
     top = np.linalg.solve(bend, -c[1:3])
-    if np.abs(top).max() > 0.5:
+    if np.abs(top).max() > 0.5:  # a top near the border is an extrapolation
         return np.zeros(2), None
     return top * reach, float(c[0] + c[1:3] @ top / 2)

@@ -7,19 +7,19 @@ from skfem import BilinearForm
 
 @BilinearForm
 def along(u, v, w):
-    """Energy form of motions along x only."""
+    """Energy form of motions u, v along x only: (lambda + 2 mu) u,x v,x + mu u,y v,y."""
     return (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
 
 
 @BilinearForm
 def inward(u, v, w):
-    """Energy form of motions into the piece only."""
+    """Energy form of motions u, v into the piece only: (lambda + 2 mu) u,y v,y + mu u,x v,x."""
     return (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
 
 
 @BilinearForm
 def mixed(u, v, w):
-    """Energy form of an inward motion u with one along x, v."""
+    """Energy form of an inward motion u with one along x, v: lambda u,y v,x + mu u,x v,y."""
     return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
 
 

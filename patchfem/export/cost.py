@@ -27,7 +27,10 @@ def write(folder: Path, knob: str, runs: list, tolerance: float, names: list) ->
 
 @styled
 def draw(knob: str, runs: list, tolerance: float, names: list):
-    """Relative error of each measure against the seconds of a run, as SVG text."""
+    """Relative error of each measure against the seconds of a run, as SVG text.
+
+    knob: its name; runs: Costs coarse to fine; tolerance: a broken line; names: of the measures shown.
+    """
     figure, (axis,) = drawing(1, 5.0)
     chain, alone = [one for one in runs if one.value is not None], [one for one in runs if one.value is None]
     for number, name in enumerate(names):

@@ -28,7 +28,11 @@ def write_rows(path: Path, time, displacement, measured, model, held, quantity: 
 
 @styled
 def draw(displacement, measured, model, held, quantity: str):
-    """Draw measured and fitted reading against displacement, and what is left over along the rows, as SVG text."""
+    """Draw measured and fitted reading against displacement, and what is left over along the rows, as SVG text.
+
+    displacement: (k,) [m]; measured, model: (k,) [N] or [1] by `quantity`; held: (k,) bool, rows that were only
+    predicted.
+    """
     figure, (loop, rest) = drawing(2, 3.6)
     name, unit = LABEL[quantity]
     along, size = axis_unit(displacement, "m")
@@ -47,7 +51,10 @@ def draw(displacement, measured, model, held, quantity: str):
 
 
 def lines_of(answer: dict) -> list:
-    """The answer as lines: one per value with its interval, then what is left over."""
+    """The answer of a fit as lines of text: one per value with its interval, then what is left over.
+
+    answer: the object of fit.json.
+    """
     out = [f"{answer['outcome']}: {answer['rows']} rows of {answer['measured']}, {answer['evaluations']} evaluations"]
     for key, one in answer["values"].items():
         unit = "" if one["unit"] == "1" else f" {one['unit']}"

@@ -57,7 +57,10 @@ def _value(one: Range, found: Fit, k: int) -> dict:
 
 
 def fit_into(fitted: Fitted, target: Path) -> dict:
-    """Write the results folder of a fit (fit.json, fit.csv, fit.svg, scene.fitted.toml); the object of fit.json."""
+    """Write the results folder of a fit and return the object of fit.json.
+
+    Files: fit.json, fit.csv, fit.svg, scene.fitted.toml. PatchfemError and Missing as in `results.Folder`.
+    """
     from .fit import draw, write_rows
     from .results import Folder
     from .summary import write_json

@@ -23,7 +23,7 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matp
 
 
 def versions() -> dict:
-    """Versions of the interpreter and of the packages that compute."""
+    """Versions, by name, of the interpreter and of the packages that compute, those that are there."""
     out = {"python": ".".join(map(str, sys.version_info[:3]))}
     for name in PACKAGES:
         try:
@@ -73,7 +73,7 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False) -
 
 
 def write(result: Result, path: Path) -> dict:
-    """Write every file of a run into the folder `path`; the summary."""
+    """Write every file of a run into the folder `path` and return its summary."""
     begin = perf_counter()
     text = result.plan.model.source.resolved
     (path / "scene.resolved.toml").write_text(text, encoding="utf-8")
@@ -133,7 +133,7 @@ def _write_netcdf(result: Result, path: Path) -> None:
 
 
 def dataset(result: Result):
-    """The xarray.Dataset of result.nc: histories, interface frames, levels, events, curve, provenance."""
+    """The xarray.Dataset of result.nc in SI: histories, interface frames, levels, events, curve, provenance."""
     histories, modal = _histories(result)
     patch, extra = result.patch, result.extra
     x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
@@ -177,7 +177,7 @@ def _levels(levels) -> dict:
 
 
 def report_data(result: Result) -> dict:
-    """Plain arrays and texts for the report page."""
+    """Plain arrays and texts of a run for the report page, by name; SI units throughout."""
     model, r, w = result.plan.model, result.response, result.window
     source = model.source
     data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": source.resolved,

@@ -133,7 +133,10 @@ def _attributes(name: str, dimensions: int = 1) -> dict:
 
 
 def described(data: xr.Dataset, summary: dict, scene_text: str, versions: dict) -> xr.Dataset:
-    """Add the origin of the numbers to a dataset: program, scene, outcome, measures; no host name and no path."""
+    """Add the origin of the numbers to a dataset: program, scene, outcome, measures; no host name and no path.
+
+    summary: the object of summary.json; scene_text: the resolved scene; versions: package -> version.
+    """
     return data.assign_attrs({
         "Conventions": "CF-1.11", "title": summary["title"], "source": f"patchfem {summary['patchfem']}",
         "outcome": summary["outcome"], "scene": scene_text,
@@ -143,7 +146,7 @@ def described(data: xr.Dataset, summary: dict, scene_text: str, versions: dict) 
 
 
 def write(data: xr.Dataset, path: Path) -> None:
-    """Write through a temporary file beside `path`."""
+    """Write a dataset as netCDF4 to `path`, whole beside it first and then renamed."""
     encoding = {name: {"zlib": True, "complevel": 1} for name in data.data_vars if data[name].ndim}
     partial = Path(path).with_name(Path(path).name + ".partial")
     data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)

@@ -38,7 +38,7 @@ behind a name counts the interfaces (strips, where strips slide apart): `slip_am
 
 
 def text() -> str:
-    """The whole page."""
+    """The whole page of patchfem/scene/README.md, from the records that the program reads."""
     units = [(kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`') for kind, units in KINDS.items()]
     stuff = [(f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
              for name, m in MATERIALS.items()]
@@ -54,7 +54,10 @@ def text() -> str:
 
 
 def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
-    """(header, model) of every table of a scene in order, ("", Tables) first; the header of an array is [[...]]."""
+    """(header, model) of every table of a scene in order, ("", Tables) first; the header of an array is [[...]].
+
+    model: the pydantic class to begin with; at: its header.
+    """
     yield (at, model)
     for key, name in keys(model).items():
         if _is_table(model, name):

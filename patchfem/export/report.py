@@ -45,7 +45,10 @@ def matched(value, error=None) -> tuple:
 
 
 def units(name: str, value: float, unit: str) -> list:
-    """Units [(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first."""
+    """Units [(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first.
+
+    value and unit: in SI; value times scale is in the unit.
+    """
     if name.endswith("fraction"):
         return [("%", 100.0)]
     if name.endswith("phase"):
@@ -80,7 +83,7 @@ def others(name: str, measure: dict) -> str:
 
 
 def cycles(data: dict) -> float | None:
-    """Cycles that were run, None where the run has none."""
+    """Cycles of the drive that were run, None where the run has none."""
     period = data.get("loop", {}).get("period")
     if period:
         time = data["history"]["time"]
@@ -100,7 +103,7 @@ def pressed(data: dict) -> bool:
 
 
 def verdict(data: dict) -> str:
-    """The answer in a few sentences, with the error of each number."""
+    """The answer of a run in a few sentences of HTML, with the error of each number."""
     summary, parts = data["summary"], []
     measures, outcome = summary["measures"], summary["outcome"]
 
@@ -128,7 +131,7 @@ def verdict(data: dict) -> str:
 
 
 def page(data: dict) -> str:
-    """The whole page from the plain data of a run."""
+    """The whole HTML page from the plain data of a run, as `folder.report_data` gives them."""
     summary = data["summary"]
     title = summary["title"] or data.get("name") or "patchfem run"
     parts = [f"<h1>{escape(title)}</h1><p class=soft>patchfem {escape(summary['patchfem'])} &middot; "
@@ -318,7 +321,7 @@ def _table_of_levels(levels: list) -> str:
 
 
 def measure(value: float, unit: str, error: float | None) -> dict:
-    """A measure as the summary has it."""
+    """A measure as the object that the summary has, from a value and an error in SI."""
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
@@ -347,5 +350,5 @@ def _cost(data: dict) -> str:
 
 
 def write_report(path: Path, data: dict) -> None:
-    """Write the page."""
+    """Write the report page of a run to `path`; data: as `folder.report_data` gives them."""
     Path(path).write_text(page(data), encoding="utf-8")

@@ -16,7 +16,11 @@ def measure_object(measure) -> dict:
 
 def summary(version: str, title: str, kind: str, outcome: str, measures: dict, effects: list, absent: list,
             warnings: list, seconds: dict) -> dict:
-    """The object of summary.json; effects: dicts with effect, equations and seconds."""
+    """The object of summary.json: the answer of a run with its effects, warnings and times.
+
+    measures: name -> Measure; effects: dicts with effect, equations and seconds; absent: effects not in the scene;
+    seconds: part of the run -> time.
+    """
     return {"patchfem": version, "title": title, "kind": kind, "outcome": outcome,
             "measures": {name: measure_object(m) for name, m in measures.items()}, "effects": effects,
             "not_in_scene": absent, "warnings": warnings,
@@ -24,5 +28,5 @@ def summary(version: str, title: str, kind: str, outcome: str, measures: dict, e
 
 
 def write_json(value: dict, path: Path) -> None:
-    """Write `value` as strict JSON (no NaN) with a final newline."""
+    """Write `value` to `path` as strict JSON with a final newline; ValueError for NaN or infinity in it."""
     Path(path).write_text(json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -13,5 +13,5 @@ FAST = {"reassoc", "contract", "arcp"}
 
 @njit(error_model="numpy", **LEAN)
 def middle(num, mem, e, v, dt):
-    """Bond length in the middle of a step [m] of a law whose bonds do not grow: not asked for."""
+    """The `middle` of laws whose bonds do not grow: 0, as no such law asks for a bond length [m]."""
     return 0.0

@@ -23,7 +23,12 @@ import numpy as np
 
 
 class Step(NamedTuple):
-    """mean: (m,) path-mean traction [Pa]; dissipated: (m,) energy per area [J/m2]; state: after the step."""
+    """What a law returns for one increment.
+
+    mean: (m,) traction averaged over the path of the increment [Pa], > 0 against slip towards +x; dissipated: (m,)
+    energy per area [J/m2], below zero only where a law creates energy; state: of the law after the step, the one before
+    is unchanged.
+    """
 
     mean: np.ndarray
     dissipated: np.ndarray

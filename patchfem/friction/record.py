@@ -6,6 +6,9 @@ from ..effects import LAWS
 
 
 def law_from(friction, load: float = 1.0):
-    """The law object of a [friction] table, of laws that have no other numbers than its keys; load [N] on the whole
-    contact, of which a stiffness in the table is. See `protocol` for what it can do."""
+    """The law object of a [friction] table, for laws that need no other numbers than its keys.
+
+    friction: the table in SI units; load [N] on the whole contact, to which a stiffness in the table refers. See
+    `protocol` for what the object can do.
+    """
     return import_module(LAWS[friction.law].module).from_keys(friction, load)

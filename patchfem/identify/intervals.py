@@ -30,7 +30,7 @@ class Answer:
 
 
 def nothing(n: int) -> Answer:
-    """Intervals that were not asked for, all NaN."""
+    """The Answer of a fit of n values whose intervals were not asked for: NaN throughout, method "none"."""
     nan = np.full((n, n), np.nan)
     return Answer(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
                   np.zeros((0, n)))
@@ -48,6 +48,7 @@ def intervals(model: Counted, u, cost: float, descend: Callable) -> Answer:
     flat = size <= FLAT * model.largest * np.sqrt(model.rows)
     inner = [i for i in range(n) if 0 < u[i] < 1 and not flat[i]]
     covariance, null = _covariance(jac[:, inner], size[inner])
+    # a value with less than 1e-3 of an unknown direction, in squares, is still known
     lost = {inner[k] for row in null for k in np.flatnonzero(row**2 > 1e-3)}
     reach = student.ppf(0.975, dof)
     spread = np.full((n, n), np.nan)
@@ -145,7 +146,7 @@ def _profile(model, u, cost, i, sign, half, growth, others, descend) -> tuple:
 
     step = min(half, room) if np.isfinite(half) and half > SHARP else room / 64
     low, f_low, high, near = 0.0, -1.0, None, u
-    for _ in range(40):
+    for _ in range(40):  # doublings to the bound, then the secant; 1e-3 of the growth ends it long before
         f, probe = miss(step, near)
         if abs(f) < 1e-3:
             break

@@ -105,7 +105,10 @@ def _starts(model: Counted, own, count: int) -> list:
 
 
 def descend(model: Counted, u, free) -> tuple:
-    """Descend from u, moving the coordinates `free` alone: (u, sum of squares, whether it settled)."""
+    """Descend from u (n,) in the unit cube along the coordinates `free` alone: (u, sum of squares, whether it settled).
+
+    SciPy's trust-region reflective method. The end is never worse than u; where u itself fails, the sum is inf.
+    """
     u, free = np.array(u, float), list(free)
     here = model(u)
     if not free or here is None:
@@ -116,7 +119,7 @@ def descend(model: Counted, u, free) -> tuple:
         out[free] = part
         return out
 
-    begin = np.clip(u[free], 1e-3, 1 - 1e-3)
+    begin = np.clip(u[free], 1e-3, 1 - 1e-3)  # the trust region begins inside its bounds
     if model(whole(begin)) is None:
         begin = np.clip(u[free], 1e-9, 1 - 1e-9)
         if model(whole(begin)) is None:

@@ -20,7 +20,7 @@ class Space:
     log: np.ndarray
 
     def values(self, u) -> np.ndarray:
-        """Values (n,) at u (n,); the ends of the cube are the bounds to the last bit."""
+        """Values (n,) at a point u (n,) of the unit cube; the ends of the cube are the bounds to the last bit."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
         for i, part in enumerate(u):
@@ -29,7 +29,7 @@ class Space:
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def unit(self, values) -> np.ndarray:
-        """Point u (n,) of values (n,), held inside the cube."""
+        """Point u (n,) of the unit cube of values (n,), held inside the cube."""
         out = np.empty(len(values))
         for i, value in enumerate(values):
             a, b = self.low[i], self.high[i]
@@ -37,14 +37,18 @@ class Space:
         return np.clip(out, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """Slopes d value/d u (n,)."""
+        """Slopes d value/d u (n,) at a point u (n,) of the unit cube."""
         values = self.values(u)
         return np.array([v * np.log(b / a) if own else b - a
                          for v, a, b, own in zip(values, self.low, self.high, self.log)])
 
 
 def space(low, high, log=None) -> Space:
-    """The Space of bounds (n,); log None: logarithms where 0 < low and high > 10 low. ValueError for a bad bound."""
+    """The Space of bounds low < high, (n,) each.
+
+    log: (n,) flags; None: logarithms where 0 < low and high > 10 low. ValueError for bounds that are not finite or not
+    in order, and for logarithms of a bound that is not positive.
+    """
     low, high = np.array(low, float), np.array(high, float)
     if low.ndim != 1 or low.shape != high.shape or not low.size:
         raise ValueError(f"low and high must be two equal rows of numbers, got shapes {low.shape} and {high.shape}")
@@ -96,7 +100,7 @@ class Counted:
         return out
 
     def penalised(self, u) -> np.ndarray:
-        """Residual, or a row far larger than any yet seen where the evaluation failed."""
+        """Residual (r,) at u (n,); where the evaluation failed, a row a thousand times the largest value yet seen."""
         out = self(u)
         return np.full(self.rows, 1e3 * max(self.largest, 1e-300)) if out is None else out
 

@@ -6,7 +6,11 @@ from .least_squares import Fit
 
 
 def remarks(found: Fit, names) -> list:
-    """One sentence each for values on a bound, without effect, known only in a combination, or open to a bound."""
+    """Sentences on what a fit leaves open, by the names (n,) of its values.
+
+    One each for a value on a bound, without effect, known only in a combination, or open to a bound, and one for
+    evaluations that failed.
+    """
     out = [f"{names[i]} is at its {side} bound {found.values[i]:.6g}: widen the range or doubt the law"
            for i, side in enumerate(found.at_bound) if side]
     told = {i for row in found.unknown for i in np.flatnonzero(row)}

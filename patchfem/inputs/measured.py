@@ -16,7 +16,11 @@ FLAGS = {"U": "unstable", "*": "no reading of the gauge", "R": "repeat run"}
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One measured condition in SI; a value that was not read is None. flag: letters of FLAGS, may be empty."""
+    """One measured condition in SI; a value that was not read is None.
+
+    frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], all >= 0; flag: letters of FLAGS, may be
+    empty.
+    """
 
     frequency: float
     input: float
@@ -26,7 +30,10 @@ class Row:
 
 
 def read_table(path: Path) -> list:
-    """Rows of a CSV with units in its header, like `input [g]`; PatchfemError names line and column of a mistake."""
+    """Rows of a CSV of measured responses with units in its header, like `input [g]`.
+
+    frequency and input must stand in every row. PatchfemError names line and column of a mistake.
+    """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

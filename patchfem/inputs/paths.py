@@ -17,8 +17,7 @@ BESIDE = {"force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665}
 
 
 def read_path(path, units: Mapping = UNITS) -> tuple:
-    """Read a slide from a CSV whose header is like `time [s],displacement [um]`: time (k,) [s] and displacement (k,)
-    [m].
+    """Read a slide from a CSV whose header is like `time [s],displacement [um]`: time (k,) [s], displacement (k,) [m].
 
     Where a column lateral stands too, (k,) [m], the displacement across, is returned third. units: column -> unit ->
     factor to SI. There must be two rows or more with strictly rising time; the first row is 0 in every column, where
@@ -44,7 +43,10 @@ def _check(path, time, *places) -> None:
 
 
 def rising(path, time) -> None:
-    """Raise PatchfemError at the first row whose time [s] does not follow the one before."""
+    """Raise PatchfemError at the first row whose time does not follow the one before.
+
+    path: the file, for the message; time: (k,) [s], its first value in line 2.
+    """
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         k = back[0]

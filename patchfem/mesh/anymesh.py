@@ -51,7 +51,7 @@ class PieceMesh:
 
     @property
     def x(self) -> np.ndarray:
-        """Places of the interface nodes (m,) [m]."""
+        """Places of the interface nodes (m,) [m], rising."""
         return self.points[self.interface, 0]
 
     @property
@@ -71,29 +71,32 @@ class PieceMesh:
 
     @property
     def coating(self) -> float:
-        """Mean thickness of the coating: its area over the length of the interface [m], 0 without one."""
+        """Mean thickness of the coating [m], its area over the length of the interface; 0 without one."""
         return float(self.areas()[self.is_coating].sum() / self.length)
 
     def areas(self) -> np.ndarray:
-        """Areas of the cells (t + q,) [m2], triangles first."""
+        """Areas of the cells (t + q,) [m2], > 0, triangles first."""
         return np.concatenate([_areas(self.points[self.triangles]), _areas(self.points[self.quads])])
 
     def tributary(self) -> np.ndarray:
-        """Length of interface that belongs to each node (m,) [m]; the lengths sum to that of the interface."""
+        """Length of interface that belongs to each node (m,) [m], half of its cells; they sum to the whole of it."""
         half = np.diff(self.x) / 2
         return np.append(half, 0.0) + np.insert(half, 0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PairMesh:
-    """Two pieces that share no node and whose interfaces have the same ends; their nodes between may differ."""
+    """Two pieces that share no node and whose interfaces have the same ends.
+
+    Their interface nodes between the ends may differ.
+    """
 
     lower: PieceMesh
     upper: PieceMesh
 
     @property
     def matching(self) -> bool:
-        """Whether both pieces have their interface nodes at the same x."""
+        """Whether both pieces have their interface nodes at the same x, to 1e-9 of the length."""
         a, b = self.lower.x, self.upper.x
         return a.size == b.size and bool(np.abs(a - b).max() <= CLOSE * self.lower.length)
 
@@ -186,6 +189,7 @@ def _upright(points, cells, where) -> np.ndarray:
     side = np.roll(points[cells], -1, axis=1) - points[cells]
     following = np.roll(side, -1, axis=1)
     turns = side[..., 0] * following[..., 1] - side[..., 1] * following[..., 0]
+    # area of a corner that is round-off
     wrong = ~(turns > 1e-10 * (side**2).sum(axis=2).max(axis=1)[:, None]).all(axis=1)
     if wrong.any():
         x, y = points[cells[np.argmax(wrong)]].mean(axis=0)
@@ -262,7 +266,10 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
 
 
 def cell_edges(mesh: PieceMesh) -> tuple:
-    """Edges (e, 2) of all cells, counter-clockwise, and the cell (e,) of each; triangles first."""
+    """Edges (e, 2) of all cells as node numbers, counter-clockwise, and the cell (e,) of each; triangles first.
+
+    An edge between two cells stands twice, once in either direction.
+    """
     found, owner, first = [], [], 0
     for cells in (mesh.triangles, mesh.quads):
         found.append(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2))
@@ -297,7 +304,10 @@ def _centred(mesh: PieceMesh, x) -> PieceMesh:
 
 
 def halved(mesh: PieceMesh) -> PieceMesh:
-    """Refine a piece for error estimates: every edge halved, every cell in four."""
+    """Refine a piece for error estimates: every edge is halved and every cell becomes four.
+
+    New interface and far nodes lie half way between the old ones.
+    """
     ends, _ = cell_edges(mesh)
     count, turn = len(mesh.points), 3 * len(mesh.triangles)
     pairs, number = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)

@@ -95,8 +95,11 @@ def _inp_members(given: dict, lines, known: dict, nodes: dict, elements: dict) -
 
 
 def read_unv(text: str) -> Tagged:
-    """Read a universal file: nodes (2411, 781, 15), elements (2412, 780), groups (2467 and its kin), length unit
-    (164)."""
+    """Read a universal file of a tagged mesh.
+
+    Datasets: nodes (2411, 781, 15), elements (2412, 780), groups (2467 and its kin), length unit (164). PatchfemError
+    or ValueError for what it cannot be.
+    """
     nodes, elements, sets, unit = {}, {}, ({}, {}), 1.0
     for number, lines in _unv_datasets(text):
         if number in (2411, 781):

@@ -24,7 +24,7 @@ class Layout:
     slope: float
 
     def size(self, x) -> np.ndarray:
-        """Wanted cell length (k,) [m] at x (k,) [m]."""
+        """Wanted cell length (k,) [m] of the layout at x (k,) [m]."""
         x = np.asarray(x, float)
         out = np.full(x.shape, self.largest)
         for place in self.places:
@@ -33,7 +33,7 @@ class Layout:
         return np.minimum(out, self.inside + self.slope * beside)
 
     def times(self, share: float) -> "Layout":
-        """The layout whose cells are `share` as long everywhere."""
+        """The layout whose cells are `share` [1] as long everywhere; its slope is taken with it."""
         return replace(self, least=self.least * share, inside=self.inside * share, largest=self.largest * share,
                        slope=self.slope * share)
 
@@ -46,6 +46,7 @@ def columns(layout: Layout, times: int = 1) -> np.ndarray:
     half, ends = layout.length / 2, 400
     reach = np.concatenate([[0.0], np.geomspace(layout.least / 16, layout.length, ends)])
     near = [place + side * reach for place in layout.places for side in (-1, 1)]
+    # points of the integral: geometric about every place, where 1/size is steep
     s = np.unique(np.clip(np.concatenate([np.linspace(-half, half, 2001), *near]), -half, half))
     rate = 1 / layout.size(s)
     count = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(s))])

@@ -8,8 +8,10 @@ from .tensor import TensorGrid
 
 
 def as_piece(body) -> PieceMesh:
-    """A body as a piece: a tensor grid as one of quads, node j*ny + i in column j and row i; any other piece as it
-    is."""
+    """A body as a piece of any mesh: a tensor grid becomes quads, any other piece stays as it is.
+
+    Node j*ny + i stands in column j and row i.
+    """
     if not isinstance(body, TensorGrid):
         return body
     nx, ny = body.x.size, body.depth.size

@@ -44,7 +44,7 @@ class TensorGrid:
         return float(self.depth[self.coating_rows])
 
     def tributary(self) -> np.ndarray:
-        """Length of interface that belongs to each node (nx,) [m]; the lengths sum to that of the interface."""
+        """Length of interface that belongs to each node (nx,) [m], half of its cells; they sum to the whole of it."""
         cells = np.diff(self.x)
         out = np.zeros(self.x.size)
         out[:-1] += cells / 2
@@ -52,7 +52,7 @@ class TensorGrid:
         return out
 
     def cell_is_coating(self) -> np.ndarray:
-        """Whether each cell is coating, (nx - 1, ny - 1) bool, column by column."""
+        """Whether each cell is coating, (nx - 1, ny - 1) bool, as columns by rows."""
         row = np.arange(self.depth.size - 1) < self.coating_rows
         return np.broadcast_to(row, (self.x.size - 1, row.size))
 
@@ -132,7 +132,10 @@ def _every_second(levels) -> np.ndarray:
 
 
 def finer(grid: TensorGrid) -> TensorGrid:
-    """Refine a grid: every cell split in two in both directions, so that the grading goes on smoothly."""
+    """Refine a grid: every cell is split in two in both directions, the grading going on smoothly.
+
+    The rows of the coating stay in the coating.
+    """
     coat = grid.coating_rows
     coated, under = _split(grid.depth[:coat + 1]), _split(grid.depth[coat:])
     return TensorGrid(frozen_array(_split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat)
@@ -150,5 +153,6 @@ def _split(levels) -> np.ndarray:
         ratio[0], ratio[-1] = cells[1] / cells[0], cells[-1] / cells[-2]
     out = np.empty(2 * levels.size - 1)
     out[::2] = levels
+    # a jump of the grading by more than four is not continued
     out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
     return out

@@ -21,7 +21,7 @@ class Rubbing:
     load: float | None
 
     def limits(self, load: float) -> tuple:
-        """Static and kinetic friction force [N] under a load [N]."""
+        """Static and kinetic friction force [N], >= 0, of the interface under a load [N]."""
         return limits_of(self.numbers, load)
 
 
@@ -68,7 +68,10 @@ def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
 
 
 def rubbings_of(scene) -> tuple:
-    """A Rubbing for every interface of a rig: those of [[structure.interface]], or [friction]; none without either."""
+    """A Rubbing for every interface of a rig: those of [[structure.interface]], or the one of [friction].
+
+    None, as an empty tuple, without either. PatchfemError where a rate of growth leaves the range of numbers.
+    """
     if scene.structure.interface:
         return tuple(Rubbing(f"structure.interface.{k}", acting(one, None, scene.where), one.load)
                      for k, one in enumerate(scene.structure.interface))
@@ -78,7 +81,7 @@ def rubbings_of(scene) -> tuple:
 
 
 def pad_width(scene) -> float | None:
-    """Width of the contact across the path [m]; strips share it."""
+    """Width of the contact across the path [m], which strips share; None where the scene names none."""
     if scene.contact is not None:
         return scene.contact.width
     return scene.normal.width if scene.normal is not None else None

@@ -24,7 +24,7 @@ class PointLoad:
     width: float | None = None
 
     def at(self, time) -> np.ndarray:
-        """Load (k,) [N] at the times (k,) [s]."""
+        """Load (k,) [N], >= 0, at the times (k,) [s]: max(0, load + amplitude cos(2 pi f t + phase))."""
         load = self.load + self.amplitude * np.cos(2 * np.pi * self.frequency * np.asarray(time) + self.phase)
         return np.where(load > 1e-12 * (self.load + self.amplitude), load, 0.0)  # round-off carries nothing
 
@@ -54,7 +54,10 @@ class PointLoad:
 
 
 def point_asked(scene) -> PointLoad | None:
-    """The load of [normal], or of the first [[structure.interface]]; None where a patch carries it or nothing does."""
+    """The load of [normal], or of the first [[structure.interface]].
+
+    None where a patch carries it or nothing does.
+    """
     if scene.structure is not None and scene.structure.interface:
         return PointLoad(scene.structure.interface[0].load)
     normal = scene.normal

@@ -50,7 +50,7 @@ class Model:
 
     @property
     def side(self) -> str:
-        """The piece that carries the shapes, and with them the pressure."""
+        """The piece that carries the shapes, and with them the pressure: "upper" or "lower"."""
         return self.patch.gap.side if self.patch is not None else "upper"
 
     @property
@@ -73,18 +73,21 @@ class Model:
 
     @property
     def speed(self) -> float:
-        """Scale of the speeds to expect [m/s]."""
+        """Scale of the speeds to expect [m/s]: the largest of a prescribed slide, or that of the drive of a rig."""
         return self.slide.peak_speed if self.rig is None else self.rig.speed
 
     @property
     def bonds(self) -> Bonds:
-        """Bonds of law 'nonlocal'; the floor of the speed defaults to 1e-3 of the speeds to expect."""
+        """Bond parameters (2.10-2.17) of law 'nonlocal'.
+
+        The floor of the speed defaults to 1e-3 of the speeds to expect, in a rig to 1e-12 m/s at least.
+        """
         from .law import bonds_of
 
         return bonds_of(self.friction, self.speed, 0.0 if self.rig is None else 1e-12)
 
     def limits(self, load: float) -> tuple:
-        """Static and kinetic friction force [N] of the first interface under a load [N]."""
+        """Static and kinetic friction force [N], >= 0, of the first interface of a rig under a load [N]."""
         return self.rig.interfaces[0].limits(load)
 
 
@@ -140,7 +143,10 @@ def _law(scene: Scene) -> tuple:
 
 
 def resolved(scene: Scene, model: Model) -> str:
-    """The scene as TOML in SI with every default written out, also those that follow from other keys."""
+    """The scene as TOML in SI with every default written out.
+
+    Those that follow from other keys take part: the element size of an automatic mesh and the floor of the speed.
+    """
     contact, friction = scene.contact, scene.friction
     if contact is not None and (contact.element_size, contact.mesh) == (None, None) and not model.patch.chosen:
         contact = contact.model_copy(update={"element_size": model.patch.size})

@@ -13,7 +13,10 @@ AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tol
 
 @dataclass(frozen=True, slots=True)
 class OnePiece:
-    """One of the two pieces: height [m] with its coating, substrate, coating or None where it is bare."""
+    """One of the two pieces of a patch.
+
+    height [m], its coating included; coating: None where the piece is bare.
+    """
 
     height: float
     substrate: Material
@@ -69,18 +72,21 @@ class PatchModel:
 
     @property
     def size(self) -> float:
-        """Element size [m] of an even interface."""
+        """Element size [m] of an even interface: that of the scene, or the automatic one."""
         return self.element_size or self.length / AUTOMATIC_CELLS
 
     @property
     def nominal_load(self) -> float:
-        """Load [N]; for a prescribed approach that of the layers as bars in series, an upper estimate."""
+        """Load [N] of all pairs; for a prescribed approach that of the layers as bars in series, an upper estimate."""
         if self.load is not None:
             return self.load
         return self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
 
     def sized(self, size: float | None, kind: str = "") -> "PatchModel":
-        """The patch with another element size [m]; None: of the tolerance in a run of kind "patch", else automatic."""
+        """The patch with another element size [m].
+
+        None: that of the tolerance in a run of kind "patch" without a mesh file or a profile, else the automatic one.
+        """
         chosen = size is None and kind == "patch" and self.mesh is None and self.gap.profile is None
         found = replace(self, element_size=size, chosen=chosen)
         profile = None if self.mesh is not None else found.size
@@ -88,7 +94,7 @@ class PatchModel:
 
     @property
     def moment(self) -> float | None:
-        """Moment of the load about the middle of the patch [N m], None where the rotation is held."""
+        """Moment of the load about the middle of the patch, sum f x [N m]; None where the rotation is held."""
         if not self.rotates:
             return 0.0 if self.spring > 0 else None
         return self.line_moment if self.line_moment is not None else self.load * self.offset
@@ -125,7 +131,10 @@ def _piece(contact: Contact, own) -> OnePiece:
 
 
 def bars(patch: PatchModel, softness) -> float:
-    """Sum over the layers of both pieces of thickness * softness(material), all pairs together, per area [m/N]."""
+    """Compliance [m/N] of the layers of both pieces as bars in series, all pairs together.
+
+    softness(material) [1/Pa]: the sum of thickness * softness over the layers is divided by the area of all pairs.
+    """
     total = 0.0
     for piece in (patch.lower, patch.upper):
         total += (piece.height - piece.thickness) * softness(piece.substrate)
@@ -134,5 +143,8 @@ def bars(patch: PatchModel, softness) -> float:
 
 
 def block_shear(patch: PatchModel) -> float:
-    """Shear stiffness [N/m] of two blocks in series, layer by layer; short blocks held at both faces are stiffer."""
+    """Shear stiffness [N/m] of the two pieces as blocks in series, layer by layer, all pairs together.
+
+    Short blocks held at both faces are stiffer than that.
+    """
     return 1 / bars(patch, lambda m: 2 * (1 + m.poisson) / m.young)

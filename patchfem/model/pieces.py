@@ -7,7 +7,7 @@ from .patch import OnePiece, PatchModel
 
 
 def layers_of(patch: PatchModel, piece: OnePiece) -> Layers:
-    """Elastic layers of one piece."""
+    """Elastic layers of one piece of a patch; a bare piece has its substrate as coating."""
     coat = piece.coating.material if piece.coating else piece.substrate
     return Layers((coat.young, coat.poisson), (piece.substrate.young, piece.substrate.poisson), patch.plane)
 
@@ -41,5 +41,5 @@ def _matches(patch: PatchModel, side: str, body) -> None:
     piece = getattr(patch, side)
     for key, mine, wanted in (("length", body.length, patch.length), ("height", body.height, piece.height),
                               ("coating.thickness", body.coating, piece.thickness)):
-        if abs(mine - wanted) > 1e-6 * patch.length:
+        if abs(mine - wanted) > 1e-6 * patch.length:  # printed digits of a mesh file
             raise PatchfemError(f"{wanted:.9g} m, the {side} piece of the mesh has {mine:.9g} m", f"contact.{key}")

@@ -51,7 +51,8 @@ class Rig:
 
     @property
     def speed(self) -> float:
-        """Scale of the speeds to expect [m/s]; it sets the default floor of the speed in the growth of bonds."""
+        """Scale of the speeds to expect [m/s], from drive and start; the default floor of the speed in 2.10 follows
+        from it."""
         return peak_speed(self.drive, self.start)
 
     @property

@@ -98,6 +98,7 @@ class SlidePath:
         legs = 0 if time is None or self.kind == "constant" else time.size - 1
         if pinned is not None:
             return 4 * ceil(max(pinned, LEAST * legs) / 4)
+        # errors fall with the square of the step; 400 a cycle give about 1e-3
         base, cycles = 400 * sqrt(1e-3 / tolerance), 1.0
         if time is not None:
             path = float(_lengths(place, self.across).sum())

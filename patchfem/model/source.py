@@ -25,7 +25,10 @@ class Source:
     remarks: tuple
 
     def where(self, key: str) -> str:
-        """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
+        """``FILE:LINE: key`` for a message about a key.
+
+        The line is that of its table where the key is not written itself; without either there is none.
+        """
         lines = key_lines(self.text)
         line = lines.get(key) or lines.get(key.rpartition(".")[0])
         return f"{self.path}:{line}: {key}" if line else f"{self.path}: {key}"

@@ -114,12 +114,12 @@ def step_start(found: ModalBasis, displacement: float) -> Start:
 
 
 def motions(found: ModalBasis, modal) -> np.ndarray:
-    """Coordinates (k, n) as motions (k, p) of the scene's own modes or masses."""
+    """Motions (k, p) [m] of the scene's own modes or masses, from coordinates modal (k, n) [m] of the basis."""
     return modal if found.shapes is None else modal @ found.shapes.T
 
 
 def frequencies(scene, modes: ModalBasis) -> np.ndarray:
-    """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
+    """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included; rigid ones are 0."""
     if scene.structure.mode and scene.structure.bonded is None:
         return np.array([mode.frequency for mode in scene.structure.mode])
     return modes.omega / (2 * pi)
@@ -144,11 +144,12 @@ def first_of(scene) -> tuple:
     reach = max(float(np.square(found.output).sum()), 1e-300)
     if structure.moving_mass is not None and structure.file is not None:
         return frequency, structure.moving_mass
+    # round-off: it leaves the output at rest
     return frequency, float(found.mass / (share if share > 1e-12 * reach else reach))
 
 
 def start_of(scene, modes: ModalBasis):
-    """Start of a scene that does not begin at rest, else None."""
+    """Start of a scene that does not begin at rest, else None; PatchfemError where it lies beyond structure.travel."""
     start, travel = start_state(scene, modes), scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "

@@ -42,5 +42,8 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
 
 
 def space_rung(coarser, beside=None) -> Rung:
-    """Rung of a coarser mesh, fewer modes or narrower strips, whose change is the error."""
+    """Rung whose one run has a coarser mesh, fewer modes or narrower strips, and whose change is the error.
+
+    coarser, beside: variants as in `Rung`.
+    """
     return Rung((coarser,), change, beside)

@@ -14,7 +14,7 @@ from .rows import row_of
 
 
 def change(fine: dict, coarse: dict) -> dict:
-    """Difference |fine - coarse| of the measures that both runs have; a phase is compared modulo pi."""
+    """Difference |fine - coarse| by name of the measures that both runs have; a phase is compared modulo pi."""
     out = {}
     for name in fine.keys() & coarse.keys():
         gap = abs(fine[name] - coarse[name])
@@ -29,7 +29,7 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
     first slip) has at least the resolution of a step.
     """
     last, before = change(fine, half), change(half, quarter)
-    factor = 2.0 if steps < 400 else 1.0
+    factor = 2.0 if steps < 400 else 1.0  # fewer steps than the estimate was tried at (head of the file)
     out = {name: factor * max(value, before.get(name, 0.0) / 2) for name, value in last.items()}
     for name in out:
         out[name] += row_of(name).grain / steps

@@ -28,7 +28,10 @@ class Events:
 
 
 def table(rows, count: int | None = None, source: str = "") -> Events:
-    """Events of rows (time, interface, kind, slide) in any order; the last MOST are kept."""
+    """Events from rows (time [s], interface, kind, slide [m]) in any order; the last MOST of them are kept.
+
+    count: how many there were, None for len(rows); source: a sentence on where they come from.
+    """
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     count, rows = len(rows) if count is None else count, rows[-MOST:]
@@ -37,11 +40,11 @@ def table(rows, count: int | None = None, source: str = "") -> Events:
 
 
 def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
-    """Events seen in samples.
+    """Events seen in samples: stops, releases and reversals of every interface, and the borders of the drive.
 
     A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal where it changes sign
-    without a stop between samples. time: (k,) [s]; slips, slides: (k, i) irreversible and whole motion [m]; held [m]: a
-    cycle that slips less sticks; borders [s] of the drive.
+    without a stop between samples. time: (k,) [s]; slips, slides: (k, i) irreversible and whole motion [m]; period [s]
+    of the drive; held [m]: a cycle that slips less sticks; borders [s] of the drive.
     """
     rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
@@ -51,11 +54,14 @@ def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) 
 
 
 def states(time, slip, period: float, held: float = 0.0) -> tuple:
-    """State between the samples: (k - 1,) speed over its peak in the cycle, and (k - 1,) +1, -1 slipping, 0
-    sticking."""
+    """State between the samples, (k - 1,) each: slip speed over its peak in the cycle, and +1, -1 slipping, 0 sticking.
+
+    time: (k,) [s]; slip: (k,) irreversible motion [m]; period [s] of the drive; held [m]: a cycle that slips less
+    sticks.
+    """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
+    cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)  # 1e-6: round-off of the times
     peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
     np.maximum.at(peak, cycle, np.abs(rate))
     for side in (slip[:-1], slip[1:]):
@@ -107,7 +113,10 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
 
 
 def stuck_time(events: Events, number: int, begin: float, end: float, moves: bool) -> float:
-    """Time [s] within [begin, end] during which interface `number` (from 1) sticks; moves: as in `sticks`."""
+    """Time [s] within [begin, end] [s] during which an interface sticks, between its events.
+
+    number: of the interface, from 1; moves: whether it slips all the time where it has no event.
+    """
     mine = events.interface == number
     one = Events(events.time[mine], np.ones(mine.sum(), np.int32), events.kind[mine], events.slide[mine],
                  events.count)

@@ -21,14 +21,17 @@ def energy_balance(book: dict) -> float:
 
 
 def harmonic(time, weight, values, omega) -> complex:
-    """First Fourier coefficient 2/T int values exp(-i omega t) dt of samples with quadrature weights."""
+    """First Fourier coefficient 2/T int values exp(-i omega t) dt of samples, in the unit of the values.
+
+    time: (k,) [s]; weight: (k,) of the quadrature; values: (k,); omega [rad/s].
+    """
     return 2 * np.sum(weight * values * np.exp(-1j * omega * time)) / np.sum(weight)
 
 
 def step_harmonic(time, means, omega) -> complex:
-    """First Fourier coefficient of a force whose mean (k - 1,) over each step between `time` (k,) is known.
+    """First Fourier coefficient of a force whose mean (k - 1,) over each step between `time` (k,) [s] is known.
 
-    It is exact for a force that is constant in each step, so a jump at a sample costs nothing.
+    omega [rad/s]. It is exact for a force that is constant in each step, so a jump at a sample costs nothing.
     """
     turn = np.exp(-1j * omega * time)
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
@@ -80,17 +83,17 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
 
 
 def slip_noise(window: Response) -> float:
-    """Range [m] below which slip is no more than the last digit of the coordinates."""
+    """Range [m] below which slip is no more than the last digit of the coordinates: 1e-13 of the largest one."""
     return ROUND * float(np.abs(window.modal).max(initial=0.0))
 
 
 def circular_mean(phases) -> float:
-    """Mean of angles [rad] modulo pi, in [0, pi)."""
+    """Mean of angles [rad] that mean the same modulo pi, in [0, pi)."""
     return float(np.angle(np.mean(np.exp(2j * np.asarray(phases)))) / 2 % np.pi)
 
 
 def ledger_measures(ledger) -> dict:
-    """Measures of a ledger (4, k) [J]: friction work, energy stored, dissipated and created at its end."""
+    """Work that went in and energy stored, dissipated and created [J], by name, at the end of a ledger (4, k) [J]."""
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
@@ -116,7 +119,10 @@ def work_check(work, pairs, jumps: bool = False) -> float:
 
 
 def drift(time, slide, period: float) -> float:
-    """Mean motion per cycle [m] over the window: last cycle's mean minus the first one's, per cycle between them."""
+    """Mean motion per cycle [m] over the window: mean of the last cycle less that of the first, per cycle between them.
+
+    time: (k,) [s]; slide: (k,) [m]; period [s]. In a window below 1.5 cycles it is the motion from end to end.
+    """
     end, start = time[-1], time[0]
     cycles = (end - start) / period
     if cycles < 1.5:
@@ -137,7 +143,7 @@ def acceleration_peak(window: Response) -> float:
     left, mid, right = size[top - 1:top + 2]
     bend = left - 2 * mid + right
     gain = -(right - left)**2 / (8 * bend) if bend < 0 else 0.0
-    return float(mid + (gain if gain < 0.01 * mid else 0.0))
+    return float(mid + (gain if gain < 0.01 * mid else 0.0))  # a larger gain is a jump, not a smooth peak
 
 
 def swing(window: Response) -> float:
@@ -156,7 +162,7 @@ def swing(window: Response) -> float:
     slope = np.arange(1, 6)[:, None] * c[1:]
     bend = np.arange(1, 5)[:, None] * slope[1:]
     s = p / (p - q)
-    for _ in range(6):
+    for _ in range(6):  # Newton's method from the straight line doubles its digits each time
         power = s[None] ** np.arange(5)[:, None]
         curve = (bend * power[:-1]).sum(axis=0)
         s = np.clip(s - (slope * power).sum(axis=0) / np.where(curve == 0, np.inf, curve), 0.0, 1.0)
@@ -166,7 +172,10 @@ def swing(window: Response) -> float:
 
 
 def window_amplitudes(extremes, window: int) -> np.ndarray:
-    """Half peak-to-peak per window of `window` cycles, oldest first, a partial head left out; extremes (c, 2)."""
+    """Half peak-to-peak [m] of the output per window of `window` cycles, oldest first.
+
+    extremes: (c, 2) [m] per cycle; a partial window at the head is left out, unless it is all there is.
+    """
     count = len(extremes) // window
     if count == 0:
         return np.array([(extremes[:, 1].max() - extremes[:, 0].min()) / 2])
@@ -188,7 +197,7 @@ def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> Outcome:
         return Outcome.STEADY if abs(change) < scale else Outcome.TRANSIENT
     rest = tail(a[-3:])
     rest = np.inf if rest is None else abs(rest)
-    endless = not np.isfinite(rest) and _rises(a) and abs(change) > 0.05 * scale
+    endless = not np.isfinite(rest) and _rises(a) and abs(change) > 0.05 * scale  # 0.05: slower is steady
     if abs(change) < scale and (rest < scale or not (np.isfinite(rest) or endless)):
         return Outcome.STEADY
     return Outcome.GROWS if _rises(a) and not np.isfinite(rest) else Outcome.TRANSIENT
@@ -233,7 +242,10 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
 
 
 def window_ends(extremes, phasors, window: int) -> tuple:
-    """Amplitudes and phasors of the last cycle of each window; extremes (c, 2), phasors (c,) per cycle."""
+    """Amplitudes [m] and phasors [m] of the last cycle of each window of `window` cycles, oldest first.
+
+    extremes: (c, 2) [m] and phasors: (c,) per cycle.
+    """
     pick = np.arange(len(phasors) - 1, -1, -window)[::-1]
     return (extremes[pick, 1] - extremes[pick, 0]) / 2, phasors[pick]
 

@@ -38,7 +38,7 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
 
 
 def changing_note(outcome: Outcome, drive) -> list:
-    """The sentence on measures under a drive that changes to the end."""
+    """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
     if outcome is not Outcome.TRANSIENT or drive.segments:
         return []
     return ["the drive changes to the end, so nothing settles: the measures are those of the last cycles; the whole "

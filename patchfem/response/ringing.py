@@ -43,6 +43,7 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     if np.abs(rest).max() <= FAINT * size:
         return None
     if time.size > MOST_SAMPLES:  # of a long stick the first part: later less is left of the ring
+        # no more samples than the ring needs
         stride = max(1, int(2 * np.pi / _highest(time, rest) / (time[1] - time[0]) / PER_PERIOD))
         time, value, columns, rest = (part[::stride][:MOST_SAMPLES] for part in (time, value, columns, rest))
     span = time[-1]
@@ -147,7 +148,7 @@ def _grown(time, value, forced, rest) -> tuple | None:
         tries = [_refined(time, value, forced, np.append(poles, start))
                  for start in _starts(time, value, forced, poles, rest)]
         new = min(tries, key=lambda one: one[2])
-        if not np.isfinite(new[2]) or new[2] > last / 2:
+        if not np.isfinite(new[2]) or new[2] > last / 2:  # less gain is noise
             break
         best, last = new, new[2]
         rest = _share(time, value, forced, best[0])[0]

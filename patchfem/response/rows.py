@@ -39,24 +39,27 @@ class Seen:
 
     @cached_property
     def slip(self) -> dict:
-        """slip_amplitude, stick_fraction and slip_start_phase, as far as the run has them."""
+        """slip_amplitude [m], stick_fraction [1] and slip_start_phase [rad] by name, as far as the run has them."""
         found = {} if self.load is None else slip_measures(self.window, self.drive, self.steps)
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
 
     @cached_property
     def cycle(self) -> dict:
-        """loop_area, equivalent_stiffness and equivalent_damping, as far as the run has them."""
+        """loop_area [J], equivalent_stiffness [N/m] and equivalent_damping [1] by name, as far as the run has them."""
         if self.loop is None or self.load is None:
             return {}
         return interface_loop(*self.loop, self.stiffness)
 
     @cached_property
     def energies(self) -> dict:
-        """The measures of the ledger at its end."""
+        """The measures of the ledger at its end [J] by name, empty without a ledger."""
         return {} if self.ledger is None else ledger_measures(self.ledger)
 
     def of_load(self, value: Callable) -> float | None:
-        """value(load history (k,) [N]) where the load changes with the motion."""
+        """A number of the load history (k,) [N] in the window; None where the load does not change with the motion.
+
+        value: function of that history.
+        """
         load = self.window.extra.get("normal_load")
         return None if load is None or self.load is None else float(value(load))
 
@@ -119,7 +122,10 @@ TABLE = {row.name: row for row in ROWS}
 
 
 def measures_of(seen: Seen) -> dict:
-    """Value by name of every row that the run has; the engine's own value comes before the one read off the samples."""
+    """Value by name of every row that the run has, in SI units.
+
+    The engine's own value comes before the one that is read off the samples.
+    """
     out = {}
     for row in ROWS:
         value = seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
@@ -135,5 +141,5 @@ def of_first(name: str) -> str:
 
 
 def row_of(name: str) -> Row:
-    """The row of a measure of any interface."""
+    """The row of a measure of any interface; KeyError for a name without one."""
     return TABLE[of_first(name)]

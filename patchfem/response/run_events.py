@@ -12,7 +12,7 @@ SOURCE = "located by the event engine"
 
 
 def slips_of(response) -> tuple:
-    """Irreversible and whole motion (k, i) [m] of every interface."""
+    """Irreversible and whole motion, (k, i) [m] each, of every interface at the samples of a Response."""
     extra = response.extra
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
@@ -25,7 +25,7 @@ def borders_of(drive) -> list:
 
 
 def of_log(log) -> Events:
-    """Events of an EventLog."""
+    """Events of an EventLog of the exact engine, as the table of `response.events`."""
     part = slice(-MOST, None)
     kind = np.array([OF_LOG[what] for what in log.what[part].tolist()], float)
     slide = np.where(kind == BORDER, np.nan, log.slide[part])
@@ -33,7 +33,10 @@ def of_log(log) -> Events:
 
 
 def events_of(window, drive, log=None, held: float = 0.0) -> Events:
-    """Events of a run: all of its log, or those seen in its last cycles; held [m] as in `response.events.detected`."""
+    """Events of a run: all of its log, or without one those seen in the samples of its last cycles.
+
+    window: Response; drive; log: EventLog or None; held [m]: a cycle that slips less sticks.
+    """
     if log is not None:
         return of_log(log)
     slips, slides = slips_of(window)
@@ -41,7 +44,7 @@ def events_of(window, drive, log=None, held: float = 0.0) -> Events:
 
 
 def moving(window, drive, log=None, held: float = 0.0) -> list:
-    """Whether each interface slips at some time in the window."""
+    """Whether each interface slips at some time in the window, [bool] (i); arguments as in `events_of`."""
     slips, held = slips_of(window)[0], max(held, slip_noise(window))
     if log is not None:
         return [bool(np.ptp(column) > 0) for column in slips.T]
@@ -69,19 +72,20 @@ def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
 
 
 def with_own(measures: dict, own: dict | None) -> dict:
-    """Measures with the uncertainty that the run itself leaves added to their errors."""
+    """Measures with the uncertainty that the run itself leaves, own by name, added to the errors they have."""
     return {name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
             for name, m in measures.items()}
 
 
 def all_stick(window, held: float) -> bool:
-    """Whether no interface and no strip slips by more than `held` [m] to either side, or by the last digit."""
+    """Whether no interface and no strip slips in the window by more than `held` [m] to either side, or the last
+    digit."""
     slips = np.column_stack([window.slip, slips_of(window)[0]])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_noise(window)))
 
 
 def joined_logs(logs, shifts) -> object:
-    """EventLogs of runs one after the other, begun `shifts` [s] later, with a border between them."""
+    """One EventLog of runs one after the other, begun `shifts` [s] later than the first, with a border between them."""
     from ..dynamics.events import event_list as listed
 
     first = logs[0]

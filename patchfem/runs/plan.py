@@ -37,7 +37,7 @@ class Plan:
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def as_json(self) -> dict:
-        """The object `patchfem plan --json` prints."""
+        """The plan as the object that `patchfem plan --json` prints."""
         return {"kind": self.kind, "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
                 "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
                 "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
@@ -45,7 +45,11 @@ class Plan:
 
 
 def plan(asked, per_point: bool = False) -> Plan:
-    """Plan of a Scene or a Model from its numbers alone: no mesh, no solve. PatchfemError where nothing can run it."""
+    """Plan of a Scene or a Model from its numbers alone: no mesh, no solve.
+
+    per_point: bonds are followed at every node though one point would do. PatchfemError, with its place, where nothing
+    can run it.
+    """
     model = asked if isinstance(asked, Model) else build(asked)
     with placed(model.source):
         return _planned(model, per_point)
@@ -131,7 +135,7 @@ def free_bytes() -> float:
 
 
 def refuse_size(what: Plan) -> None:
-    """Missing where a run would need more memory than there is."""
+    """Raise Missing where a run would need more memory than there is."""
     free = free_bytes()
     if what.bytes > free:
         raise Missing(f"about {what.bytes / 1e9:.3g} GB are needed, {free / 1e9:.3g} GB are free; make "

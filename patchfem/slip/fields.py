@@ -6,7 +6,11 @@ from ..friction.bonds.parameters import Bonds
 
 
 def element_fields(patch, found, states, length: float) -> tuple:
-    """Traction and irreversible local slip (f, m) of a Jenkins set in states [(slide, stretch), ...]."""
+    """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of a Jenkins set, read back from its states.
+
+    patch: the solved Patch; found: its JenkinsSet; states: f of (slide [m], stretch (t,) [m]); length [m]: of the
+    elastic-plastic law, 0 for Coulomb's.
+    """
     m, weight = patch.x.size, patch.pieces.interface.weight
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
     for i, (slide, stretch) in enumerate(states):
@@ -19,7 +23,11 @@ def element_fields(patch, found, states, length: float) -> tuple:
 
 
 def point_fields(patch, law: Bonds, shear, states) -> tuple:
-    """Traction and irreversible local slip (f, m) of bond points in states [(slide, bonds (4, a)), ...]."""
+    """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of bond points, read back from their states.
+
+    patch: the solved Patch; shear: its ShearModes or None; states: f of (slide [m], bonds (4, a): m, z, s2, local
+    slide).
+    """
     m = patch.x.size
     index = np.arange(m) if shear is None else shear.points
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))

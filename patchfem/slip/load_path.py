@@ -54,7 +54,7 @@ def _cuts(state: SlipState, operators: Operators, step: Step) -> list:
     if step.load is None and not active.any():
         share = _touch(at(0.0), at(1.0))
     for _ in range(CUTS * operators.x.size):
-        if share >= 1 - 2 * AHEAD:
+        if share >= 1 - 2 * AHEAD:  # the rest is shorter than the look ahead
             return out
         ahead = share + AHEAD * (1 - share)
         active, force, rate, opening, widening = _rates(operators, at(ahead), at(1.0), 1 - ahead, active)
@@ -65,7 +65,7 @@ def _cuts(state: SlipState, operators: Operators, step: Step) -> list:
         share = ahead + first
         if share < 1 - AHEAD:
             out.append(at(share))
-        turned = np.minimum(leaves, enters) <= first + 1e-14
+        turned = np.minimum(leaves, enters) <= first + 1e-14  # mirrored nodes change together
         active = active ^ turned if np.isfinite(first) else active
     raise NotConverged("contact: the contact set changes too often along one leg of the load path; take smaller steps")
 

@@ -42,7 +42,10 @@ class Operators:
     kept: dict = field(default_factory=dict, repr=False)
 
     def inverse(self, name: str) -> Kept:
-        """The kept inverse of the operator "normal", "tangential" or "both" (2m, 2m)."""
+        """The kept inverse of one operator, made on the first call.
+
+        name: "normal" or "tangential" (m, m), or "both" (2m, 2m): normal forces before shear forces, coupled.
+        """
         if name not in self.kept:
             full = getattr(self, name) if name != "both" else \
                 np.block([[self.normal, self.coupling], [self.coupling.T, self.tangential]])
@@ -104,7 +107,7 @@ class SlipState:
 
     @property
     def load(self) -> float:
-        """Resultant of the normal forces [N]."""
+        """Resultant of the normal forces [N], compression > 0."""
         return float(self.normal_force.sum())
 
     @property
@@ -114,12 +117,16 @@ class SlipState:
 
     @property
     def active(self) -> np.ndarray:
-        """Contact set (m,) bool: the nodes that carry."""
+        """Contact set (m,) bool: the nodes with a normal force above zero."""
         return self.normal_force > 0
 
 
 def start(operators: Operators, gap: np.ndarray, slide: float = 0.0) -> SlipState:
-    """The pieces at rest, a hair apart at their nearest node, before any slip; gap (m,) [m] with its tilt."""
+    """State of pieces at rest before any load and slip, touching at their nearest node without a force.
+
+    gap: (m,) [m] with its tilt; slide [m] of the holders at the start. PatchfemError for a gap of another shape or
+    values that are not finite.
+    """
     gap = np.asarray(gap, float)
     if gap.shape != operators.x.shape or not (np.isfinite(gap).all() and np.isfinite(slide)):
         raise PatchfemError(f"contact: the gap must be {operators.x.shape} finite heights and the slide finite")
@@ -274,7 +281,7 @@ def slip_residuals(operators: Operators, slip, gap, normal, shear, approach: flo
     if step.shear is not None:
         out["shear_balance"] = abs(shear.sum() - step.shear) / (most or 1.0)
     out["cone"] = max(0.0, np.max(np.abs(shear) - limit)) / (limit.max() or 1.0)
-    stuck = np.abs(shear[touching]) < limit[touching] * (1 - 1e-9)
+    stuck = np.abs(shear[touching]) < limit[touching] * (1 - 1e-9)  # within 1e-9 of the cone a node may do either
     out["stick"] = np.abs(moved[stuck]).max(initial=0.0) / (depth or 1.0)
     out["direction"] = np.max(-np.sign(shear[touching]) * moved, where=~stuck, initial=0.0) / (depth or 1.0)
     return {key: float(value) for key, value in out.items()}

@@ -29,10 +29,14 @@ class Kept:
         self.block = self.inverse = np.zeros((0, 0))
 
     def on(self, index: np.ndarray) -> tuple:
-        """Block of the operator on the sorted nodes `index` (n,) and its inverse, (n, n) each."""
+        """Block of the operator on the sorted nodes `index` (n,) and its inverse, (n, n) each.
+
+        PatchfemError where the block is not positive definite.
+        """
         if not np.array_equal(index, self.index):
             gone = np.isin(self.index, index, invert=True)
             new = np.setdiff1d(index, self.index, assume_unique=True)
+            # many nodes cost as much as a new inverse, and round-off adds up from update to update
             if gone.sum() + new.size > max(2, index.size // 10) or self.updates > 30:
                 self._fresh(index)
             else:
@@ -62,18 +66,25 @@ class Kept:
         self.block, self.inverse = self.full[np.ix_(index, index)], k
         self.index, self.updates = index.copy(), self.updates + 1
         probe = np.cos(np.arange(index.size)**2 % 7.0)
+        # a probe of no symmetry: where its answer is off, the inverse is made anew
         if not np.abs(self.block @ (k @ probe) - probe).max() <= 1e-11:
             self._fresh(index)
 
 
 def rigid_columns(x, count: int) -> np.ndarray:
-    """Rigid motions (m, count) of the upper holder: none, approach, or approach and minus rotation."""
+    """Rigid motions (m, count) of the upper holder: approach, then minus rotation about x = 0.
+
+    x: (m,) [m]; count: 0 (none), 1 or 2.
+    """
     return np.stack([np.ones(x.size), x], axis=1)[:, :count]
 
 
 def press_forces(kept: Kept, x, gap, target, active, spring: float = 0.0) -> tuple:
-    """Normal forces (m,) [N], motions and sets tried, as `unilateral.solve_forces`, on an inverse that follows the
-    set."""
+    """Normal forces (m,) [N], rigid motions and sets tried of a contact, on an inverse that follows the set.
+
+    kept: inverse of the normal compliance; x, gap: (m,) [m]; target, spring and the motions as in
+    `unilateral.solve_forces`, which takes over where sets come back; active: (m,) bool of a neighbouring answer.
+    """
     rigid = rigid_columns(x, target.size)
     active = active.copy() if active.sum() >= max(1, target.size) else np.zeros(0, bool)
     seen = set()
@@ -85,7 +96,7 @@ def press_forces(kept: Kept, x, gap, target, active, spring: float = 0.0) -> tup
         force = np.zeros(x.size)
         force[index], motion = _sole(kept, index, gap[index], rigid[index], target, spring)
         opening = gap - rigid @ motion + kept.full @ force
-        scale = 1e-13 * (kept.largest * np.abs(force).sum() + np.ptp(gap))
+        scale = 1e-13 * (kept.largest * np.abs(force).sum() + np.ptp(gap))  # round-off of an opening
         following = (active & (force > 0)) | (~active & (opening < -scale))
         if np.array_equal(following, active):
             return force, motion, count
@@ -117,8 +128,9 @@ def _sole(kept, index, gap, rigid, target, spring):
 def bounded_shear(kept: Kept, index, reference, limit, sign, total=None, slide=None) -> tuple:
     """Shear forces of a contact set under known limits mu f, with the slide and the signs of the slipping nodes.
 
-    index: (n,) nodes; reference: (n,) s + C_nt^T f [m]; limit: (n,) > 0 [N]; sign: (n,) -1, 0, 1 of a neighbouring
-    answer; either `total` [N], smaller in size than sum(limit), or `slide` [m]. Also returns the sets tried.
+    Returns forces (n,) [N], slide [m], signs (n,), sets tried. kept: inverse of the tangential compliance; index: (n,)
+    nodes; reference: (n,) s + C_nt^T f [m]; limit: (n,) > 0 [N]; sign: (n,) -1, 0, 1 of a neighbouring answer; either
+    `total` [N], smaller in size than sum(limit), or `slide` [m]. NotConverged where the slower method does not end.
     """
     block, inverse = kept.on(index)
     sign, seen = sign.copy(), set()
@@ -194,7 +206,7 @@ def _one_by_one(block, reference, limit, total, slide) -> tuple:
             if total is not None:
                 motion = (total - wanted.sum() - both[:, 0].sum()) / both[:, 1].sum()
             wanted[stuck] = both[:, 0] + motion * both[:, 1]
-        over = stuck & (np.abs(wanted) > limit * (1 + 1e-13) + ROUND * limit.max())
+        over = stuck & (np.abs(wanted) > limit * (1 + 1e-13) + ROUND * limit.max())  # beyond round-off
         if over.any():
             way = np.where(over, wanted - force, 1.0)
             share = np.where(over, (np.sign(wanted) * limit - force) / np.where(way == 0, 1.0, way), np.inf)

@@ -84,7 +84,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         first = wait.min()
         slide += max(first, 0.0)
         carried[index] += rate * max(first, 0.0)
-        going = wait <= first * (1 + 1e-12)
+        going = wait <= first * (1 + 1e-12)  # nodes that yield at once, as mirrored ones do
         rates.append(np.zeros(force.size))
         rates[-1][index] = rate
         at.append(slide)
@@ -187,6 +187,7 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     count = min(count, index.size)
     shape = vectors / root[:, None]
     elastic = 2 * np.abs(shape @ (values * (shape.T @ limit[index]))).max()
+    # six bond lengths: exp(-6) of the bonds' stretch is left; the square sets more slides where the backbone bends
     slides = (6 * bond_length + elastic) * (np.arange(1, 25) / 24) ** 2
     many = max(64, 4 * count)
     with one_thread(), np.errstate(over="ignore", invalid="ignore"):
@@ -230,17 +231,26 @@ def _backbone(limit, shape, values, length, slides) -> np.ndarray:
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
-    """Tangential stiffness dT/d(slide) [N/m] with every node of the contact set sticking; active (m,) bool."""
+    """Tangential stiffness dT/d(slide) [N/m] of a patch with every node of its contact set sticking.
+
+    tangential: compliance (m, m) [m/N]; active: (m,) bool contact set.
+    """
     index = np.flatnonzero(active)
     return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
 
 
 def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:
-    """Rotational stiffness -dM/d(rotation) [N m/rad] about x = 0 at fixed approach and contact set; x (m,) [m]."""
+    """Rotational stiffness -dM/d(rotation) [N m/rad] > 0 about x = 0 at fixed approach and contact set.
+
+    normal: compliance (m, m) [m/N]; x: (m,) [m]; active: (m,) bool contact set.
+    """
     index = np.flatnonzero(active)
     return float(np.linalg.solve(normal[np.ix_(index, index)], x[index]) @ x[index])
 
 
 def normal_stiffness(normal: np.ndarray, active: np.ndarray) -> float:
-    """Normal stiffness dN/d(approach) [N/m] at fixed rotation and contact set."""
+    """Normal stiffness dN/d(approach) [N/m] at fixed rotation and contact set.
+
+    normal: compliance (m, m) [m/N]; active: (m,) bool contact set.
+    """
     return tangential_stiffness(normal, active)

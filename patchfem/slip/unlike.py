@@ -186,6 +186,6 @@ def _alternate(both, x, gap, target, total, slide, reference, friction, spring) 
             sign = np.zeros(m, np.int8)
             sign[index] = found[2]
         change, shear = np.abs(new - shear).max(), new
-        if change <= 1e-14 * (friction * force.sum()):
+        if change <= 1e-14 * (friction * force.sum()):  # of mu N: round-off
             return force, shear, motion, float(moved_to), sign, MOST + count
     raise NotConverged(_UNSETTLED)

@@ -17,7 +17,10 @@ KNOWN = ("M", "K", "C", "omega", "frequency", "damping", "moving_mass", "slide",
 
 
 def read(path) -> dict:
-    """Known arrays of a file by name; PatchfemError for a file that cannot be read."""
+    """Known arrays of a .npz or .mat file by name (`KNOWN`); other arrays are left alone.
+
+    PatchfemError for a file that cannot be read, holds objects, or is a .mat file of version 7.3.
+    """
     try:
         if str(path).lower().endswith(".npz"):
             with np.load(path, allow_pickle=False) as file:
@@ -118,13 +121,14 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
     damping = _numbers(data, "damping", where, (n,), (n, n))
     if damping.ndim == 1 and (damping < 0).any():
         raise PatchfemError(f"{where}: damping must be >= 0, not {damping.min():g}")
+    # round-off of a singular D
     if damping.ndim == 2 and np.linalg.eigvalsh(damping + damping.T).min() < -1e-9 * np.abs(damping).max():
         raise PatchfemError(f"{where}: damping feeds energy in; a positive matrix D [1/s] is wanted")
     zeta, coupled = matrices.split(damping, omega) if damping.ndim == 2 else (frozen_array(damping), None)
     output = _numbers(data, "output", where, (n,)) if "output" in data else faces[0]
     base = -(_numbers(data, "force", where, (n,)) if "force" in data else output) if forced \
         else _numbers(data, "base", where, (n,))
-    if not forced and np.sum(base**2) > 1 + 1e-9:
+    if not forced and np.sum(base**2) > 1 + 1e-9:  # modes of unit mass hold at most the whole of it
         raise PatchfemError(f"{where}: the sum of base^2 over the modes is {np.sum(base**2):.6g}; <= 1 is wanted")
     moved = {key: frozen_array(_numbers(data, key, where, (n,))) for key in PATCH if key in data and data[key].any()}
     return ModalBasis(_names(data, n, where) or tuple(f"mode {k + 1}" for k in range(n)), frozen_array(omega), zeta,

@@ -11,10 +11,11 @@ ROWS = ("slide", "base", "output", "normal", "pitch", "lateral", "yaw")
 
 
 def bonded(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
-    """The modes with a spring [N/m] and a damper [N s/m] along the slide of the first interface.
+    """The modes with a spring [N/m] and a damper [N s/m], both >= 0, along the slide of the first interface.
 
-    The stiffness diag(omega^2) + k s s^T / mass is made diagonal again; D mostly couples then. `shapes` leads back to
-    the coordinates that `basis` had, or to its own shapes.
+    The stiffness diag(omega^2) + k s s^T/mass is made diagonal again, exactly; D mostly couples then. The largest share
+    that an old mode has in a new one is > 0. `shapes` leads back to the coordinates that `basis` had, or to its own
+    shapes.
     """
     s, m = basis.interfaces[0], basis.mass
     omega, V = decouple(np.vstack([np.diag(basis.omega), np.sqrt(stiffness / m) * s]))

@@ -20,7 +20,7 @@ class Piecewise:
     moving: bool = True
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s]; at the border of two segments the later one."""
+        """Drive [m s-2] at times t (k,) >= 0 [s]; at the border of two segments that of the later one."""
         t = np.asarray(t, float)
         which = np.searchsorted([s.start for s in self.segments], t, side="right") - 1
         out = np.zeros(t.shape)
@@ -31,17 +31,24 @@ class Piecewise:
 
 
 def step(size: float, period: float, moving: bool = True) -> Piecewise:
-    """A step drive: a constant `size` [m s-2] from t = 0."""
+    """A step drive: the constant `size` [m s-2] from t = 0; period [s]: what counts as a cycle.
+
+    moving: the base accelerates by it; False: it is a force over the modal mass.
+    """
     return Piecewise((Segment(0.0, size),), period, moving)
 
 
 def release(period: float) -> Piecewise:
-    """No drive at all: free motion from the given start."""
+    """No drive at all, for free motion from the given start; period [s]: what counts as a cycle."""
     return Piecewise((Segment(0.0),), period, False)
 
 
 def levels(accelerations, omega: float, cycles: float, moving: bool = True) -> Piecewise:
-    """A sine drive whose amplitude [m s-2] changes every `cycles` cycles, its phase going on (as the report tests)."""
+    """A sine drive whose amplitude changes from level to level while its phase goes on, as the report tested.
+
+    accelerations [m s-2]: one per level; omega [rad/s]; cycles: length of a level; moving as in `step`. Source: report,
+    4.C.
+    """
     period = 2 * np.pi / omega
     parts = [Segment(k * cycles * period, 0.0, float(a), omega, 2 * np.pi * (k * cycles % 1.0))
              for k, a in enumerate(accelerations)]
@@ -66,21 +73,21 @@ class Sweep:
 
     @property
     def segments(self) -> tuple:
-        """Empty: the response to a chirp has no elementary form."""
+        """Empty, as the response to a chirp has no elementary form."""
         return ()
 
     @property
     def period(self) -> float:
-        """Period of the frequency at the end [s]."""
+        """Period [s] of the frequency at the end of the sweep."""
         return 1 / self.high
 
     def frequency(self, t):
-        """Instantaneous frequency [Hz] at t (k,) [s]."""
+        """Instantaneous frequency [Hz] at times t (k,) >= 0 [s]; that of the end from `duration` on."""
         part = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
         return self.low * (self.high / self.low)**part if self.logarithmic else self.low + (self.high - self.low) * part
 
     def phase(self, t):
-        """Phase 2 pi int_0^t f dt [rad]."""
+        """Phase 2 pi int_0^t f dt [rad] at times t (k,) >= 0 [s], in closed form."""
         t = np.asarray(t, float)
         inside = np.minimum(t, self.duration)
         if self.logarithmic and self.high != self.low:
@@ -91,7 +98,7 @@ class Sweep:
         return 2 * np.pi * (turns + (t - inside) * self.high)
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s]."""
+        """Drive [m s-2] at times t (k,) >= 0 [s]: the acceleration, or X omega(t)^2, times the sine of the phase."""
         size = self.acceleration
         if self.displacement is not None:
             size = self.displacement * (2 * np.pi * self.frequency(t))**2
@@ -100,7 +107,11 @@ class Sweep:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recorded:
-    """A signal read off a table: time (k,) [s] rising from 0, value (k,) [m s-2], straight between, 0 after its end."""
+    """A signal read off a table, straight between its rows and 0 after the last.
+
+    time: (k,) [s] rising from 0; value: (k,) [m s-2]; period [s]: what counts as a cycle; moving as in `step`.
+    PatchfemError for fewer than two rows or times that do not rise from 0.
+    """
 
     time: np.ndarray
     value: np.ndarray
@@ -113,9 +124,9 @@ class Recorded:
 
     @property
     def segments(self) -> tuple:
-        """Empty: a recorded signal is marched."""
+        """Empty, as a recorded signal is marched."""
         return ()
 
     def values(self, t):
-        """Drive [m s-2] at times t (k,) >= 0 [s]."""
+        """Drive [m s-2] at times t (k,) >= 0 [s], linear between the rows."""
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)

@@ -25,9 +25,10 @@ FLAT = 1e-9  # relative residual at which nothing is left
 
 
 class Fit:
-    """A separable least-squares problem.
+    """A separable least-squares problem: modes from frequency responses, linear in all but (w_r, zeta_r).
 
-    omega: (q,) [rad/s]; data: (q, p) complex; power: (p,) derivatives that were measured.
+    omega: (q,) [rad/s]; data: (q, p) complex; power: (p,) derivatives that were measured. Every response is scaled by
+    its root mean square. PatchfemError where the derivatives are mixed.
     """
 
     def __init__(self, omega, data, power):
@@ -40,6 +41,7 @@ class Fit:
         self.lift = (1j * omega)**power[0]
         self.data = data / size
         self.level = np.sqrt(np.mean(np.abs(self.data)**2, axis=1))
+        # first guess of the noise: in proportion to the response, at least 1e-3 of its largest
         self.weigh(self.level + 1e-3 * self.level.max())
 
     def weigh(self, noise):
@@ -53,7 +55,11 @@ class Fit:
         return np.vstack([values.real, values.imag])
 
     def columns(self, theta):
-        """Real design (2q, n + 2) for theta = (ln w_r ..., ln zeta_r ...), its derivatives and the column scales."""
+        """Real design (2q, n + 2) for theta = (ln w_r ..., ln zeta_r ...), its derivatives, and the column scales.
+
+        Columns: one per mode, then what lies below and above the band; their norms are 1 after division by the scales.
+        The derivatives over ln w_r and ln zeta_r are (2q, n) each.
+        """
         w, z = np.exp(np.split(theta, 2))
         s = self.omega[:, None]
         base = (self.weight * self.lift)[:, None]
@@ -74,9 +80,14 @@ class Fit:
         return design @ coefficients - self.target, coefficients, q, (d_w, d_z), scale
 
     def residual(self, theta):
+        """Residual (2q p,) of the weighted responses at theta (2n,), real parts before imaginary ones."""
         return self.solve(theta)[0].ravel()
 
     def jacobian(self, theta):
+        """Derivatives (2q p, 2n) of the residual over theta, as by Kaufman (1975).
+
+        Each is the change of one column outside the span of all, times the coefficients of that column.
+        """
         _, coefficients, q, slopes, _ = self.solve(theta)
         out = []
         for slope in slopes:
@@ -86,7 +97,10 @@ class Fit:
         return np.stack(out, axis=1)
 
     def refine(self, theta, close=1e-6):
-        """The least squares theta to the relative change `close`, and its residual sum."""
+        """The least-squares theta (2n,) from a start, to the relative change `close`, and its residual sum of squares.
+
+        w stays within half the lowest and twice the highest frequency, zeta within 1e-7 and 0.9.
+        """
         n = theta.size // 2
         low = np.concatenate([np.full(n, np.log(self.omega.min() / 2)), np.full(n, np.log(1e-7))])
         high = np.concatenate([np.full(n, np.log(self.top * 2)), np.full(n, np.log(0.9))])
@@ -96,20 +110,20 @@ class Fit:
         return found.x, 2 * found.cost
 
     def left(self, theta):
-        """Rest of the responses without the modes of theta (q, p), weighted."""
+        """What the modes of theta leave of the responses, (q, p) complex, weighted."""
         rest = self.solve(theta)[0]
         half = len(self.omega)
         return rest[:half] + 1j * rest[half:]
 
     def parts(self, theta):
-        """Contribution of every mode (q, n, p), weighted."""
+        """Contribution of every mode of theta to the responses, (q, n, p) complex, weighted."""
         _, coefficients, _, _, _ = self.solve(theta)
         n, half = theta.size // 2, len(self.omega)
         design = self.columns(theta)[0][:, :n]
         return (design[:half] + 1j * design[half:])[:, :, None] * coefficients[None, :n]
 
     def residues(self, theta):
-        """Residues A (n, p), L (p,) and U (p,) in the units of the receptance."""
+        """Residues A (n, p), L (p,) and U (p,) of theta, in the units of the receptance (head of the file)."""
         _, coefficients, _, _, scale = self.solve(theta)
         found = coefficients / scale[:, None] * self.size
         return found[:-2], found[-2] * self.top**2, found[-1]
@@ -227,7 +241,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     inside = (w >= omega[0]) & (w <= omega[-1])
     w, zeta, A = w[inside], zeta[inside], A[inside]
     own = A[:, places.index(ref)]
-    good = own > 1e-6 * np.abs(A).max(axis=1)
+    good = own > 1e-6 * np.abs(A).max(axis=1)  # the shape is A over the root of it
     notes += [f"the mode at {f / (2 * np.pi):.5g} Hz does not move {_named(ref)} and is left out" for f in w[~good]]
     if not good.any():
         raise PatchfemError(f"structure.file: no mode moves {_named(ref)} with the force there; check its sign")
@@ -235,7 +249,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     misfit = np.linalg.norm(fit.residual(theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > 0.5:
         raise NotConverged(f"structure.file: the modes found leave {100 * misfit:.0f} % of the responses unexplained")
-    if misfit > 0.05:
+    if misfit > 0.05:  # of the responses: worth a sentence
         notes.append(f"the {good.sum()} modes of structure.file leave {100 * misfit:.2g} % of the responses "
                      "unexplained")
     shape = A[good] / np.sqrt(own[good])[:, None]

@@ -7,7 +7,10 @@ from . import matrices
 
 
 def rows(pairs, n: int) -> np.ndarray:
-    """Relative displacements x_i - x_j (len(pairs), n) of pairs (i, j) of masses from 1, 0 the base."""
+    """Relative displacements x_i - x_j as rows (len(pairs), n) over n masses.
+
+    pairs: (i, j) of masses counted from 1, 0 the base.
+    """
     out = np.zeros((len(pairs), n))
     for row, (i, j) in zip(out, pairs):
         if i:

@@ -72,12 +72,12 @@ def decouple(rows) -> tuple:
     n = rows.shape[1]
     padded = rows if len(rows) >= n else np.vstack([rows, np.zeros((n - len(rows), n))])
     _, values, V = svd(padded, full_matrices=False)
-    omega = np.where(values <= n * ROUND * values[0], 0.0, values)
+    omega = np.where(values <= n * ROUND * values[0], 0.0, values)  # rigid modes: exactly zero
     return omega[::-1], V[::-1].T
 
 
 def trimmed(D, scale) -> np.ndarray:
-    """D (n, n) with entries set to zero that are round-off beside scale (n, n), symmetric."""
+    """D (n, n) made symmetric, with entries set to zero that are round-off beside scale (n, n): at most 1e-12 of it."""
     D = (D + D.T) / 2
     return np.where(np.abs(D) <= 1e-12 * scale, 0.0, D)
 
@@ -134,7 +134,7 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
 def _damper(phi, C):
     D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
     least = eigh(D, eigvals_only=True)
-    if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):
+    if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
         raise PatchfemError(f"structure: C feeds energy in: one shape has the damping {least[0]:.3g} 1/s over its "
                             "mass; dampers >= 0 are wanted")
     return D
@@ -175,4 +175,5 @@ def _signs(phi, output) -> np.ndarray:
     there = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
     size = np.abs(output) @ np.abs(phi)
+    # at a node of the shape the output is round-off
     return np.where(np.where(np.abs(there) > 1e-9 * size, there, largest) < 0, -1.0, 1.0)

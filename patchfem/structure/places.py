@@ -25,7 +25,11 @@ class Shapes:
     notes: list = field(default_factory=list)
 
     def at(self, text: str, key: str) -> np.ndarray:
-        """Motion (n,) at a place; several with commas between are added, signs as written: a relative motion."""
+        """Motion (n,) of the modes, for unit modal mass, at a place such as "12:+x" or "12:+x, 13:-x".
+
+        Several places are added with their signs, which makes a relative motion. key: key of the scene for messages.
+        PatchfemError for a text that is no place and for a place that the file does not have.
+        """
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
             found = _PLACE.fullmatch(part.strip())
@@ -63,7 +67,7 @@ def basis(shapes: Shapes, mass: float, places: dict, forced: bool) -> ModalBasis
     output = rows.get("output_at", slide)
     base = -rows.get("force_at", output) if forced else rows.get("base_at", slide)
     held = float(np.sum(base**2))
-    if not forced and held > 1.05:
+    if not forced and held > 1.05:  # beyond 5 % the mass or the place is wrong
         raise PatchfemError(f"structure.base_at: the modes hold {held:.4g} of moving_mass there, and at most 1 is "
                             "possible; lower structure.moving_mass or name the place of the moving mass")
     moved = {key: frozen_array(rows[f"{key}_at"]) for key in ("normal", "pitch") if f"{key}_at" in rows}
@@ -77,7 +81,7 @@ def basis(shapes: Shapes, mass: float, places: dict, forced: bool) -> ModalBasis
 
 
 def held_note(basis: ModalBasis) -> list:
-    """A sentence where the modes of a file hold less than 80 % of the moving mass."""
+    """A sentence, in a list, where the modes of a file hold less than 80 % of the moving mass; else an empty list."""
     held = float(np.sum(basis.base**2))
     if held >= 0.8:
         return []

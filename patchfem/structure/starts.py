@@ -6,13 +6,16 @@ from ..core import ModalBasis, PatchfemError, Start, frozen_array
 
 
 def at_rest(basis: ModalBasis) -> Start:
-    """Start at rest: nothing is displaced and nothing moves."""
+    """Start at rest in n coordinates: nothing is displaced and nothing moves."""
     zero = frozen_array(np.zeros(basis.omega.size))
     return Start(zero, zero)
 
 
 def given(basis: ModalBasis, displacement=None, velocity=None) -> Start:
-    """Start of displacements [m] and velocities [m/s] (p,) of the scene's own modes or masses; None: zeros."""
+    """Start from displacements [m] and velocities [m/s] (p,) of the scene's own modes or masses; None: zeros.
+
+    They are turned into the coordinates of the basis by its `shapes`. PatchfemError for another count than p.
+    """
     return Start(*(frozen_array(_coordinates(basis, values)) for values in (displacement, velocity)))
 
 
@@ -50,6 +53,8 @@ def released(basis: ModalBasis, displacement: float) -> Start:
 
 
 def base_step(basis: ModalBasis, displacement: float) -> Start:
-    """Start in the instant after the base has jumped by `displacement` [m]: what it carries stays where it was, z = -X
-    base."""
+    """Start in the instant after the base has jumped by `displacement` X [m], z = -X base.
+
+    What the base carries stays where it was.
+    """
     return Start(frozen_array(-displacement * basis.base), frozen_array(np.zeros(basis.omega.size)))

@@ -32,22 +32,27 @@ def spectrum(profile: Profile) -> tuple:
 
 def _even(profile: Profile) -> Profile:
     steps = np.diff(profile.x)
-    if np.ptp(steps) <= 1e-6 * steps.mean():
+    if np.ptp(steps) <= 1e-6 * steps.mean():  # even but for printed digits
         return profile
-    step = max(float(np.percentile(steps, 10)), profile.length / _MOST)
+    step = max(float(np.percentile(steps, 10)), profile.length / _MOST)  # as fine as the fine stretches
     x = np.linspace(profile.x[0], profile.x[-1], int(np.ceil(profile.length / step)) + 1)
     return Profile(x, np.interp(x, profile.x, profile.z), profile.source)
 
 
 def fine_share(profile: Profile, length: float) -> float:
-    """Share of the height (rms over rms, of the levelled trace) in waves shorter than `length` [m]: 0 to 1."""
+    """Share [1] of the height of the levelled trace in waves shorter than `length` [m], rms over rms, 0 to 1.
+
+    PatchfemError for missing heights.
+    """
     waves, power = spectrum(profile)
     return float(np.sqrt(_below(waves, power, length)))
 
 
 def element_for(profile: Profile, kept: float) -> float:
-    """Largest element [m] whose waves of ELEMENTS elements and more leave out at most 1 - kept of the height (rms); inf
-    for a flat trace."""
+    """Largest element [m] whose waves of two elements and more keep the share `kept` of the height (rms).
+
+    It is inf for a flat trace. PatchfemError for missing heights and unless 0 < kept < 1.
+    """
     return _element(*spectrum(profile), kept)
 
 

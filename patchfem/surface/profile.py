@@ -27,7 +27,7 @@ class Profile:
 
     @property
     def missing(self) -> np.ndarray:
-        """Whether no height was measured, (n,) bool."""
+        """Whether no height was measured at each sample, (n,) bool."""
         return np.isnan(self.z)
 
     @property
@@ -37,7 +37,7 @@ class Profile:
 
 
 def level(profile: Profile) -> Profile:
-    """Level a trace: subtract the least-squares line of its measured samples, which all count alike."""
+    """Level a trace: its least-squares line over the measured samples, which all count alike, is subtracted."""
     there = ~profile.missing
     x, z = profile.x, profile.z
     if there.sum() < 2:
@@ -118,7 +118,7 @@ def _running(z) -> tuple:
 
 
 def say(length: float) -> str:
-    """A length for a message: "200 um", "12.7 mm"."""
+    """A length [m] as words for a message, such as "200 um" or "12.7 mm", to four digits."""
     for unit, factor in (("m", 1.0), ("mm", 1e-3), ("um", 1e-6)):
         if abs(length) >= factor * (1 - 1e-9):
             return f"{length / factor:.4g} {unit}"

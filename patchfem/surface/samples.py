@@ -40,7 +40,7 @@ def _evened(path, x, factor: float) -> tuple:
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
     """
-    if x.size < 10:
+    if x.size < 10:  # too few to judge the spacing by
         return x, ()
     count = np.arange(x.size) - (x.size - 1) / 2
     step = float(count @ x / (count @ count))
@@ -50,6 +50,7 @@ def _evened(path, x, factor: float) -> tuple:
         return x, ()
     largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
     digits = 10.0 ** np.arange(largest, largest - 8, -1)
+    # the coarsest power of ten of which every x is a multiple
     digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
     if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
         return x, ()

@@ -7,12 +7,19 @@ from .profile import Profile
 
 
 def sine(x: np.ndarray, amplitude: float, wavelength: float, phase: float = 0.0) -> Profile:
-    """A sine, amplitude sin(2 pi x / wavelength + phase), at x (n,) [m]; lengths [m], phase [rad]."""
+    """A sine trace, amplitude sin(2 pi x/wavelength + phase) [m], at rising x (n,) [m].
+
+    amplitude, wavelength [m], phase [rad]. PatchfemError as in `waves`.
+    """
     return waves(x, [amplitude], [wavelength], [phase])
 
 
 def waves(x: np.ndarray, amplitudes, wavelengths, phases=None) -> Profile:
-    """Sum of k sines; amplitudes, wavelengths (k,) [m], phases (k,) [rad], 0 where left out."""
+    """Trace of k sines in sum, at rising x (n,) [m].
+
+    amplitudes, wavelengths: (k,) [m]; phases: (k,) [rad], 0 where left out. PatchfemError for lists of unlike lengths,
+    numbers that are not finite, wavelengths not above zero, and places that do not rise.
+    """
     x = _places(x)
     a, length = _finite("amplitudes", amplitudes), _finite("wavelengths", wavelengths)
     shift = np.zeros(a.size) if phases is None else _finite("phases", phases)
@@ -27,8 +34,11 @@ def waves(x: np.ndarray, amplitudes, wavelengths, phases=None) -> Profile:
 
 
 def peaks(x: np.ndarray, at, heights, widths) -> Profile:
-    """Sum of k Gaussian peaks heights exp(-(x - at)^2 / (2 widths^2)), all (k,) [m]; a height below zero is material
-    that sticks out into the gap."""
+    """Trace of k Gaussian peaks in sum, heights exp(-(x - at)^2/(2 widths^2)), at rising x (n,) [m].
+
+    at, heights, widths: (k,) [m]; a height below zero is material that sticks out into the gap. PatchfemError as in
+    `waves`.
+    """
     x = _places(x)
     at, heights, widths = (_finite(name, v) for name, v in (("at", at), ("heights", heights), ("widths", widths)))
     if not at.size == heights.size == widths.size:

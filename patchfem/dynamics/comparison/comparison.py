@@ -32,7 +32,7 @@ class Comparison:
     warnings: tuple
 
     def slide(self, modes: ModalBasis) -> np.ndarray:
-        """Slide of every interface (i, k) [m]."""
+        """Slide (i, k) [m] of every interface at every step."""
         return modes.interfaces @ self.z.T
 
     def accelerations(self, modes: ModalBasis) -> np.ndarray:
@@ -52,7 +52,7 @@ class Comparison:
 
     @property
     def worst(self) -> float:
-        """Largest |residual| [N] of an accepted step."""
+        """Largest |residual| [N] of a step that was accepted."""
         return float(np.abs(self.residual).max(initial=0.0))
 
 
@@ -110,7 +110,11 @@ def grid(modes: ModalBasis, drive, law: tuple, duration: float, steps_per_cycle:
 
 
 def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, v) -> np.ndarray:
-    """Friction forces (i,) [N] of a start: elastic ones are unstrained, held ones hold as far as they can."""
+    """Friction forces (i,) [N] of a start at coordinates z (n,) [m] and rates v (n,) [m/s].
+
+    laws: rows of `point_laws.rows`; kernels: compiled loops; drive [m s-2] at 0 s. Elastic forces are unstrained, held
+    ones hold as far as they can.
+    """
     faces = modes.interfaces
     speed, force = faces @ v, np.zeros(len(laws))
     free = -modes.base * drive - modes.omega**2 * z - modes.dampers @ v
@@ -125,7 +129,7 @@ def first_forces(modes: ModalBasis, laws: np.ndarray, kernels, drive: float, z, 
 
 
 def ledger(modes: ModalBasis, found: Grid) -> MappingProxyType:
-    """Energies [J] of a finished run by the trapezoidal rule."""
+    """Energies [J] of a finished run by the trapezoidal rule, by the names of `Comparison.ledger`."""
     m, v = modes.mass, found.v
     energy = 0.5 * m * np.sum(v[[0, -1]]**2 + (modes.omega * found.z[[0, -1]])**2, axis=1)
     work = np.trapezoid(-m * found.drive * (v @ modes.base), dx=found.h)
@@ -137,7 +141,10 @@ def ledger(modes: ModalBasis, found: Grid) -> MappingProxyType:
 
 
 def finish(modes: ModalBasis, found: Grid, failures: int, warnings: list) -> Comparison:
-    """The result of a filled grid, with its ledger and a warning for the energy that does not balance."""
+    """The result of a filled grid, with its ledger.
+
+    A warning is added where the motion is not finite or more than 1e-3 of the energy that passed through is missing.
+    """
     book = ledger(modes, found)
     flow = max(abs(book["work_in"]), book["viscous"] + abs(book["friction"]), abs(book["stored"]), 1e-300)
     if not np.isfinite(book["error"]):

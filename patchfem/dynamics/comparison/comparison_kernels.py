@@ -31,7 +31,7 @@ def law_force(laws, c, speed, travel, before, hold):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def first_forces(laws, speed, force):
-    """Forces (i,) [N] of a start at slide speeds (i,) [m/s]; of interfaces that a force may hold, 0."""
+    """Forces (i,) [N] of a start at slide speeds (i,) [m/s] into `force`; 0 where a force may hold the interface."""
     for c in range(force.size):
         held = laws[c, 0] == COULOMB and abs(speed[c]) < laws[c, 3]
         force[c] = 0.0 if held else law_force(laws, c, speed[c], 0.0, 0.0, 0.0)
@@ -39,7 +39,8 @@ def first_forces(laws, speed, force):
 
 @njit(error_model="numpy", **LEAN)
 def pull(row, z, v, omega, dampers, base, drive, out):
-    """Modal accelerations without friction into `out`, and their part along one interface `row` (n,)."""
+    """Modal accelerations (n,) [m s-2] without friction into `out`; returns their part along an interface `row`
+    (n,)."""
     along = 0.0
     for i in range(omega.size):
         a = -base[i] * drive - omega[i] ** 2 * z[i]
@@ -52,7 +53,10 @@ def pull(row, z, v, omega, dampers, base, drive, out):
 
 @njit(error_model="numpy", **LEAN)
 def holding(c, along, faces, force, mass):
-    """Force [N] at interface c that leaves it no acceleration, the other interfaces' forces given."""
+    """Force [N] at interface c that leaves it no acceleration, the forces (i,) [N] of the others given.
+
+    along [m s-2]: acceleration of the slide without friction; faces: (i, n); mass [kg].
+    """
     own = 0.0
     for d in range(force.size):
         share = 0.0
@@ -76,7 +80,7 @@ def dot(row, x):
 
 @njit(error_model="numpy", **LEAN)
 def step_of(row, z, v, first, last):
-    """Value of one row of a map."""
+    """Value at the end of a step by a row (4,) of a map: of z, v and the accelerations at both ends of the step."""
     return row[0] * z + row[1] * v + row[2] * first + row[3] * last
 
 
@@ -144,7 +148,7 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
     limit = laws[c, 1]
     if laws[c, 3] != 0 and abs(before) >= limit:
         return before
-    low, high, force = -1.001 * limit, 1.001 * limit, before
+    low, high, force = -1.001 * limit, 1.001 * limit, before  # a force at the limit lies inside the bracket
     for count in range(200):
         found, by_speed, by_travel = law.at_end(laws[:, HEAD:], c, before, speed - back_speed * force,
                                                 travel - back_travel * force)
@@ -158,9 +162,12 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
 
 @njit(error_model="numpy", **LEAN)
 def sweeps(laws, stuck, direction, speed, travel, soft_speed, soft_travel, before, force):
-    """Forces (i,) of all interfaces at the end of a step, the stuck ones given, by sweeps over them; their number."""
+    """Forces (i,) [N] of all interfaces at the end of a step, the stuck ones given, by sweeps over them; their number.
+
+    Arguments as in `settle`.
+    """
     count, change = 0, 1.0
-    while count < 500 and change > 1e-15:
+    while count < 500 and change > 1e-15:  # of the limit: round-off
         count += 1
         change = 0.0
         for c in range(force.size):

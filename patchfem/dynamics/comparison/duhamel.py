@@ -16,7 +16,10 @@ CRITERIA = ("displacement", "velocity", "force")
 
 
 def kernels(modes: ModalBasis, h: float) -> np.ndarray:
-    """Maps (n, 2, 4) of (z, z', f at the start, f at the end) to (z, z') after h [s] under f [m s-2] linear in time."""
+    """Maps (n, 2, 4) of (z, z', f at the start, f at the end) to (z, z') after h [s] (eq. 3.10).
+
+    f [m s-2] is linear in time. Dampers that couple the modes are left out; the loop takes them as a force.
+    """
     out = np.empty((modes.omega.size, 2, 4))
     for i, (w, d) in enumerate(zip(modes.omega, np.diag(modes.dampers))):
         a = np.zeros((4, 4))

@@ -13,7 +13,11 @@ from .point_laws import Smooth, loops, rows, sticking_warnings
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400,
         start: Start | None = None) -> Comparison:
-    """Run from `start` (rest) for `duration` [s]; laws: one of point_laws per interface."""
+    """Run from `start` (None: rest) for `duration` [s] by explicit Euler steps.
+
+    laws: one of point_laws per interface. PatchfemError as in `comparison.grid`. Warnings say what the step takes off
+    the damping.
+    """
 
     law = rows(laws, len(modes.interfaces))
     kernels = loops(laws)

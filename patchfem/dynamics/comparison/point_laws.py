@@ -35,7 +35,7 @@ class Coulomb:
         return COULOMB
 
     def row(self, stick_speed: float | None = None) -> np.ndarray:
-        """Numbers for the compiled loops; stick_speed [m/s] overrides the law's own."""
+        """Numbers (HEAD,) for the compiled loops; stick_speed [m/s] overrides the law's own."""
         return np.array([0.0, self.static, self.kinetic, self.stick_speed if stick_speed is None else stick_speed])
 
 
@@ -51,7 +51,7 @@ class Smooth:
 
     @property
     def limit(self) -> float:
-        """Largest force [N]."""
+        """Largest force [N], or the size of the force where none is largest."""
         return self.element.limit
 
     @property
@@ -70,12 +70,15 @@ class Smooth:
         return self.limit / self.element.numbers[2] if self.element.form == "speed" else 0.0
 
     def row(self, stick_speed: float | None = None) -> np.ndarray:
-        """Numbers for the compiled loops."""
+        """Numbers (HEAD + k,) for the compiled loops; a stick speed is not used."""
         return np.array([1.0, self.limit, 0.0, float(self.printed), *self.element.numbers])
 
 
 def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
-    """Numbers of the laws, (i, HEAD + k); PatchfemError where they do not fit the interfaces or cannot be."""
+    """Numbers of the laws for the compiled loops, (i, HEAD + k).
+
+    PatchfemError where they do not fit the number of interfaces, are not finite or positive, or kinetic exceeds static.
+    """
     if len(laws) != interfaces:
         raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give each interface its own")
     found, number = [law.row(stick_speed) for law in laws], number_of(kernels_of(laws))
@@ -97,14 +100,14 @@ def kernels_of(laws) -> tuple:
 
 
 def loops(laws):
-    """The compiled loops of the comparison methods for these laws."""
+    """The compiled loops of the comparison methods for these laws, an instance of `comparison_kernels`."""
     smooth = tuple(name for name in kernels_of(laws) if name != COULOMB)
     law = law_of(smooth or (COULOMB,), ("at_end",))
     return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law})
 
 
 def sticking_warnings(laws, stick_speed: float | None = None) -> list:
-    """Warnings of what the laws by themselves get wrong."""
+    """Sentences on what the laws by themselves get wrong: those that never stick, and 3.12 as printed."""
     out = []
     for law in laws:
         if isinstance(law, Coulomb):

@@ -13,30 +13,34 @@ SET_VALUED = True
 
 @njit(error_model="numpy", **LEAN)
 def solve(free, beta, q, v, dt, c, goal):
-    """(dq, path-mean force, iterations) of a step with dq = free - beta force."""
+    """(dq [m], path-mean force [N], iterations) of a step of Coulomb's law, with dq = free - beta force.
+
+    free [m]: slide without friction; beta [m/N]: slide that a newton takes away; the other arguments are those of
+    `element_kernels.solve`.
+    """
     dq, force = law.stick(free, beta, c.num[0, 1], c.num[0, 2])
     return dq, force, 1
 
 
 @njit(error_model="numpy", **LEAN)
 def given(dq, q, v, dt, c, goal):
-    """(path-mean force, True) over a slide increment that is prescribed."""
+    """(path-mean force [N], True) of Coulomb's law over a slide increment dq [m] that is prescribed."""
     return law.mean(c.num, c.mem, 0, q, dq, 0.0, dt)[0], True
 
 
 @njit(error_model="numpy", **LEAN)
 def commit(dq, force, q, v0, v1, dt, c):
-    """Move the memory by the step; (energy dissipated [J], True)."""
+    """Keep the force [N] of the solved step; (energy dissipated [J], True)."""
     return law.commit(c.num, c.mem, 0, dq, force, v0, v1, dt, 0.0), True
 
 
 @njit(error_model="numpy", **LEAN)
 def state(c, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) at slide q [m]."""
+    """(force of the last step [N], stored energy 0 [J], irreversible slip [m]) at the slide q [m]."""
     return law.state(c.num, c.mem, 0, q, v)
 
 
 @njit(error_model="numpy", **LEAN)
 def hold(c, force):
-    """Tell the contact that holds which force [N] it needs now; no more than it can bear."""
+    """Tell the contact that holds which force [N] it needs at an instant; it keeps no more than its static force."""
     c.mem[0, 0] = min(max(force, -c.num[0, 1]), c.num[0, 1])

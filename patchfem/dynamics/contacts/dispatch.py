@@ -24,13 +24,19 @@ def {name}({signature}):
 
 
 def number_of(laws: tuple) -> dict:
-    """num[e, 0] of every compiled law: 0 for Coulomb's, which the loops ask for its step, from 1 on for the others."""
+    """num[e, 0] of every compiled law by its module: 0 for Coulomb's, from 1 on for the others.
+
+    The loops ask Coulomb's law for its step, as it has no slope.
+    """
     return {COULOMB: 0} | {law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)}
 
 
 @cache
 def law_of(laws: tuple, names: tuple = MARCHED):
-    """The compiled module of one law, or of several that num[e, 0] tells apart; names: functions that are asked for."""
+    """The compiled module of one law, or one written for several that num[e, 0] tells apart.
+
+    laws: modules; names: functions that are asked for. The module written is kept beside the compiled code.
+    """
     if len(laws) == 1:
         return compiled.load(laws[0])
     numbers, text = number_of(laws), ""

@@ -16,7 +16,8 @@ SET_VALUED = False
 
 @njit(error_model="numpy", **LEAN)
 def pulled(dq, c, v0, dt):
-    """(path-mean force [N], slope [N/m]) of a bond list; a slope of zero stands for an unknown one."""
+    """(path-mean force [N], its slope over dq [N/m]) of a bond list over dq [m]; a slope of 0 stands for an unknown
+    one."""
     scale = c.force[0]
     if c.law[1] == MOMENTS:
         force, slope = list_slope(dq, c, v0, dt)
@@ -45,7 +46,7 @@ def solve(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **LEAN)
 def given(dq, q, v, dt, c, goal):
-    """(path-mean force, True) over a slide increment that is prescribed."""
+    """(path-mean force [N], True) over a slide increment dq [m] in dt [s] that is prescribed."""
     return pulled(dq, c, v, dt)[0], True
 
 
@@ -69,11 +70,11 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", **LEAN)
 def state(c, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands."""
+    """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
     force = c.force[0] * c.tally[5]
     return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
 
 
 @njit(error_model="numpy", **LEAN)
 def hold(c, force):
-    """Nothing: what holds is in the list."""
+    """Nothing to do: what holds is in the list of bonds."""

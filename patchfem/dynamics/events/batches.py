@@ -38,7 +38,7 @@ class Batch:
         return len(self.time)
 
     def cut(self, which) -> "Batch":
-        """A Batch of some of the pieces."""
+        """A Batch of some of the pieces; which: index or mask (k,)."""
         return Batch(*(getattr(self, name)[which] for name in Batch.__slots__))
 
     def ending(self, span: float) -> "Batch":
@@ -49,18 +49,18 @@ class Batch:
 
     @property
     def share(self):
-        """Part of the unit that each piece lasts (k,)."""
+        """Part of its unit that each piece lasts, (k,) in (0, 1]."""
         return self.span / self.unit
 
     def acceleration(self, owner, tau):
-        """Drive [m/s2] at tau (..., j) [s] in the pieces `owner` (...,)."""
+        """Drive [m s-2] at tau (..., j) [s] after the starts of the pieces `owner` (...,)."""
         constant, size, omega = (self.drive[owner, j] for j in range(3))
         lift = (slice(None),) + (None,) * (tau.ndim - 1)
         return constant[lift] + size[lift] * np.sin(self.theta[owner][lift] + omega[lift] * tau)
 
 
 def gather(pieces) -> Batch:
-    """Collect pieces into a Batch."""
+    """Collect pieces of `engine.Engine`, a list of them, into a Batch."""
     scalar = [np.array([getattr(p, name) for p in pieces])
               for name in ("time", "span", "unit", "theta", "cycle", "first")]
     rest = [np.array([getattr(p, name) for p in pieces], float)
@@ -74,7 +74,7 @@ def join(batches) -> Batch:
 
 
 def powers(u):
-    """Powers u^k (..., TERMS) of u (...,)."""
+    """Powers u^k (..., TERMS), k = 0, 1, ..., of u (...,)."""
     out = np.empty((*np.shape(u), TERMS))
     out[..., 0] = 1.0
     for k in range(1, TERMS):
@@ -83,7 +83,7 @@ def powers(u):
 
 
 def states(batch: Batch, owner, tau) -> tuple:
-    """Coordinates and rates (j, n) at tau (j,) [s] in the pieces `owner` (j,)."""
+    """Coordinates (j, n) [m] and rates (j, n) [m/s] at tau (j,) [s] in the pieces `owner` (j,)."""
     u = tau / batch.unit[owner]
     power, coefs = powers(u), batch.coefs[owner]
     z = np.einsum("jk,jkn->jn", power, coefs)
@@ -92,13 +92,19 @@ def states(batch: Batch, owner, tau) -> tuple:
 
 
 def sample(batch: Batch, times, modes: ModalBasis, drive, live) -> Response:
-    """Response at `times` (k,) [s], ascending; a time on the border of two pieces belongs to the later one."""
+    """Response at `times` (k,) [s], ascending; a time on the border of two pieces belongs to the later one.
+
+    live: numbers of the faces that rub.
+    """
     owner = np.clip(np.searchsorted(batch.time, times, side="right") - 1, 0, len(batch) - 1)
     return at(batch, owner, np.clip(times - batch.time[owner], 0.0, batch.span[owner]), times, modes, drive, live)
 
 
 def at(batch: Batch, owner, tau, times, modes: ModalBasis, drive, live) -> Response:
-    """Response at `times`, which are tau (k,) [s] in the pieces `owner` (k,)."""
+    """Response at `times` (k,) [s], which are tau (k,) [s] after the starts of the pieces `owner` (k,).
+
+    live: numbers of the faces that rub.
+    """
     z, v = states(batch, owner, tau)
     base = batch.acceleration(owner, tau)
     faces, count = np.asarray(modes.interfaces, float), len(modes.interfaces)
@@ -119,7 +125,10 @@ def at(batch: Batch, owner, tau, times, modes: ModalBasis, drive, live) -> Respo
 
 
 def energies(batch: Batch, modes: ModalBasis, live) -> np.ndarray:
-    """Work of the drive, viscous loss, integral of |power of the drive|, work of friction [J] over all pieces."""
+    """Work of the drive, viscous loss, integral of |power of the drive|, friction work [J], (4,), over all pieces.
+
+    By 12 Gauss points a piece.
+    """
     v = _rates(batch, powers(batch.share[:, None] * NODES))
     weight = batch.span[:, None] * WEIGHTS
     every = np.arange(len(batch))
@@ -143,7 +152,10 @@ def _rates(batch: Batch, power):
 
 
 def loop_of(batch: Batch, modes: ModalBasis, live) -> tuple:
-    """Quadrature over the pieces: time, weight, slide, rate and force of the first interface."""
+    """Quadrature over the pieces: time [s], weight [s], slide [m], rate [m/s], force [N] of the first interface.
+
+    (12 k,) each.
+    """
     z, v = _nodes(batch)
     tau = batch.span[:, None] * NODES
     face = np.asarray(modes.interfaces, float)[0]
@@ -159,13 +171,16 @@ def loop_of(batch: Batch, modes: ModalBasis, live) -> tuple:
 
 
 def stored(batch: Batch, modes: ModalBasis, share: float) -> np.ndarray:
-    """Energy of the modes [J] (k,) at a share of every piece."""
+    """Energy of the modes (k,) [J], kinetic and elastic, at a share [0, 1] of every piece."""
     z, v = states(batch, np.arange(len(batch)), batch.span * share)
     return 0.5 * modes.mass * np.sum(v**2 + (modes.omega * z)**2, axis=1)
 
 
 def turning_points(series, share) -> tuple:
-    """Turning points (piece, u) of series (k, TERMS) for u inside (0, share (k,)), by samples and Newton's method."""
+    """Turning points (piece (j,), u (j,)) of series (k, TERMS) in u, for u inside (0, share (k,)).
+
+    They are seen by a change of the slope's sign between 9 samples, and refined by Newton's method.
+    """
     slope = derivative(series[..., None])[..., 0]
     bend = derivative(slope[..., None])[..., 0]
     u = share[:, None] * GRID
@@ -188,7 +203,10 @@ def values_at(series, piece, u):
 
 
 def absolute(batch: Batch, modes: ModalBasis, moving: bool):
-    """Series (k, TERMS) of the (absolute) acceleration at the output; the last two terms of the motion are lost."""
+    """Series (k, TERMS) [m s-2] of the acceleration at the output, that of a moving base included.
+
+    The last two terms of the motion are lost.
+    """
     out = batch.coefs @ modes.output
     series = np.zeros_like(out)
     series[:, :-2] = out[:, 2:] * (ORDER[2:] * (ORDER[2:] - 1)) / batch.unit[:, None]**2
@@ -196,7 +214,7 @@ def absolute(batch: Batch, modes: ModalBasis, moving: bool):
 
 
 def pushing(batch: Batch, modes: ModalBasis, face: int):
-    """Series (k, TERMS) of the friction force [N] of the live face number `face`; the last term is lost."""
+    """Series (k, TERMS) [N] of the friction force of the live face number `face`; the last term is lost."""
     react, coefs, series = batch.react[:, face], batch.coefs, np.zeros(batch.coefs.shape[:2])
     rate = np.zeros_like(coefs)
     rate[:, :-1] = coefs[:, 1:] * ORDER[1:, None] / batch.unit[:, None, None]

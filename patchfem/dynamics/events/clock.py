@@ -12,7 +12,11 @@ TURN = 2 * pi
 
 
 class Clock:
-    """Clock of an exact run: cycle and offset in it [s], with the drive's segments and the end as borders."""
+    """Clock of an exact run: the cycle and the offset in it [s].
+
+    drive: with segments in closed form; cycles: length of the run. Borders are those of the drive's segments and the
+    end. PatchfemError for a drive without a closed form.
+    """
 
     def __init__(self, drive, cycles: float):
         if not drive.segments:
@@ -26,7 +30,7 @@ class Clock:
         self.begin(0)
 
     def place(self, time: float) -> tuple:
-        """Cycle and offset of a time [s]."""
+        """Cycle (a whole number) and offset [s] of a time [s]; within 4e-15 of a whole cycle it is that one."""
         share = time / self.period
         near = round(share)
         if abs(share - near) <= 4e-15 * max(1.0, abs(share)):
@@ -58,7 +62,7 @@ class Clock:
 
     @property
     def theta(self) -> float:
-        """Phase of the drive."""
+        """Phase of the drive [rad], in [0, 2 pi)."""
         return (self.cycle_phase + self.omega * self.offset) % TURN
 
     @property

@@ -44,7 +44,11 @@ class Piece:
 
 
 class Engine:
-    """A run from event to event; static, kinetic: friction forces [N] of every interface, kinetic <= static."""
+    """A run of Coulomb friction from event to event.
+
+    static, kinetic: friction forces [N] of every interface, (i,) or one for all, 0 <= kinetic <= static; cycles:
+    length; start: None for rest. PatchfemError for other forces and for an interface that no mode moves.
+    """
 
     def __init__(self, modes: ModalBasis, drive, static, kinetic, cycles: float, start: Start | None = None):
         faces = np.asarray(modes.interfaces, float)
@@ -70,7 +74,10 @@ class Engine:
         self.idle = 0
 
     def pieces(self):
-        """Yield the pieces in order. NotConverged after 1000 events without progress."""
+        """Yield the pieces in order of time, to the end of the run.
+
+        NotConverged after 1000 events in a row without progress, and where no state of stick and slip holds.
+        """
         clock = self.clock
         self._enter(self.signs, [c for c, s in enumerate(self.signs) if s == 0])
         first = True
@@ -144,7 +151,7 @@ class Engine:
         resting = self._resting(piece) if len(guess) > 1 else [0]
         if face not in resting:
             resting = sorted([*resting, face])
-        self.idle = self.idle + 1 if piece.span < 1e-12 * self.clock.period else 0
+        self.idle = self.idle + 1 if piece.span < 1e-12 * self.clock.period else 0  # no progress
         if self.idle > 1000:
             raise NotConverged(f"dynamics: events pile up at t = {self.clock.time:.9g} s")
         self._enter(tuple(guess), resting)

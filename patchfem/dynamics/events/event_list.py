@@ -27,7 +27,7 @@ class EventLog:
     count: int
 
     def until(self, end: float) -> "EventLog":
-        """The events up to `end` [s]."""
+        """The events up to `end` [s], their count without the later ones."""
         kept = int(np.searchsorted(self.time, end, side="right"))
         if kept == len(self.time):
             return self
@@ -36,13 +36,13 @@ class EventLog:
 
 
 class Recorder:
-    """The events of a run noted as they come."""
+    """The events of a run, noted as they come; the last ROOM of them are kept."""
 
     def __init__(self):
         self.rows, self.count = deque(maxlen=ROOM), 0
 
     def add(self, time: float, phase: float, interface: int, what: int, slide: float) -> None:
-        """Note one event."""
+        """Note one event: time [s], phase [rad], interface from 0, what as in EventLog, slide [m]."""
         self.count += 1
         self.rows.append((time, phase, interface, what, slide))
 
@@ -54,7 +54,7 @@ class Recorder:
 
 
 def kind_of(before: int, after: int) -> int | None:
-    """Kind of event that a change of the sign of slip is, None where it is none."""
+    """Kind of event (STOP, +-RELEASE, +-REVERSAL) that a change of the sign of slip is; None where it is none."""
     if before == after:
         return None
     if after == 0:

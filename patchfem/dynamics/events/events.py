@@ -33,7 +33,7 @@ class Phase:
 
     @property
     def direction(self) -> int:
-        """Direction of slip of the first interface."""
+        """Direction of slip of the first interface: +1, -1, or 0 in stick."""
         return self.directions[0]
 
     @property

@@ -67,7 +67,7 @@ def polish(coefs, low: float, high: float, x: float) -> float:
 
 
 def derivative(coefs):
-    """Derivative to u of polynomials (..., TERMS, n) along the axis before the last."""
+    """Derivatives over u of polynomials (..., TERMS, n) in u, along the axis before the last."""
     out = np.zeros_like(coefs)
     out[..., :-1, :] = coefs[..., 1:, :] * ORDER[1:, None]
     return out
@@ -75,14 +75,17 @@ def derivative(coefs):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Signal:
-    """A scalar over consecutive pieces: times (k + 1,) [s] of their borders, unit [s], coefs (k, TERMS) in t/unit."""
+    """A scalar over consecutive pieces of time, a series in each.
+
+    times: (k + 1,) [s] of their borders; unit: (k,) [s]; coefs: (k, TERMS) in t/unit, t from the piece's start.
+    """
 
     times: np.ndarray
     unit: np.ndarray
     coefs: np.ndarray
 
     def many(self, t):
-        """Values at times t (j,) [s] since the first border."""
+        """Values (j,) at times t (j,) [s] since the first border."""
         t = np.asarray(t, float)
         k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.unit) - 1)
         u, out = (t - self.times[k]) / self.unit[k], np.zeros(t.shape)
@@ -94,10 +97,10 @@ class Signal:
         return float(self.many(np.array([t]))[0])
 
     def rate(self) -> "Signal":
-        """Time derivative."""
+        """The time derivative as a Signal."""
         return Signal(self.times, self.unit, derivative(self.coefs[..., None])[..., 0] / self.unit[:, None])
 
 
 def combine(signals, factors) -> Signal:
-    """Weighted sum of signals over the same pieces."""
+    """Sum of signals over the same pieces, weighted with `factors`."""
     return Signal(signals[0].times, signals[0].unit, sum(f * s.coefs for s, f in zip(signals, factors)))

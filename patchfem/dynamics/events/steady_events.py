@@ -149,7 +149,7 @@ def steady(modes: ModalBasis, drive, static, kinetic, start: Start | None = None
             state, one = better or (state, one)
             break
         if better is None:
-            cycles = min(2 * cycles, 400)
+            cycles = min(2 * cycles, 400)  # Newton's direction leads away: come nearer by more cycles of the run
             state = _after(modes, drive, static, kinetic, state, cycles)
             one = period_map(modes, drive, static, kinetic, state, periods)
         else:
@@ -186,6 +186,7 @@ def _norm(miss, size, n: int) -> float:
 def _newton(modes, drive, static, kinetic, state, one, size, periods):
     """A better (state, Map) along Newton's direction, None where there is none."""
     n = modes.omega.size
+    # least squares: a stuck slide may rest anywhere in a range, which makes the matrix singular
     left = (one.slope - np.eye(2 * n)) * size / size[:, None]
     step = np.linalg.lstsq(left, -(one.end - state) / size, rcond=1e-11)[0] * size
     now = _norm(one.end - state, size, n)

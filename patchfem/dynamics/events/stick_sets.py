@@ -238,6 +238,7 @@ def _within(system, entry, signs, rest, limit):
         if not new and not lost:
             break
         fixed = {k: s for k, s in fixed.items() if k not in lost} | new
+    # at its limit, to that weight
     edge = [k for k in range(len(rest)) if k not in fixed and abs(force[k]) > limit[k] * (1 - 1e-6)]
     for choice in sorted(product((1, 0), repeat=min(len(edge), 10)), key=sum, reverse=True):
         slips = fixed | {k: int(np.sign(force[k])) for k, yes in zip(edge, choice) if yes}
@@ -254,7 +255,7 @@ def _forces(faces, mass: float, pull, limit, fixed):
     free = [k for k in range(len(limit)) if k not in fixed]
     if free:
         rows = faces[free].T / mass
-        small = 1e-6 * max(np.abs(rows).max(), 1e-300)
+        small = 1e-6 * max(np.abs(rows).max(), 1e-300)  # weight that picks the smallest forces among equal ones
         want = np.concatenate([pull - faces.T @ force / mass, np.zeros(len(free))])
         found = lsq_linear(np.concatenate([rows, small * np.eye(len(free))]), want, (-limit[free], limit[free]),
                            method="bvls", tol=1e-14)

@@ -28,11 +28,11 @@ class Free(NamedTuple):
 
 
 def stuck_mode(modes: ModalBasis, rows, stiffness, mode: int) -> tuple:
-    """(omega, shape (n,) with shape[mode] = 1) of the mode-th mode when the rows (i, n) hold with stiffness (i,)."""
+    """(omega [rad/s], shape (n,)) of a mode when the rows (i, n) hold with stiffness (i,) [N/m]; shape[mode] = 1."""
     k = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
     values, vectors = np.linalg.eigh(k)
     shape = vectors[:, mode]
-    if abs(shape[mode]) < 1e-6:
+    if abs(shape[mode]) < 1e-6:  # modes have changed places: take the one with most of this coordinate
         shape = vectors[:, int(np.argmax(np.abs(vectors[mode])))]
         mode_value = values[int(np.argmax(np.abs(vectors[mode])))]
         return float(np.sqrt(mode_value)), shape / shape[mode]
@@ -40,7 +40,11 @@ def stuck_mode(modes: ModalBasis, rows, stiffness, mode: int) -> tuple:
 
 
 class FreeBalance:
-    """Equations of the free motion: unknowns are the packed slides of `Balance`, omega/scale and zeta."""
+    """Equations of the free motion of one mode that a negative damping keeps up.
+
+    balance: Balance of the rows; mode: number of the coordinate whose amplitude is given; scale [rad/s]. Unknowns:
+    packed slides of `Balance`, omega/scale and zeta.
+    """
 
     def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
         self.balance, self.mode, self.h, self.scale = balance, mode, harmonics, scale
@@ -99,7 +103,10 @@ class FreeBalance:
         return residual, jacobian, Free(amplitude, omega, zeta, balance.lift @ y, fold.force, z)
 
     def solve(self, x, amplitude: float, goal: float = 1e-10, most: int = 30):
-        """(unknowns, Free) by Newton's method; NotConverged after `most` steps. Motions count per amplitude."""
+        """(unknowns (N,), Free) by Newton's method from x (N,), at an amplitude [m] of the mode's coordinate.
+
+        goal: of the step, motions counted per amplitude. NotConverged after `most` steps.
+        """
         unit = np.append(np.full(x.size - 2, amplitude), [1.0, 1.0])
         rows = np.full(x.size, 1 / amplitude)
         for _ in range(most):

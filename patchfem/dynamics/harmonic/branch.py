@@ -27,7 +27,7 @@ class Branch:
 
     @property
     def values(self) -> np.ndarray:
-        """The parameter at every point (k,)."""
+        """The parameter at every point (k,), [Hz] or [m s-2]."""
         return np.array([p.omega / (2 * np.pi) if self.parameter == "frequency" else p.level for p in self.points])
 
     def amplitudes(self, row) -> np.ndarray:

@@ -74,6 +74,7 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
         tangent = _tangent(system, x, p, t, size, width, forward)
         found.append((x, p, tangent[1], arc))
         signs.append(tangent[0])
+        # few iterations: the curve is straight here
         step = min(step * (1.5 if count <= 3 else 1.1 if count <= 5 else 0.6), longest)
     return Path(np.array([f[0] for f in found]), np.array([f[1] for f in found]),
                 np.array([f[2][-1] for f in found]), np.array([f[3] for f in found]),
@@ -126,7 +127,7 @@ def _tangent(system, x, p, last, size, width, forward) -> tuple:
 def _alike(new, x, p, t, size, width, step) -> bool:
     """Whether the step went where the tangent points and not to another part of the curve."""
     move = np.append((new[0] - x) / size, (new[1] - p) / width)
-    return float(move @ t) > 0.7 * float(np.linalg.norm(move))
+    return float(move @ t) > 0.7 * float(np.linalg.norm(move))  # within 45 degrees of the tangent
 
 
 def _folds(found, width) -> tuple:

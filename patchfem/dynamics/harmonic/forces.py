@@ -38,7 +38,7 @@ class Group:
         self.samples = samples
 
     def with_samples(self, samples: int) -> "Group":
-        """The same on a grid of `samples`."""
+        """The same laws on the same rows, on a grid of `samples` per cycle."""
         other = object.__new__(Group)
         other.rows, other.laws, other.samples = self.rows, self.laws, samples
         return other
@@ -60,18 +60,21 @@ class Group:
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
     def tracks(self, q, omega: float, samples: int = 0) -> list:
-        """Track of every row."""
+        """Track of every row, a list of i, from the harmonics q (i, H + 1) [m] of the slides.
+
+        samples: per cycle, 0: those of the group or as many as H asks for.
+        """
         n = samples or self.samples or self.samples_for(q.shape[1] - 1)
         values, rates = synthesis(q, n), synthesis(1j * np.arange(q.shape[1]) * q, n)
         return [Track(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
 
     def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
-        """Forces (i, N) at the samples of one cycle."""
+        """Forces (i, N) [N] at the samples of one cycle, from the harmonics q (i, H + 1) [m] of the slides."""
         return np.array([sum(law.sample(track).force for law in laws)
                          for track, laws in zip(self.tracks(q, omega, samples), self.laws)])
 
     def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
-        """Harmonics (i, harmonics + 1) of the forces."""
+        """Harmonics (i, harmonics + 1) [N] of the forces from those of the slides, q (i, H + 1) [m]."""
         return analysis(self.forces(q, omega, samples), harmonics)
 
     def __call__(self, q, omega: float) -> Fold:

@@ -33,7 +33,10 @@ class Fold(NamedTuple):
 
 
 def pack(x) -> np.ndarray:
-    """Complex harmonics (r, H + 1) as reals (r (2 H + 1),)."""
+    """Complex harmonics (r, H + 1) as reals (r (2 H + 1),).
+
+    Row by row the real parts of k = 0..H, then the imaginary ones of k = 1..H.
+    """
     return np.concatenate([x.real, x.imag[:, 1:]], axis=1).ravel()
 
 
@@ -62,7 +65,7 @@ class Plant:
 
 
 def plant(modes: ModalBasis, omega: float, harmonics: int) -> Plant:
-    """R_k for k = 0..harmonics at omega [rad/s]."""
+    """The linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0..harmonics at omega [rad/s], as a Plant."""
     n, k = modes.omega.size, np.arange(harmonics + 1)
     around = k * omega
     slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[:, None, None] * modes.dampers
@@ -84,7 +87,10 @@ def plant(modes: ModalBasis, omega: float, harmonics: int) -> Plant:
 
 
 class System(NamedTuple):
-    """Residual (N,), its Jacobian (N, N), its slopes over omega and over the drive level (N,), the contact's Fold."""
+    """The equations at one point.
+
+    residual (N,), its Jacobian (N, N), its slopes over omega and over the drive level (N,), and the contact's Fold.
+    """
 
     residual: np.ndarray
     jacobian: np.ndarray
@@ -104,7 +110,7 @@ class Balance:
     def __init__(self, modes: ModalBasis, rows, contact):
         rows = np.asarray(rows, float)
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
-        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
+        rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0  # round-off of rows that depend on others
         if rank == 0:
             raise PatchfemError("structure.mode.slide: no mode moves the interface, so there is nothing to balance; "
                                 "give one a slide")
@@ -121,7 +127,7 @@ class Balance:
         return other
 
     def plant(self, omega: float, harmonics: int) -> Plant:
-        """`plant`, kept for the last frequencies."""
+        """`plant` at omega [rad/s], kept for the last eight frequencies."""
         key = (omega, harmonics)
         if key not in self._plants:
             if len(self._plants) > 8:
@@ -130,17 +136,20 @@ class Balance:
         return self._plants[key]
 
     def size(self, omega: float, harmonics: int) -> int:
-        """Number of real unknowns."""
+        """Number N of real unknowns at omega [rad/s]."""
         free = self.plant(omega, harmonics).free
         return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
 
     def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
-        """Slides of the interface rows (i, H + 1) complex of unknowns x (N,)."""
+        """Slides (i, H + 1) [m], complex harmonics of the interface rows, of unknowns x (N,)."""
         r = self.lift.shape[1]
         return self.lift @ unpack(x[:r * (2 * harmonics + 1)], r)
 
     def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
-        """Modal harmonics (K + 1, n) under the force (i, K + 1); K may exceed H."""
+        """Modal harmonics (K + 1, n) [m] under the force (i, K + 1) [N] and the drive of amplitude level [m s-2].
+
+        K may exceed H: what the balance leaves out then takes part.
+        """
         top = force.shape[1] - 1
         return self._motion(self.plant(omega, top), self._coordinates(x, omega, harmonics), level, force)
 
@@ -203,6 +212,7 @@ class Balance:
         push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (self.modes.mass * omega**2)
         for part, own in ((slice(0, low), size), (slice(low, None), push)):
             scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
+            # a true root leaves round-off, a minimum of the residual more
             if float(np.linalg.norm(left[part])) > 1e-7 * scale:
                 return False
         return True
@@ -234,10 +244,10 @@ class Balance:
 
 
 def solve_linear(matrix):
-    """A function b -> matrix^-1 b; least squares where the matrix is singular (a mean that nothing holds)."""
+    """A function b -> matrix^-1 b; least squares where the matrix (N, N) is singular (a mean that nothing holds)."""
     factors, pivots, _ = dgetrf(matrix)
     sizes = np.abs(np.diag(factors))
-    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():
+    if np.isfinite(sizes).all() and sizes.min() > 1e-13 * sizes.max():  # else singular to round-off
         return lambda b: dgetrs(factors, pivots, b)[0]
     if not np.isfinite(matrix).all():
         return lambda b: np.full(b.shape, np.nan)
@@ -267,6 +277,8 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, goal
             left = float(np.linalg.norm(solve(there.residual)))
             if best is None or left < best[0]:
                 best = (left, tried, there)
+            # natural monotonicity (Deuflhard): the next simplified step is shorter; a tiny step is taken as
+            # it is
             if left <= (1 - share / 4) * length or share < 0.02 or not length > 1e-8 * size:
                 break
             share /= 2

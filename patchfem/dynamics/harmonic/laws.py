@@ -21,7 +21,7 @@ SHARPEST = 48  # samples while an element goes from one limit to the other
 
 @cache
 def kernels():
-    """The compiled laws."""
+    """The compiled loops over the samples of a cycle, `cycle_kernels`."""
     return load("dynamics.harmonic.cycle_kernels")
 
 
@@ -53,7 +53,11 @@ class Sampled(NamedTuple):
 
 
 class Track:
-    """A periodic slide with harmonics x (H + 1,) on N uniform samples of the cycle."""
+    """A periodic slide on uniform samples of the cycle.
+
+    x: harmonics (H + 1,) [m]; omega [rad/s]; samples: N; q (N,) [m] and rate (N,), dq/d(omega t) [m]: where they are
+    known.
+    """
 
     def __init__(self, x, omega: float, samples: int, q=None, rate=None):
         self.x, self.omega, self.samples = x, omega, samples
@@ -71,7 +75,7 @@ class Track:
 
 
 def synthesis(x, samples: int) -> np.ndarray:
-    """Samples (..., N) over one cycle of Re sum X_k exp(i k theta), X (..., H + 1)."""
+    """Samples (..., N) over one cycle of Re sum X_k exp(i k theta) from harmonics x (..., H + 1); N may be small."""
     if 2 * x.shape[-1] > samples:
         every = -(-2 * x.shape[-1] // samples)
         return synthesis(x, samples * every)[..., ::every]
@@ -82,7 +86,7 @@ def synthesis(x, samples: int) -> np.ndarray:
 
 
 def analysis(values, harmonics: int) -> np.ndarray:
-    """Harmonics (..., H + 1) of samples (..., N)."""
+    """Harmonics (..., H + 1) of samples (..., N) over one cycle, H <= N/2; inverse of `synthesis`."""
     n = values.shape[-1]
     out = np.fft.rfft(values, axis=-1)[..., :harmonics + 1] * (2 / n)
     out[..., 0] /= 2

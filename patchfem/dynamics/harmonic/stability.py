@@ -9,7 +9,10 @@ from .laws import Flow, Stretch
 
 
 def with_stability(periodic, modes, cells: int = 0):
-    """The Periodic with its multipliers and whether it is stable; cells of the cycle, 0: 1024 or as it was sampled."""
+    """The Periodic with its Floquet multipliers and whether it is stable.
+
+    cells: of the cycle, 0: 1024, or as many as it was sampled in.
+    """
     found = multipliers(monodromy_of(periodic, modes, cells))
     return replace(periodic, multipliers=found, stable=is_stable(found))
 

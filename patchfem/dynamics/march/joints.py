@@ -18,7 +18,11 @@ from .models import SET_VALUED, ContactModel, coulomb_model
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Joint:
-    """A law on one port: its Element; potential: energy [J] of a slide [m] of a spring, None for friction."""
+    """A law on one port.
+
+    port: row of slides; element: the law under its load; potential: energy [J] of a slide [m] of a spring, None for
+    friction.
+    """
 
     port: int
     element: Element
@@ -26,12 +30,15 @@ class Joint:
 
 
 def cubic(port: int, stiffness: float) -> Joint:
-    """Restoring force k_3 q^3 [N], k_3 [N/m3]."""
+    """Spring on a port with the restoring force k_3 q^3 [N]; stiffness: k_3 [N/m3]."""
     return _spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
 
 
 def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
-    """Restoring force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks."""
+    """Spring on a port with the restoring force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks.
+
+    stiffness: k [N/m] at rest; wavelength: lambda [m].
+    """
     turn = 2 * np.pi / wavelength
     return _spring(port, [0.0, 0.0, stiffness, wavelength],
                    lambda q: 2 * stiffness * (np.sin(0.5 * turn * q) / turn)**2)
@@ -43,7 +50,7 @@ def _spring(port: int, numbers, potential) -> Joint:
 
 @cache
 def loop_of(laws: tuple, patch: tuple):
-    """The loop with these laws and the contact of the patch, of this kind."""
+    """The compiled loop of joints with these laws (modules) and the patch's contact of this kind."""
     law = law_of(laws)
     parts = {"law": law, "patch": contact_of(patch),
              "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
@@ -67,17 +74,17 @@ class JointsModel:
 
     @property
     def limit(self) -> float:
-        """Friction limit of all [N]."""
+        """Friction limit [N] of patch and joints together."""
         return (self.patch.limit if self.patch is not None else 0.0) + sum(one.element.limit for one in self.joints)
 
     @property
     def length(self) -> float:
-        """Bond length of the patch, or else of the first interface [m]."""
+        """Bond length [m] of the patch, or else of the first interface."""
         return self.patch.length if self.patch is not None else self.joints[0].element.length
 
     @property
     def reduction(self):
-        """Of the patch."""
+        """What the arrays of the patch were reduced from (ContactModel.reduction), None without a patch."""
         return self.patch.reduction if self.patch is not None else None
 
     @property
@@ -92,24 +99,28 @@ class JointsModel:
 
     @property
     def kind(self) -> tuple:
-        """Of the patch."""
+        """Kind of the patch's contact (ContactModel.kind), that of an idle one without a patch."""
         return self.patch.kind if self.patch is not None else (SET_VALUED, "")
 
     @property
     def runner(self):
-        """The class that marches it."""
+        """The class that marches such a model."""
         return JointsRun
 
     def shown(self, contact) -> dict:
-        """Of the patch."""
+        """What a picture needs of the patch's memory (ContactModel.shown), {} without a patch."""
         return self.patch.shown(contact) if self.patch is not None else {}
 
     def build(self, hub=None):
-        """(contact, None) of the patch; an idle point where there is none."""
+        """(contact, None) of the patch with arrays of their own; an idle point where there is none."""
         return (self.patch or coulomb_model(0.0, 0.0)).build()
 
     def arrays(self, beta, give) -> arrays.Joints:
-        """Fresh arrays; beta (p, p), give (n,) [m/N]."""
+        """Fresh `arrays.Joints` of a march.
+
+        beta: (p, p) [m/N], slide of port p taken by a force on another; give: (n,) [m/N], motion of a coordinate per
+        force.
+        """
         e, (p, n), numbers = len(self.joints), self.rows.shape, number_of(self.laws)
         elements = [one.element for one in self.joints]
         num, mem = (np.zeros((e, max(1, *(len(part) for part in parts)))) for parts in (
@@ -141,7 +152,7 @@ class JointsRun(Run):
         self.ledger[0] += self.strained()
 
     def fork(self, drive):
-        """As of a Run."""
+        """A copy of the march as it stands, its joints too, that goes on under another drive."""
         twin = super().fork(drive)
         twin.joints = type(self.joints)(*(array.copy() for array in self.joints))
         return twin
@@ -155,13 +166,13 @@ class JointsRun(Run):
         return rows[:-1, 2 * self.modes.omega.size + 6]
 
     def watched(self, rows) -> tuple:
-        """(rates, slips) (k, e) of the patch and of all elements."""
+        """Slide rates (k, e) [m/s] and slips (k, e) [m] of the patch and of all elements in booked rows."""
         rate, slip = super().watched(rows)
         parts = rows[:, 2 * self.modes.omega.size + 10:].reshape(len(rows), self.rubs.size, 4)
         return np.column_stack([rate, parts[:, :, 1]]), np.column_stack([slip, parts[:, :, 3]])
 
     def strained(self) -> float:
-        """Energy of the patch, of the interfaces and of the springs [J]."""
+        """Energy [J] stored in the patch, the interfaces and the springs."""
         rows, n = np.empty((1, self.width)), 2 * self.modes.omega.size
         self.loop.march(0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, self.joints, np.inf, np.zeros(9),
                         rows)

@@ -24,7 +24,7 @@ HOLDS = 0  # of num: the law that holds without a stretch
 
 @njit(error_model="numpy", **LEAN)
 def elsewhere(mine, port, j):
-    """Slide [m] that the forces of all others take from a port; mine -1 for the patch on port 0."""
+    """Slide [m] that the forces of all others take from a port; mine: the element, -1 for the patch on port 0."""
     out = 0.0
     for k in range(j.forces.size):
         if k != mine:
@@ -58,7 +58,10 @@ def sampled(i, motion, j, rows):
 
 @njit(error_model="numpy", **LEAN)
 def turned(e, turn, j, dt):
-    """Solve element e with all others held: (change of its force over its goal, iterations)."""
+    """Solve element e with all others held: (change of its force over its goal [1], iterations).
+
+    turn: from 0; j: arrays.Joints; the change is inf where the solve failed.
+    """
     p = j.ports[e]
     beta = j.beta[p, p]
     mine = j.free[p] - elsewhere(e, p, j)
@@ -107,7 +110,10 @@ def agreed(there, smooth, q, v, dt, c, j):
 
 @njit(error_model="numpy", **LEAN)
 def held(i, there, dq, force, j, rows):
-    """Forces at the sample of what is set-valued: between steps of stick the mean of both, else that of the step."""
+    """Write the forces at sample i of what is set-valued.
+
+    Between steps of stick it is the mean of both steps, else that of the step that follows.
+    """
     n, m = j.room.shape[1], 2 * j.room.shape[1] + 7
     for e in range(j.ports.size):
         if j.num[e, 0] == HOLDS:
@@ -121,7 +127,7 @@ def held(i, there, dq, force, j, rows):
 
 @njit(error_model="numpy", **LEAN)
 def pushed(there, dq, plant, j, accel):
-    """Modal accelerations (n,) of all forces; the friction work of the step [J]."""
+    """Modal accelerations (n,) [m s-2] of all forces into `accel`; returns the friction work of the step [J]."""
     work = j.own[0] * dq if there else 0.0
     for k in range(accel.size):
         accel[k] = -plant.slide[k] * j.own[0] / plant.mass if there else 0.0

@@ -56,7 +56,10 @@ def march(first, steps, motion, plant, table, c, goal, travel, ledger, rows):
 
 @njit(error_model="numpy", **LEAN)
 def holding(motion, plant, drive, accel, spare):
-    """Friction force [N] that keeps the slide from accelerating at an instant; drive [m s-2]."""
+    """Friction force [N] that keeps the slide from accelerating at an instant under the drive [m s-2].
+
+    motion: (2, n); accel, spare: room.
+    """
     for k in range(accel.size):
         accel[k] = 0.0
     accelerations(motion, plant.omega, plant.damp, plant.damping, plant.base, drive, accel, spare)

@@ -78,13 +78,13 @@ def _runner(model):
 
 
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
-    """Load the compiled loop, or compile it, by a march of no steps."""
+    """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
     run = _runner(model)(modes, drive, model, 4, np.inf, load_kernels(say))
     run.cycle(0, 0, [])
 
 
 def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None):
-    """A Run at its start."""
+    """A Run of a model at its start, from rest or from `start`; travel [m]: of the output, where it ends."""
     return _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(), start)
 
 
@@ -160,7 +160,7 @@ class Run:
         self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
 
     def fork(self, drive):
-        """A copy that goes on by itself, under another drive."""
+        """A copy of the march as it stands that goes on by itself, under another drive."""
         twin = copy(self)
         twin.drive, twin.periodic = drive, None
         for name, value in vars(self).items():
@@ -180,7 +180,7 @@ class Run:
         return float(slip.max() - slip.min()) / 2
 
     def table(self, count: int) -> tuple:
-        """(table, row of the next step) for `count` steps from here."""
+        """(table of `propagator.tables`, row of the next step in it) for `count` steps from here."""
         if self.periodic is not None:
             return self.periodic, self.done % len(self.periodic)
         return self.prop.tables(self.drive, self.done, max(count, 1)), 0
@@ -190,7 +190,10 @@ class Run:
         return _response(rows, number, self.prop.dt, self.modes, self.drive)
 
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
-        """March `size` steps in `frames` pieces (0: one), a snapshot after each. (first step, rows, friction work)."""
+        """March `size` steps in `frames` pieces (0: one), with a snapshot after each.
+
+        Returns (first step, rows (steps + 1, width), friction work [J]); snapshots: list to add to.
+        """
         first, before, parts = self.done, self.ledger[8], []
         self._make_room(size)
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
@@ -266,7 +269,7 @@ class Run:
                             "friction limit; raise accuracy.steps_per_cycle")
 
     def watched(self, rows) -> tuple:
-        """(rates, slips) (k, i) of the interfaces in booked rows."""
+        """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""
         n = 2 * self.modes.omega.size
         return rows[:, n + 1:n + 2], rows[:, n + 3:n + 4]
 
@@ -322,7 +325,7 @@ def _phasor(rows, modes, first: int, around: int) -> complex:
 
 
 def hermite_extremes(y, v, dt) -> tuple:
-    """Smallest and largest value of the piecewise cubic with values y (k,) and rates v (k,) at spacing dt."""
+    """Smallest and largest value of the piecewise cubic through values y (k,) with rates v (k,) at spacing dt [s]."""
     low, high = float(y.min()), float(y.max())
     at = np.flatnonzero(v[:-1] * v[1:] < 0)
     if at.size:

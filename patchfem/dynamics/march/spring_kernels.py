@@ -15,14 +15,17 @@ __all__ = ["commit", "mean", "middle", "state"]
 
 @njit(error_model="numpy", **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]."""
+    """Path-mean force [N] of the springs from the slide q [m] over dq [m], and its slope over dq [N/m].
+
+    (V(q + dq) - V(q))/dq, written without a difference of large numbers; mem, eps and dt are not used.
+    """
     b, cubic, stiffness = q + dq, 0.25 * num[e, 1], num[e, 2]
     force, slope = cubic * (b + q) * (b * b + q * q), cubic * (3 * b * b + 2 * b * q + q * q)
     if stiffness == 0.0:
         return force, slope
     turn = 2 * pi / num[e, 3]
     half, centre = 0.5 * turn * dq, turn * (q + 0.5 * dq)
-    if abs(half) < 1e-4:
+    if abs(half) < 1e-4:  # the series is off by 1e-4^4/120 there, the quotients lose digits
         ratio, bend = 1 - half * half / 6, -half / 3
     else:
         ratio = sin(half) / half
@@ -33,13 +36,13 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 @njit(error_model="numpy", **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Nothing is lost [J]."""
+    """Energy dissipated: 0 J, as springs give all of it back."""
     return 0.0
 
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], slide [m])."""
+    """(force [N], stored energy V(q) [J], slide q [m]) of the springs at the slide q [m]."""
     force, energy, stiffness = num[e, 1] * q ** 3, 0.25 * num[e, 1] * q ** 4, num[e, 2]
     if stiffness == 0.0:
         return force, energy, q

@@ -24,7 +24,10 @@ class Jenkins:
         self.held = oscillator((w * w + stiffness)**0.5, decay, om)
 
     def elastic(self, v, g0, bc, bs, pull, limit):
-        """First time up to `limit` at which the spring yields, inf if none; pull: its force over the mass at first."""
+        """First time up to `limit` at which the spring yields, inf if it does not.
+
+        v: speed at first; g0, bc, bs: as in `slip_kernels`; pull: force of the spring over the mass at first.
+        """
         beta, alpha, om = self.held[0], self.held[1], self.om
         size = abs(self.b)
         stride = min(1 / om, 1.1 / (alpha + (alpha * alpha + 1.1 * beta)**0.5))

@@ -15,7 +15,7 @@ PHASES = 16  # releases kept per period
 
 
 def impulse(u, o):
-    """Answers of the free mode after u: (to a unit impulse h, its rate h', to a unit step)."""
+    """Answers of the free mode after u: (to a unit impulse h, its rate h', to a unit step); o: of `oscillator`."""
     if u * o[6] < REACH:
         h, h1, _ = series(u, 1.0, 0.0, 0.0, 0.0, o)
         return h, h1, step_answer(u, o, h, h1)
@@ -104,7 +104,7 @@ def newton(theta, z, v, angle, sign, b, static, kinetic, o, out, phases, tries):
         last = max(abs(rz), abs(rv) / o[5]) / size if size > 0.0 else 0.0
         if not last < 1e6:
             return z, v, inf
-        if last <= 2e-14 or (last <= 1e-12 and last >= 0.1 * best):
+        if last <= 2e-14 or (last <= 1e-12 and last >= 0.1 * best):  # round-off, or no gain any more
             return z, v, last
         best = min(best, last)
         a, c, d, e = out[3] - sign, out[4], out[6], out[7] - sign
@@ -171,8 +171,10 @@ def settle(theta, z, v, halves, b, static, kinetic, o, out, phases):
 
 
 def recurrence(theta, z, v, b, static, kinetic, o, out, phases):
-    """After how many periods, at most 64, a state comes back to 1e-6 of the motion's size; 0 if after none, or if it
-    comes back turned over after half a period."""
+    """Number of periods, at most 64, after which a state comes back to 1e-6 of the motion's size.
+
+    It is 0 if it does not, or if it comes back turned over after half a period. theta: phase of the state (z, v).
+    """
     now, speed, top = z, v, 0.0
     for k in range(129):
         if not flow(theta, now, speed, pi, b, static, kinetic, o, out, phases):
@@ -199,6 +201,7 @@ def point(w, decay, static, kinetic, b, om, z, v, patience, out, phases, found):
     if abs(b) <= static and z == 0.0 and v == 0.0:
         found[4], found[5] = 1.0, 1.0
         return
+    # at resonance without damping friction below pi/4 of the input does not bound the motion
     if decay == 0.0 and abs(om - w) <= 1e-12 * w and kinetic < 0.25 * pi * abs(b):
         found[0] = UNBOUNDED
         found[2] = inf
@@ -238,7 +241,7 @@ def report(periods, sign, out, phases, found, miss):
         found[10], found[11] = det / big if big != 0.0 else 0.0, 0.0
     else:
         found[5], found[6], found[10], found[11] = half, sqrt(-inside), half, -sqrt(-inside)
-    if found[5]**2 + found[6]**2 > 1.0 + 1e-9:
+    if found[5]**2 + found[6]**2 > 1.0 + 1e-9:  # round-off of a multiplier of 1
         return False
     turn = TURN * periods
     if sign < 0.0:

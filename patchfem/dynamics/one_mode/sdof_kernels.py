@@ -45,7 +45,7 @@ def release(push, b, theta, static):
 
 
 def crossing(z, limit, direction, v0, g0, bc, bs, span, o):
-    """Time in a slip at which z reaches +-limit; its motion is monotonic."""
+    """Time in a slip of `span` at which z reaches +-limit; its motion is monotonic, so halving finds it."""
     low, high = 0.0, span
     for _ in range(200):
         middle = 0.5 * (low + high)
@@ -149,7 +149,7 @@ def note(extremes, k, low, high):
 
 
 def note_stick(extremes, position, cycles, z):
-    """Extremes of a stick of some cycles that starts at a position [cycles]."""
+    """Widen the extremes of the cycles that a stick at z takes; position: its start [cycles], cycles: its length."""
     first = int(position + 1e-12)
     last = max(first, int(position + cycles - 1e-12))
     for k in range(first, min(last, extremes.shape[0] - 1) + 1):
@@ -157,7 +157,7 @@ def note_stick(extremes, position, cycles, z):
 
 
 def note_slip(extremes, position, per, z, direction, v0, g0, bc, bs, span, shift, o):
-    """Extremes of z per cycle over a slip; position [cycles] of its start, per [s] of a cycle."""
+    """Widen the extremes of z of the cycles that a slip takes; position [cycles] of its start, per [s] of a cycle."""
     first, last, z0 = int(position + 1e-12), int(position + span / per - 1e-12), z
     for k in range(first, last):
         z1 = z + direction * motion((k + 1 - position) * per, v0, g0, bc, bs, o)[0]
@@ -261,7 +261,11 @@ def _keep(state, s, turns, theta, z, v, direction, g0, bc, bs):
 
 
 def begin(push, b, theta, v, static, kinetic):
-    """Phase that follows a state: (direction, g0, bc, bs); push + b sin(theta) is the force that would hold z."""
+    """Phase that follows a state: (direction, g0, bc, bs) as `slip_kernels` takes them, direction 0 for a stick.
+
+    push + b sin(theta) is the force over the mass that would hold z; v: velocity, of either sign; static, kinetic: over
+    the mass.
+    """
     sine, cosine = b * sin(theta), b * cos(theta)
     need = push + sine
     if v != 0.0:
@@ -276,7 +280,10 @@ def begin(push, b, theta, v, static, kinetic):
 
 
 def enter(state, segments, s, turns, theta, z, v, direction, static, kinetic, beta):
-    """State (v as it is, not turned) at the start of segment s; after the last one what is there at the end."""
+    """Write the state at the start of segment s; after the last segment what is there at the end.
+
+    v >= 0: speed, direction: its sign; beta [1/s2]: stiffness over the mass.
+    """
     v = direction * v
     if s >= segments.shape[0]:
         _keep(state, s, turns, theta, z, v, direction, 0.0, 0.0, 0.0)

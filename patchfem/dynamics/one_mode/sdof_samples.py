@@ -132,12 +132,15 @@ def _one(u, rows, owner, block, om, parts) -> np.ndarray:
 
 
 def position(u, rows, owner, block: OneMode):
-    """Position z alone, as `states` gives it."""
+    """Position z (k,) [m] alone, as `states` gives it."""
     return _states(u, rows, owner, block, 1)[0]
 
 
 def states(u, rows, owner, block: OneMode) -> tuple:
-    """Motion (z, v, z'') at times u (k,) after the starts of the phases rows[owner]; rows (p, 10), owner (k,)."""
+    """Motion (z [m], v [m/s], z'' [m s-2]), (k,) each, at times u (k,) [s] after the starts of the phases rows[owner].
+
+    rows: (p, 10) of `sdof_kernels.march`; owner: (k,) their numbers.
+    """
     return _states(u, rows, owner, block, 3)
 
 
@@ -161,7 +164,7 @@ def pull(u, rows, owner, block: OneMode) -> tuple:
 
 
 def force(u, rows, owner, block: OneMode):
-    """Friction force [N]: kinetic in slip, what holds the interface in stick."""
+    """Friction force (k,) [N] at times u (k,) [s] in the phases `owner`: kinetic in slip, what holds in stick."""
     if block.slide == 0 or block.friction[0] == 0:
         return np.zeros(u.size)
     held, way = pull(u, rows, owner, block)[0] - block.w**2 * rows[owner, 4], rows[owner, 3]
@@ -169,7 +172,7 @@ def force(u, rows, owner, block: OneMode):
 
 
 def response(time, z, v, gain, pushed, block: OneMode) -> Response:
-    """The histories of a run from z, v, z'' (k,) and the friction force `pushed` [N]."""
+    """The histories of a run from z, v, z'' (k,) at `time` (k,) [s] and the friction force `pushed` (k,) [N]."""
     base = block.drive.values(time)
     moving = base if getattr(block.drive, "moving", True) else 0.0
     slide = block.slide * z

@@ -29,7 +29,10 @@ def oscillator(w, decay, om):
 
 
 def series(u, v0, g0, bc, bs, o):
-    """Motion (shift, speed, acceleration) by the power series, for top u <= 0.3."""
+    """Motion (shift, speed, acceleration) at u by the power series, for short times: top u <= 0.3.
+
+    v0, g0, bc, bs: of the equation at the head of the file; o: of `oscillator`.
+    """
     beta, alpha, om = o[0], o[1], o[5]
     if u <= 0.0:
         return 0.0, v0, g0 - alpha * v0
@@ -67,12 +70,15 @@ def step_answer(u, o, h, h1):
 
 
 def motion(u, v0, g0, bc, bs, o):
-    """Motion (shift, speed, acceleration) at u after the start of a phase with speed v0."""
+    """Motion (shift, speed, acceleration) at u after the start of a phase with speed v0 >= 0.
+
+    g0, bc, bs: of the equation at the head of the file; o: of `oscillator`. Exact to round-off at every damping.
+    """
     return moved(u, cos(o[5] * u), sin(o[5] * u), v0, g0, bc, bs, o)
 
 
 def moved(u, co, so, v0, g0, bc, bs, o):
-    """Motion as `motion` gives it, with the cosine and sine of om u at hand."""
+    """Motion as `motion` gives it, with the cosine co and sine so of om u at hand."""
     beta, alpha, decay, own, kind, om, top = o
     if u * top < REACH:
         return series(u, v0, g0, bc, bs, o)
@@ -131,11 +137,14 @@ def first_leap(a, j, k, m, h):
     if a > 0.0:
         loss = h * (max(-j, 0.0) / 2 + h * (max(-k, 0.0) / 6 + h * m / 24))
         out = max(out, h if loss <= a else h * a / loss)
-    return min(0.9 * out, h)
+    return min(0.9 * out, h)  # inside the bound
 
 
 def leap(v, a, j, k, m, h):
-    """Largest time up to h up to which v + a u + j u^2/2 + k u^3/6 - m u^4/24 is sure to stay positive, v > 0."""
+    """Largest time up to h up to which v + a u + j u^2/2 + k u^3/6 - m u^4/24 is sure to stay positive, v > 0.
+
+    v, a, j, k: speed and its derivatives; m: bound of the size of the fourth (`bend`).
+    """
     low = -0.25 * m * h + (k if k < 0.0 else 0.0)
     low = low * h / 3 + (j if j < 0.0 else 0.0)
     if v + h * (low * h / 2 + (a if a < 0.0 else 0.0)) > 0.0:
@@ -174,10 +183,13 @@ def _free(value, slope, j, k, m, s, end):
 
 
 def bend(v, a, size, h, o):
-    """Bound of the fourth derivative of the speed over the next h, from the equation of motion; size: of the drive."""
+    """Bound of the fourth derivative of the speed over the next h, from the equation of motion; inf for too long an h.
+
+    v, a: speed and acceleration; size: of the drive.
+    """
     beta, alpha, om = o[0], o[1], o[5]
     rest = 1.0 - alpha * h - 0.5 * beta * h * h
-    if rest < 0.1:
+    if rest < 0.1:  # the bound by its own right-hand side holds for rest > 0 alone
         return inf
     second = (om * size + alpha * abs(a) + beta * (abs(v) + h * abs(a))) / rest
     third = om * om * size + alpha * second + beta * (abs(a) + h * second)
@@ -185,7 +197,7 @@ def bend(v, a, size, h, o):
 
 
 def over_parts(v0, a0, size, bc, bs, o):
-    """Fourth derivatives of an overdamped speed at first: of its fast, its slow and its forced term."""
+    """Sizes of the fourth derivatives of an overdamped speed at first: of its fast, its slow and its forced term."""
     beta, alpha, decay, own, om = o[0], o[1], o[2], o[3], o[5]
     fast = -(decay + own)
     slow = beta / fast
@@ -213,14 +225,15 @@ def stop(v0, g0, bc, bs, o, limit):
         quick, late, forced = over_parts(v0, g0 - alpha * v0, size, bc, bs, o)
         rest = late + forced
     y, u, v, a, co, so, peak = 0.0, 0.0, v0, g0 - alpha * v0, 1.0, 0.0, 0.0
-    for _ in range(200000):
+    for _ in range(200000):  # a guard: a slip that needs more is lost
         j = om * (bc * co - bs * so) - alpha * a - beta * v
+        # so near the end the speed is a parabola: one step along it ends the slip to round-off
         if u > 0.0 and v <= 1e-6 * peak:
             x = -v / a if a < 0.0 else inf
             if abs(j) * x <= -1e-5 * a:
                 x *= 1.0 - 0.5 * j * x / a
                 return min(u + x, limit), y + x * (v + 0.5 * a * x), a + x * j
-            if v <= 1e-14 * peak:
+            if v <= 1e-14 * peak:  # a speed of round-off: this is the end
                 return u, y, a
         peak = max(peak, v)
         h = min(stride, limit - u)

@@ -11,7 +11,10 @@ from .sdof import scene_of
 
 
 class Regime(StrEnum):
-    """How the interface moves in steady motion; unsettled: no periodic motion was found."""
+    """How the interface moves in steady motion.
+
+    UNSETTLED: no periodic motion was found.
+    """
 
     STUCK = "stuck"
     STOPS = "stops"
@@ -45,7 +48,11 @@ class Steady:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curve:
-    """A frequency response, arrays (k,) as in Steady: omega [rad/s], regime (of Regime), stops, amplitude [m], ..."""
+    """A frequency response, arrays (k,) with the meanings of Steady.
+
+    omega [rad/s] of the drive; regime: of Regime; stops; amplitude [m]; stick_fraction; multiplier: the larger one;
+    condition; residual.
+    """
 
     omega: np.ndarray
     regime: np.ndarray

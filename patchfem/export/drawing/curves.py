@@ -13,7 +13,7 @@ MARKED = 40  # points of a curve up to which each is marked
 
 
 def spans(curve: dict) -> list:
-    """Stretches [(regime, first, last + 1)] of neighbouring points of a curve that share a regime."""
+    """Stretches [(regime, first, last + 1)] of neighbouring points of a curve of steady motions that share a regime."""
     regime = np.asarray(curve["regime"], str)
     edges = [0, *(np.flatnonzero(regime[1:] != regime[:-1]) + 1), regime.size]
     return [(str(regime[a]), int(a), int(b)) for a, b in pairwise(edges)]
@@ -38,7 +38,7 @@ def regime(steady: dict | None) -> str:
 
 
 def caption(found: dict) -> str:
-    """Caption of the picture of a curve."""
+    """Caption of the picture of a curve of steady motions: what it shows, its regimes, folds and gaps."""
     what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
     text = f"Half peak-to-peak of the steady motion over the {what}, {count} points; "
@@ -85,7 +85,10 @@ def _gaps(axis, along, value) -> None:
 
 @styled
 def levels(rows: list):
-    """Draw the amplitude after every level, in the order of the test; arrows run upwards and downwards."""
+    """Draw the amplitude after every level, in the order of the test, with arrows upwards and downwards.
+
+    rows: objects with drive [m s-2], stuck, values and errors by name, as in result.nc.
+    """
     drive = np.array([row["drive"] for row in rows]) / G
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
     name, scale = axis_unit(amplitude, "m")

@@ -27,7 +27,7 @@ class Panel:
     over: bool
 
     def title(self) -> str:
-        """Head of the panel: how it is drawn."""
+        """Head of the panel: how much its motion is magnified, and which stress the top colour stands for."""
         text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
         unit, scale = axis_unit([self.top], "Pa")
         return text + (f", top colour {self.top * scale:.3g} {unit} and more" if self.over else "")
@@ -100,7 +100,7 @@ def moved(frame: Frame) -> np.ndarray:
 
 
 def rounded(factor: float, least: float = 1.0) -> float:
-    """A factor rounded down to 1, 2 or 5 times a power of ten, `least` at least; factor > 0."""
+    """A factor > 0 rounded down to 1, 2 or 5 times a power of ten; `least` where it is smaller than that."""
     if factor < least:
         return least
     power = 10.0**np.floor(np.log10(factor))
@@ -125,13 +125,13 @@ def near(frame: Frame) -> tuple:
 
 
 def middles(frame: Frame) -> np.ndarray:
-    """Middles of the cells (cells, 2) [mm]."""
+    """Middles of the cells (cells, 2) [mm] of a frame, lines of the interface included."""
     sums = np.add.reduceat(frame.points[frame.connectivity, :2], frame.offsets[:-1])
     return sums / np.diff(frame.offsets)[:, None] * 1e3
 
 
 def areas(frame: Frame) -> np.ndarray:
-    """Areas of the cells (cells,) [m2], 0 of lines."""
+    """Areas of the cells (cells,) [m2] of a frame, 0 of lines."""
     size, out = np.diff(frame.offsets), np.zeros(len(frame.types))
     for count in np.unique(size[size > 2]):
         mine = size == count
@@ -142,7 +142,7 @@ def areas(frame: Frame) -> np.ndarray:
 
 
 def curves(frame: Frame) -> tuple:
-    """Stresses along the interface: (x [mm], ((label, values in the unit), ...), unit)."""
+    """Stresses along the interface of a frame: (x (m,) [mm], ((label, values (m,) in the unit), ...), unit)."""
     line = frame.interface()
     shown = [("normal stress", frame.point_data["normal_stress"][line])]
     if "shear_stress" in frame.point_data:
@@ -152,7 +152,7 @@ def curves(frame: Frame) -> tuple:
 
 
 def borders(frame: Frame, cells) -> tuple:
-    """Edges (e, 2) of the `cells` (bool): the outer ones of both pieces, and those between coating and substrate."""
+    """Edges (e, 2) of the `cells` (bool), as point numbers: outer ones of both pieces, and those under a coating."""
     outer, inner = [], []
     size, material = np.diff(frame.offsets), frame.cell_data["material"]
     for part in (0, 1):

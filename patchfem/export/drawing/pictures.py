@@ -28,7 +28,7 @@ DOTS, BANDS = 800, 1500
 
 
 def step_of(ladder: tuple, size: float) -> tuple:
-    """Unit (name, scale) of a ladder: the smallest in which `size` [SI] stays below 1000."""
+    """Unit (name, scale) of a ladder of LADDERS: the smallest in which `size` [SI] stays below 1000."""
     for name, scale in ladder:
         if abs(size) * scale < 1000:
             return name, scale
@@ -36,7 +36,10 @@ def step_of(ladder: tuple, size: float) -> tuple:
 
 
 def axis_unit(values, unit: str) -> tuple:
-    """Unit (name, scale) for an axis that shows `values` [SI]."""
+    """Unit (name, scale) of an axis that shows `values` [SI]: finite values times scale are in that unit.
+
+    unit: a key of LADDERS.
+    """
     values = np.asarray(values)
     return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
@@ -68,6 +71,10 @@ def whole_from(time, period: float, window_start: float) -> float:
 
 
 def drawing(columns: int = 1, height: float = 3.2, **layout):
+    """An empty Figure of the page's width with `columns` axes side by side: (figure, axes).
+
+    height [inch]; layout: passed on to matplotlib's `subplots`.
+    """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -150,7 +157,11 @@ def interface(x, fields: dict):
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:
-    """Part (left, right, height) [m] of both pieces that shows the contact, right - left = 2 height ratio."""
+    """Part (left, right, height) [m] of both pieces that shows the contact, right - left = 2 height ratio.
+
+    x: (m,) and depth: (ny,) [m] of the mesh; sigma: (m,) [Pa], somewhere > 0; ratio: width of the picture over its
+    height.
+    """
     used = np.flatnonzero(sigma > 0)
     first, last, length = x[used[0]], x[used[-1]], x[-1] - x[0]
     width = min(1.6 * (last - first) + 2 * (x[1] - x[0]), 0.4 * length)
@@ -201,7 +212,7 @@ def bodies(x, depths, mises, sigma):
 
 @styled
 def loop(slide, force, title: str):
-    """Draw the friction force [N] against the slide [m]."""
+    """Draw the friction force (k,) [N] against the slide (k,) [m], with a title."""
     figure, (axis,) = drawing(1, 3.6)
     along, um = axis_unit(slide, "m")
     up, scale = axis_unit(force, "N")

@@ -143,7 +143,7 @@ class Frame:
                 for n in np.unique(size[mine])]
 
     def interface(self) -> np.ndarray:
-        """Points of the interface (m,) by rising x."""
+        """Numbers of the points of the interface (m,), by rising x."""
         nodes = np.unique(np.concatenate([block.ravel() for block in self.cells(2)]))
         return nodes[np.argsort(self.points[nodes, 0], kind="stable")]
 
@@ -183,7 +183,10 @@ class Series:
         return len(self.times)
 
     def frame(self, number: int = -1) -> Frame:
-        """Frame `number` from 0, from the end where it is negative; PatchfemError for one that is not there."""
+        """The frame `number` from 0, counted from the end where it is negative.
+
+        PatchfemError for a number that is not there and for a file that is damaged.
+        """
         count = len(self)
         if not -count <= number < count:
             raise PatchfemError(f"--frame: {number} is not there, {self.path} has frames 0 to {count - 1}")

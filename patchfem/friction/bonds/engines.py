@@ -36,7 +36,7 @@ class Choice:
     seconds: float
 
     def said(self) -> str:
-        """One line for a plan."""
+        """One line for a plan: engine, length of the list, cost per step, settings and bound of the error."""
         parts = [f"{self.engine}: about {self.strips:.0f} strips of bonds, {1e6 * self.seconds:.2g} us per step"]
         if self.tail > 0:
             parts.append(f"tail {self.tail:.1g}")

@@ -36,8 +36,9 @@ from .list_sum_kernels import (
 from .point_kernels import bond_mean, grow
 
 PIECE = 0.25  # longest strip in bond lengths
+# two Gauss points a strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
 GROWN = 0.5  # most growth J of one strip of growing bonds
-MOST_GROWN = 16
+MOST_GROWN = 16  # strips of a step for its growth alone: after a long rest J has no bound
 TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
 LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies is no better than the force
 
@@ -204,7 +205,10 @@ def _path_mean(energy, short, last, dq, c, v0, dt):
 
 @njit(error_model="numpy", **LEAN)
 def list_slope(dq, c, v0, dt):
-    """(path-mean weight, its derivative [1/m]) of the stretch reading of order 1, exact."""
+    """(path-mean weight [1], its derivative over dq [1/m]) of an increment, exact in the stretch reading of order 1.
+
+    dq [m]; c: the list; v0 [m/s], dt [s] set the bond length of the step. Friction force = mu_s N * weight.
+    """
     tally, now, law = c.tally, c.now, c.law
     m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(tally[0]), int(tally[1]))
     first = law[3] * exp(-now[2])
@@ -215,7 +219,11 @@ def list_slope(dq, c, v0, dt):
 
 @njit(error_model="numpy", **LEAN)
 def list_step(dq, c, v0, v1, dt):
-    """Commit dq: append its strips, drop those beyond the cut-off, merge now and then. False when the list is full."""
+    """Commit an increment: append its strips, drop strips beyond the cut-off, merge now and then; False without room.
+
+    dq [m]; c: the list, changed in place; v0, v1: speeds [m/s] at the ends of the step of dt [s]. The energy it stores
+    and the force after the step stand in `tally`.
+    """
     bonds, tally, now, law = c.bondlist, c.tally, c.now, c.law
     before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
     q, path, damage, grown, eps, middle = _after(dq, now, c.growth, v0, v1, dt)
@@ -225,6 +233,7 @@ def list_step(dq, c, v0, v1, dt):
     if size > 0:
         done = _append(dq, place, way, harm, before, grown - age, middle, bonds, tally, now, law)
         _cut(bonds, tally, now, law)
+        # a merge passes over the whole list: wait until it has grown by a fifth
         if law[5] > 0 and tally[1] - tally[0] > 1.2 * tally[3] + 12:
             merge(bonds, tally, now, law)
     tally[5], tally[4] = list_state(0.0, c, 0.0, 0.0)
@@ -238,7 +247,7 @@ def _rescale(bonds, tally, now, law):
     if law[1] == SHARES:
         return
     clock = now[3] if law[1] == AGED else now[2]
-    if clock - now[5] < 300:
+    if clock - now[5] < 300:  # exp(300) = 1e130; the range of numbers ends at exp(709)
         return
     less = exp(now[5] - clock)
     for k in range(int(tally[0]), int(tally[1])):

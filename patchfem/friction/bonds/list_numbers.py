@@ -14,7 +14,7 @@ NODES = 1 / 32  # of the table of P(p + 1, x)
 
 
 def form_of(law: Bonds) -> float:
-    """Form of the sum that a law needs."""
+    """Form of the sum over bonds that a law needs: MOMENTS, POWER, SHARES or AGED of `list_sum_kernels`."""
     if law.reading == "stretch":
         return MOMENTS if law.order == 1 else POWER
     return AGED if law.grows else SHARES
@@ -39,14 +39,20 @@ def law_numbers(law: Bonds, reach: float, merge: float) -> np.ndarray:
 
 
 def share_table(law: Bonds) -> np.ndarray:
-    """P(p + 1, x) at multiples of 1/32, empty where a closed form serves."""
+    """P(p + 1, x) (k,) [1] at multiples x of 1/32 for `list_math_kernels.tabled`; empty where a closed form serves.
+
+    It ends at x = 60 + 4 p, where P is 1 to the last digit.
+    """
     if form_of(law) != SHARES or law.order in (0, 1, 2):
         return np.zeros(0)
     return gammainc(law.order + 1, NODES * np.arange(32 * ceil(60 + 4 * law.order)))
 
 
 def room(law: Bonds, reach: float, merge: float) -> int:
-    """Strips to allocate: those that merging leaves, those of one longest step and some to work with."""
+    """Strips to allocate for a list: those that merging leaves, those of one longest step and some to work with.
+
+    reach: cut-off in bond lengths of path or in units of damage; merge: width in bond lengths, 0 without merging.
+    """
     step = STRIP * ceil(min(reach, NOTHING_LEFT)) + 64
     if merge > 0:
         return 4 * step + ceil(16 / merge)

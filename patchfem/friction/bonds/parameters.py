@@ -33,13 +33,14 @@ class Bonds:
 
     @property
     def grows(self) -> bool:
-        """Whether the bond length evolves."""
+        """Whether the bond length evolves by eq. 2.10; without rates it stays at eps_0."""
         return self.rest_growth is not None
 
 
 def won_share(growth, back):
     """Share of the mature length won in a step (2.10 at constant speed) that was won before the place `back` [1] behind
     its end; growth: the step multiplies the distance to its goal by exp(-growth)."""
+    # of little growth the share is linear
     return np.divide(np.expm1(-growth * (1 - back)), np.expm1(-growth), out=1 - back, where=growth > 1e-9)
 
 
@@ -85,6 +86,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> 
 
     if max(abs(v0), abs(v1)) < floor:
         rest = law.rest_growth * dt / floor
+    # closer speeds: their difference loses its digits, and the mean speed is as good
     elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
         rest = law.rest_growth * dt * (primitive(v1) - primitive(v0)) / (v1 - v0)
     else:

@@ -12,7 +12,10 @@ from ..flags_kernels import FAST, LEAN
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def shape(x):
-    """(f1, f2, exp(-x)) of `recursion.shape_functions` for one x >= 0; 6 ns, NumPy 20 us per call."""
+    """(f1, f2, exp(-x)) [1] for one x >= 0: f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x, without cancellation.
+
+    Twin: `recursion.shape_functions`. Cost: 6 ns, NumPy 20 us per call.
+    """
     if x < 0.03:
         f2 = 0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320)))))
         f1 = 1 - x * f2
@@ -40,7 +43,11 @@ def moments(x, e):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def bond_mean(m, z, dq, sigma, eps):
-    """Path-mean stretch [Pa m] and its slope [Pa] of one point (twin: `recursion.advance`); 10 ns."""
+    """Path-mean stretch [Pa m] of one point over an increment (2.17, stretch, p = 1), and its slope over dq [Pa].
+
+    m [Pa], z [Pa m]: density and stretch before; dq [m]; sigma [Pa] forms the new bonds; eps [m]. The traction is
+    mu_s/eps_0 times the mean. Twin: `recursion.advance`. Cost: 10 ns.
+    """
     path = abs(dq)
     g = 1.0 if dq > 0 else -1.0
     x = path / eps
@@ -53,7 +60,11 @@ def bond_mean(m, z, dq, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def bond_step(m, z, s2, dq, sigma, eps):
-    """New (m, z, s2) of one point and the integral of s2 dR/eps (twin: `recursion.advance`)."""
+    """(m [Pa], z [Pa m], s2 [Pa m2]) of one point after an increment dq [m], and the integral of s2 dR/eps [Pa m2].
+
+    m, z, s2: before; sigma [Pa] forms the new bonds; eps [m]. mu_s/(2 eps_0) times the integral is dissipated. Twin:
+    `recursion.advance`.
+    """
     path = abs(dq)
     g = 1.0 if dq > 0 else -1.0
     x = path / eps
@@ -81,7 +92,10 @@ def free_part(play, dq, half):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def loose_mean(m, z, play, half, dq, sigma, eps):
-    """`bond_mean` with an elastic range of half width `half` (twin: `recursion.Recursion.step`)."""
+    """`bond_mean` of a point with an elastic range: path-mean stretch [Pa m] over dq [m], and its slope [Pa].
+
+    play [1]: place in the range, half [m]: half its width. Twin: `recursion.moved`.
+    """
     free = free_part(play, dq, half)[0]
     rest = dq - free
     if rest == 0.0 or abs(dq) < 1e-280:  # no 1/dq of a step that small
@@ -95,7 +109,10 @@ def loose_mean(m, z, play, half, dq, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def loose_step(m, z, s2, play, half, dq, sigma, eps):
-    """`bond_step` with an elastic range; returns the new play as well."""
+    """`bond_step` of a point with an elastic range: (m, z, s2, play, integral of s2 dR/eps).
+
+    play [1]: place in the range, half [m]: half its width. Twin: `recursion.moved`.
+    """
     free, play = free_part(play, dq, half)
     s2 += free * (2 * z + m * free)
     z += m * free
@@ -114,7 +131,7 @@ def grow(eps, v0, v1, path, dt, growth):
         return eps, 0.0
     if max(abs(v0), abs(v1)) < floor:
         rest = a_s * dt / floor
-    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
+    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):  # as in `parameters`: closer speeds cancel
         rest = a_s * dt * (_primitive(v1, floor) - _primitive(v0, floor)) / (v1 - v0)
     else:
         rest = a_s * dt / max(abs(v0 + v1) / 2, floor)
@@ -135,7 +152,11 @@ def _primitive(v, floor):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def rigid_step(dq, weight, bonds, source, eps):
-    """`bond_step` of points (m,) that all slide by dq [m], in place; returns the energy they dissipate [J]."""
+    """`bond_step` of points (m,) that all slide by dq [m], in place; returns the energy that they dissipate [J].
+
+    weight: mu_s area/eps_0 (m,) [m]; bonds (5, m): m, z, s2, local slide, play; source (m,) [Pa] forms the new bonds;
+    eps [m].
+    """
     path = abs(dq)
     g = 1.0 if dq > 0 else -1.0
     x = path / eps

@@ -34,7 +34,10 @@ PANELS = (0, 1, 2, 4, 8, 16, 32)  # of a step in bond lengths, five Gauss points
 
 
 def cutoff(order: float, tail: float) -> float:
-    """Path R/eps beyond which all older bonds together carry at most `tail` (Q(p + 1, R/eps) = tail)."""
+    """Path R/eps [1] beyond which all older bonds together carry at most the share `tail` of the friction limit.
+
+    It solves Q(p + 1, R/eps) = tail; order: p > -1, tail in (0, 1).
+    """
     return float(gammainccinv(order + 1, tail))
 
 
@@ -188,7 +191,7 @@ class Quadrature:
         old, now = (state.damage, state.now[2]) if stretched else (state.path / self.law.length,
                                                                    state.now[1] / self.law.length)
         first = int(np.searchsorted(old, now - reach))
-        if first < max(64, len(state.q) // 2):
+        if first < max(64, len(state.q) // 2):  # copying the rest is worth it only when half of it is gone
             return state
         kept = {name: getattr(state, name)[first:] for name in (*COLUMNS, "sigma")}
         return replace(state, **kept, gain=state.gain[:, first:], alive=np.maximum(state.alive - first, 0),
@@ -208,7 +211,7 @@ class Quadrature:
         return self.law.static * _squeezed(self._sums(state)[:-1])
 
     def stored(self, state: Strips) -> np.ndarray:
-        """Elastic energy per area (m,) [J/m2] of the bonds at the damage of the moment."""
+        """Elastic energy per area (m,) [J/m2] of the bonds of a state, at the damage of the moment."""
         return self.law.static * self._sums(state)[-1]
 
 

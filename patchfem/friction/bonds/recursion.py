@@ -46,7 +46,10 @@ class BondState(NamedTuple):
 
 
 def shape_functions(x):
-    """(f1, f2, exp(-x)) with f1 = (1 - exp(-x))/x and f2 = (1 - f1)/x, x >= 0, without cancellation."""
+    """(f1, f2, exp(-x)) [1] with f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x for x >= 0 of any shape, without cancellation.
+
+    Below x = 0.03 both are series of seven terms. Compiled twin: `point_kernels.shape`.
+    """
     x = np.asarray(x, float)
     small = x < 0.03
     safe = np.where(small, 1.0, x)
@@ -59,7 +62,10 @@ def shape_functions(x):
 
 
 def moments(x, e):
-    """Integrals 0..x of y exp(-y), of y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x)."""
+    """Integrals from 0 to x of y exp(-y), of y^2 exp(-y) and of the latter once more, without cancellation.
+
+    x >= 0 of any shape; e = exp(-x). Compiled twin: `point_kernels.moments`.
+    """
     series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
     c = np.where(x < 0.5, x**4 * series, 6 - e * (x**3 + 3 * x * x + 6 * x + 6))
     third = (c + x**3 * e) / 3
@@ -97,7 +103,10 @@ def advance(bonds, dq, sigma, eps):
 
 
 def stretch(bonds, dq):
-    """Bonds (3, m) that all stretch by dq [m] along a line and neither break nor form."""
+    """Bonds (3, m) that all stretch by dq [m] along a line and neither break nor form.
+
+    m stays, z' = z + m dq, s2' = s2 + dq (2 z + m dq).
+    """
     m, z, s2 = bonds
     return np.stack([m, z + m * dq, s2 + dq * (2 * z + m * dq)])
 
@@ -125,7 +134,11 @@ def moved(law: Bonds, bonds, play, dq, sigma, eps) -> tuple:
 
 
 def pressed(law: Bonds, bonds, s0, s1):
-    """Bonds (3, m) after a change of the pressure from s0 to s1 (m,) [Pa] at rest; stored energy never rises."""
+    """Bonds (3, m) after a change of the pressure from s0 to s1 (m,) [Pa] at rest; the stored energy never rises.
+
+    Where it falls, bonds without stretch are let go first, as long as m >= z^2/s2 allows it; beyond that all stretches
+    shrink. Where it rises, unstressed bonds of density m_0 (s1 - s0) come.
+    """
     m, z, s2 = bonds
     falls = s1 < s0
     left = np.divide(m * s1, s0, out=np.zeros_like(m), where=s0 > 0)
@@ -138,7 +151,8 @@ def pressed(law: Bonds, bonds, s0, s1):
 
 
 def refuse_directions(law: Bonds, directions: int) -> None:
-    """PatchfemError for a law whose elastic range has no form in two directions."""
+    """Raise PatchfemError for a law with breakaway in more than one direction: its elastic range has no form in a
+    plane."""
     if directions > 1 and law.breakaway:
         raise PatchfemError("breakaway in two directions: set breakaway = 0; not yet built")
 
@@ -178,16 +192,19 @@ class Recursion:
         return Step(scale * mean, spent, BondState(out, grow(law, state.eps, speed, speed, path, dt), play))
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa] on a line; mean: the traction after it."""
+        """The law at rest on a line while the pressure goes from s0 to s1 (m,) [Pa], by the rule of `pressed`.
+
+        The mean of the Step is the traction after it; what the bonds no longer store is dissipated.
+        """
         bonds = pressed(self.law, state.bonds, s0, s1)
         scale = self.law.static / self.law.length
         return Step(scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
-        """tau = mu_s z/eps_0 [Pa]: (m,) along a line, (2, m) in a plane."""
+        """Traction tau = mu_s z/eps_0 [Pa] of a state, > 0 against slip: (m,) along a line, (2, m) in a plane."""
         z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
         return self.law.static / self.law.length * z
 
     def stored(self, state: BondState):
-        """Elastic energy of the bonds per area (m,) [J/m2]."""
+        """Elastic energy per area mu_s s2/(2 eps_0) (m,) [J/m2] of the bonds of a state."""
         return self.law.static / (2 * self.law.length) * state.bonds[-1]

@@ -54,13 +54,20 @@ class Strips:
 
 
 def surviving(state: Strips) -> np.ndarray:
-    """(k,) surviving bond density of each entry [1] in the stretch reading."""
+    """Surviving bond density (k,) [1] of each entry in the stretch reading, per unit of the pressure it formed under.
+
+    A cohort keeps exp(-damage since it formed), a strip that times 1 - exp(-length/eps).
+    """
     left = np.exp(-(state.now[2] - state.damage))
     return np.where(state.length == 0, left, left * -np.expm1(-state.length / state.eps))
 
 
 def weights(state: Strips, law: Bonds) -> np.ndarray:
-    """(k, d + 1) per unit mu_s sigma of each entry: signed force [1] by direction and stored energy [m]."""
+    """What each entry of the strips carries and stores, (k, d + 1), per unit mu_s sigma (eq. 2.17).
+
+    Columns: signed force [1] along each of the d directions, then stored energy [m]. It chooses the closed forms and
+    the Gauss points that the head of the file lists.
+    """
     out = np.empty((len(state.q), state.q.shape[1] + 1))
     cohorts = state.length == 0
     out[cohorts] = _cohorts(state, cohorts, law)

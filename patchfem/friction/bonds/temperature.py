@@ -43,7 +43,11 @@ def _scaled(name: str, value: float, exponent, key: str):
 
 
 def critical_speed(rest, slip):
-    """v_c = sqrt(a_s l_k) [m/s], at which the bond length lies half way between eps_0 and eps_k."""
+    """Critical speed v_c = sqrt(a_s l_k) [m/s], at which the bond length lies half way between eps_0 and eps_k (2.11).
+
+    rest: a_s [m s-2], slip: l_k [m], numbers or (m,). The root of each is taken first, so that the product cannot
+    overflow.
+    """
     return np.sqrt(rest) * np.sqrt(slip)
 
 

@@ -18,7 +18,11 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 
 @dataclass(frozen=True, slots=True)
 class BoucWen:
-    """mu, eps [m], n and s. All points of a contact share z, as all share the slide."""
+    """The Bouc-Wen law as a law object: mu [1], eps [m], exponent n and shape s of the module's equation.
+
+    All points of a contact share z, as all share the slide. The pressure must stay constant. Compiled twin:
+    `bouc_wen_kernels`.
+    """
 
     static: float
     length: float
@@ -26,17 +30,21 @@ class BoucWen:
     shape: float = 0.5
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]."""
+        """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`): limit mu N, length
+        eps."""
         numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
         return Element("friction.laws.bouc_wen_kernels", numbers, np.zeros(1), self.static * load, self.length,
                        form="flow")
 
     def start(self, sigma):
-        """State: (z, pressure (m,) [Pa])."""
+        """State (z [1], pressure (m,) [Pa]) before any motion: z = 0 under the pressure sigma (m,) [Pa]."""
         return 0.0, sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under a pressure (m,) [Pa] that stays."""
+        """One straight increment of slide dq [m] under a pressure (m,) [Pa] that stays; s0 and dt are not used.
+
+        The mean traction is mu s1 int z dq/dq, by the integral of `along`; with dq = 0 it is the traction as it stands.
+        """
         way, before = float(np.sign(dq)), self.stored(state)
         end, area = self.along(way * state[0], abs(dq) / self.length)
         after = way * end if dq else state[0], s1
@@ -45,8 +53,11 @@ class BoucWen:
         return Step(mean, work - (self.stored(after) - before), after)
 
     def along(self, y: float, x: float) -> tuple:
-        """(y, integral of y) after a slide x > 0 in lengths, y = z sgn v: dy/dx = 1 - |y|^n, or 1 - (1 - 2 s) |y|^n
-        below zero, by the inverse function: x as an integral over y, which Newton's method turns around."""
+        """(y, integral of y) [1] after a slide x > 0 in lengths eps, from y = z sgn v.
+
+        Equation: dy/dx = 1 - |y|^n, below zero 1 - (1 - 2 s) |y|^n. It is solved by its inverse function: x as an
+        integral over y, which Newton's method turns around.
+        """
         area = 0.0
         if y < 0:
             give = 1 - 2 * self.shape
@@ -60,7 +71,7 @@ class BoucWen:
                         break
                 return -u, -self._integral(lambda v: v / (1 - give * v**self.exponent), u, -y)
             area, x, y = -self._integral(lambda u: u / (1 - give * u**self.exponent), 0.0, -y), x - way, 0.0
-        w = begin = -np.log1p(-min(y, 1 - 1e-16))
+        w = begin = -np.log1p(-min(y, 1 - 1e-16))  # the knee taken out; w has no bound at y = 1
         for _ in range(60):
             miss = self._integral(lambda v: 1 / self._pace(v), begin, w) - x
             w -= miss * self._pace(w)
@@ -73,7 +84,7 @@ class BoucWen:
         y = -np.expm1(-w)
         with np.errstate(invalid="ignore", divide="ignore"):
             pace = -np.expm1(self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))) * np.exp(w)
-        return np.where(w > 30.0, self.exponent, pace)
+        return np.where(w > 30.0, self.exponent, pace)  # 1 - y = 1e-13: the pace is n but for that
 
     @staticmethod
     def _integral(of, a: float, b: float) -> float:
@@ -85,15 +96,16 @@ class BoucWen:
         return float(np.sum(half * WEIGHTS * 4 * root**3 * of(root**4)))
 
     def traction(self, state):
-        """Traction (m,) [Pa]."""
+        """Traction mu sigma z (m,) [Pa] of a state, > 0 against slip towards +x."""
         return self.static * state[1] * state[0]
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]."""
+        """Elastic energy per area mu sigma eps z^2/2 (m,) [J/m2] of a state."""
         return self.static * state[1] * self.length * state[0]**2 / 2
 
 
 def from_keys(friction, load: float) -> BoucWen:
-    """The law of a [friction] table under a load [N] of the whole contact."""
+    """The Bouc-Wen law of a [friction] table: eps = mu N/stiffness under a load N [N] of the whole contact, 1 N where
+    it is 0."""
     length = friction.static * (load or 1.0) / friction.stiffness
     return BoucWen(friction.static, length, friction.exponent, friction.shape)

@@ -22,13 +22,16 @@ FLAT = 36.0  # w from which y is 1 to the last digit
 
 @njit(error_model="numpy", **LEAN)
 def pace(w, n):
-    """dw/dx above zero, (1 - y^n)/(1 - y): of whole n the sum 1 + y + ... + y^(n - 1)."""
+    """dw/dx of w = -ln(1 - y) above zero: (1 - y^n)/(1 - y), between 1 and n; n the exponent, x the slide over eps.
+
+    For a whole n up to 8 it is the sum 1 + y + ... + y^(n - 1). Twin: `bouc_wen.BoucWen._pace`.
+    """
     if n % 1 == 0 and n <= 8:
         y, out = -expm1(-w), 1.0
         for _ in range(int(n) - 1):
             out = 1 + y * out
         return out
-    if w < 1e-300:
+    if w < 1e-300:  # the pace is 1 at y = 0, which has no logarithm
         return 1.0
     if w > FLAT:
         return n
@@ -38,7 +41,7 @@ def pace(w, n):
 
 @njit(error_model="numpy", **LEAN)
 def density(u, n, give, rising):
-    """(dx/du, |y|) at u = w above zero, at u = -y below."""
+    """(dx/du, |y|) of the variable of integration u: u = w above zero (`rising`), u = -y below; give = 1 - 2 s."""
     return (1 / pace(u, n), -expm1(-u)) if rising else (1 / (1 - give * u**n), u)
 
 
@@ -60,7 +63,7 @@ def piece(low, size, n, give, rising, bent):
 
 @njit(error_model="numpy", **LEAN)
 def between(low, high, n, give, rising):
-    """(x, integral of |y|) between two values of u."""
+    """(slide x, integral of |y| over x) [1] between two values low < high of u, as in `density`."""
     x, area, rest = 0.0, 0.0, low
     if rising and high > FLAT:
         flat = high - max(low, FLAT)
@@ -87,7 +90,8 @@ def scaled(area, way, x):
 
 @njit(error_model="numpy", **LEAN)
 def unloaded(y, x, n, give):
-    """(y, slide left over, integral of y) of an unloading from y < 0 over x, to zero at most."""
+    """(y, slide left over, integral of y) [1] of an unloading from y < 0 over a slide x > 0 in lengths eps, to y = 0 at
+    most."""
     whole, area = between(0.0, -y, n, give, False)
     if whole <= x:
         return 0.0, x - whole, -area
@@ -103,13 +107,14 @@ def unloaded(y, x, n, give):
 
 @njit(error_model="numpy", **LEAN)
 def along(y, x, n, s):
-    """(y, integral of y) after a slide x >= 0."""
+    """(y, integral of y over x) [1] after a slide x >= 0 in lengths eps, from y = z sgn dq. Twin:
+    `bouc_wen.BoucWen.along`."""
     area = 0.0
     if y < 0:
         y, x, area = unloaded(y, x, n, 1 - 2 * s)
         if x <= 0:
             return y, area
-    begin = -log1p(-y) if y < 1 - 1e-15 else FLAT
+    begin = -log1p(-y) if y < 1 - 1e-15 else FLAT  # at the limit w has no bound
     w = begin + x * pace(begin, n)
     for _ in range(40):
         miss = between(begin, w, n, 0.0, True)[0] - x
@@ -122,13 +127,16 @@ def along(y, x, n, s):
 
 @njit(error_model="numpy", **LEAN)
 def slope(y, n, s):
-    """dy/dx."""
+    """dy/dx at y [1]: 1 - y^n above zero, 1 - (1 - 2 s) |y|^n below."""
     return 1 - max(y, 0.0)**n if y >= 0 else 1 - (1 - 2 * s) * (-y)**n
 
 
 @njit(error_model="numpy", **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]."""
+    """Path-mean force [N] of the Bouc-Wen law over an increment dq [m], and its slope over dq [N/m].
+
+    q, eps and dt are not used; the signature is that of `protocol`.
+    """
     limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
     way = 1.0 if dq > 0 else -1.0
     x, rise = abs(dq) / length, slope(way * z, n, s)
@@ -140,7 +148,7 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 @njit(error_model="numpy", **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move z; returns the energy dissipated [J]."""
+    """Move z over the increment dq [m]; returns the energy dissipated [J], work less the gain of the stored energy."""
     limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
     way = 1.0 if dq > 0 else -1.0
     end, area = along(way * z, abs(dq) / length, n, s)
@@ -150,24 +158,31 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible slip [m])."""
+    """(force mu N z [N], stored energy [J], irreversible part q - eps z of the slide [m]) of a contact at the slide q
+    [m]."""
     z = mem[e, 0]
     return num[e, 1] * z, 0.5 * num[e, 1] * num[e, 2] * z * z, q - num[e, 2] * z
 
 
 @njit(error_model="numpy", **LEAN)
 def flow(num, e, z, dq, dt):
-    """(stretch eps z [m] after a slide dq, its slopes over that before, dq and dt)."""
+    """(stretch eps z [m] after a slide dq [m] from the stretch z [m], its slopes over the stretch before, dq [1] and dt
+    [m/s]).
+
+    Used by harmonic balance; the law knows no time, so the last slope is 0.
+    """
     length, n, s = num[e, 2], num[e, 3], num[e, 4]
     way = 1.0 if dq > 0 else -1.0
     begin = way * z / length
     end = along(begin, abs(dq) / length, n, s)[0]
     rise, first = slope(end, n, s), slope(begin, n, s)
+    # at the limit both vanish
     kept = rise / first if first > 1e-8 else exp(-n * abs(dq) / length)
     return way * length * end, kept, rise, 0.0
 
 
 @njit(error_model="numpy", **LEAN)
 def pull(num, e, z, v):
-    """(force [N] at a stretch z [m], its slopes over z and the speed)."""
+    """(force [N] at a stretch z = eps times the z of the law [m], its slopes over the stretch [N/m] and the speed [N
+    s/m], 0)."""
     return num[e, 1] / num[e, 2] * z, num[e, 1] / num[e, 2], 0.0

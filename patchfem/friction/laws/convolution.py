@@ -48,12 +48,18 @@ def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
 
 
 def average(places, nodes, sigma, way: float, length: float, order: float) -> np.ndarray:
-    """Averages (n,) [Pa] at places (n,) [m] of the pressure sigma (m,) [Pa] at nodes (m,) [m]; way: sign of motion."""
+    """Averages (n,) [Pa] of the pressure behind the places (n,) [m], weighted by phi_p: the integral at the head of the
+    file.
+
+    nodes (m,) [m] rising, sigma (m,) [Pa] >= 0 linear between them and 0 outside; way: sign of the motion, +1 averages
+    over x below the place; length: eps [m]; order: p > -1. Exact but for what lies further behind than a share 1e-20 of
+    the weight. Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
+    """
     places, nodes, sigma = (np.asarray(part, float) for part in (places, nodes, sigma))
     if way < 0:
         return average(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
     bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    reach = length * float(gammainccinv(order + 2, 1e-20))
+    reach = length * float(gammainccinv(order + 2, 1e-20))  # weights beyond are below the last digit
     out = np.zeros(places.size)
     for first in range(0, places.size, ROWS):
         here = places[first:first + ROWS]
@@ -66,8 +72,11 @@ def average(places, nodes, sigma, way: float, length: float, order: float) -> np
 
 
 def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
-    """(forward, backward) resultants [N] over mu_s of a rigid slide: weight (m,) [m2], sigma (m,) [Pa]. They differ
-    where the pressure is not symmetric: each loses what its own trailing edge would carry."""
+    """(forward, backward) resultants over mu_s [N] of the averaged law in a rigid slide towards +x and -x, both >= 0.
+
+    nodes (m,) [m]; sigma (m,) [Pa]; weight: nodal areas (m,) [m2]; length: eps [m]; order: p. They differ where the
+    pressure is not symmetric: each loses what its own trailing edge would carry.
+    """
     on = np.asarray(sigma) > 0
     return tuple(float(np.asarray(weight) @ np.where(on, average(nodes, nodes, sigma, way, length, order), 0.0))
                  for way in (1.0, -1.0))
@@ -98,7 +107,7 @@ class Convolution:
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def start(self, sigma) -> Averaged:
-        """No traction before any motion."""
+        """State before any motion: no traction, under a pressure sigma (m,) [Pa]."""
         return Averaged(np.zeros_like(sigma), 0.0, 0.0)
 
     def share(self, dq, dt):
@@ -106,11 +115,16 @@ class Convolution:
         return np.sign(dq)
 
     def limit(self, sigma, way: float):
-        """Traction (m,) [Pa] of a motion of sign `way` under a pressure sigma (m,) [Pa] that rides on the mover."""
+        """Traction (m,) [Pa], >= 0, that resists a motion of sign `way` under a pressure sigma (m,) [Pa] that rides on
+        the mover."""
         return self.static * self._averaged(0.0, sigma, way)
 
     def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]; the mean is that of its two ends."""
+        """One straight increment dq [m] under a pressure that goes from s0 to s1 (m,) [Pa]; dt is not used.
+
+        The mean traction is that of the two ends of the increment. All work is dissipated. At dq = 0 the traction
+        stays.
+        """
         if dq == 0:
             return Step(state.traction, np.zeros_like(s0), state)
         way, slide = float(np.sign(dq)), state.slide + dq
@@ -122,7 +136,10 @@ class Convolution:
         return Step(mean, mean * dq, Averaged(end, slide, way))
 
     def press(self, state: Averaged, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa]: the traction is kept within its limit. mean: after it."""
+        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is kept within its new limit.
+
+        The mean of the Step is the traction after it; nothing is dissipated.
+        """
         way = float(np.sign(state.traction.sum()))
         held = state.traction
         if way != 0:
@@ -142,9 +159,9 @@ class Convolution:
         return np.where(sigma > 0, behind, 0.0)
 
     def traction(self, state: Averaged):
-        """Traction (m,) [Pa] at the end of the last step."""
+        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
         return state.traction
 
     def stored(self, state: Averaged):
-        """Elastic energy per area (m,) [J/m2]: none."""
+        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
         return np.zeros_like(state.traction)

@@ -21,12 +21,13 @@ class Coulomb:
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]: no kernels with a slope."""
+        """The law of a contact under a constant load [N]: static and kinetic force, and no kernels, as a set-valued law
+        has no slope."""
         static = self.kinetic if self.static is None else self.static
         return Element("", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load)
 
     def start(self, sigma):
-        """State: the last traction (m,) [Pa], 0 before any motion."""
+        """State before any motion: the last traction (m,) [Pa], 0 under a pressure sigma (m,) [Pa]."""
         return np.zeros_like(sigma)
 
     def share(self, dq, dt):
@@ -34,34 +35,41 @@ class Coulomb:
         return np.sign(dq)
 
     def limit(self, sigma, way: float):
-        """Largest traction (m,) [Pa] of a motion of either sign."""
+        """Largest traction mu_k sigma (m,) [Pa], >= 0, of a motion of either sign under a pressure sigma (m,) [Pa]."""
         return self.kinetic * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under pressure s0 -> s1 (m,) [Pa]."""
+        """One straight increment dq [m] under a pressure that goes from s0 to s1 (m,) [Pa]; dt is not used.
+
+        The mean traction is mu_k (s0 + s1)/2 sgn dq and all work is dissipated. At dq = 0 the last traction is kept.
+        """
         if dq == 0:
             return Step(state, np.zeros_like(s0), state)
         mean = self.kinetic * (s0 + s1) / 2 * np.sign(dq)
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
     def press(self, state, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is cut to mu_k s1.
+
+        The mean of the Step is the traction after it; nothing is dissipated.
+        """
         held = np.clip(state, -self.kinetic * s1, self.kinetic * s1)
         return Step(held, np.zeros_like(held), held)
 
     def breaking(self, sigma, direction: float):
-        """Traction (m,) [Pa] under sigma at the instant a rest ends in a motion of this sign."""
+        """Traction mu_s sigma (m,) [Pa] under a pressure sigma (m,) [Pa] at the instant a rest ends; direction: sign of
+        the motion."""
         return (self.kinetic if self.static is None else self.static) * sigma * direction
 
     def traction(self, state):
-        """Traction (m,) [Pa] at the end of the last step."""
+        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
         return state
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]: none."""
+        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
         return np.zeros_like(state)
 
 
 def from_keys(friction, load: float) -> Coulomb:
-    """The law of a [friction] table."""
+    """Coulomb's law of a [friction] table; without a kinetic coefficient it is the static one. load [N] is not used."""
     return Coulomb(friction.static if friction.kinetic is None else friction.kinetic, friction.static)

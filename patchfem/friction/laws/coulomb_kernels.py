@@ -13,7 +13,11 @@ __all__ = ["at_end", "commit", "mean", "middle", "state"]
 
 @njit(error_model="numpy", **LEAN)
 def stick(free, beta, static, kinetic):
-    """(dq [m], path-mean force [N]) with dq = free - beta force: no slide up to the static force, else kinetic."""
+    """(slide dq [m], path-mean force [N]) of one step of Coulomb's law, with dq = free - beta force.
+
+    free [m]: slide of the step without friction; beta [m/N] > 0: slide that one newton of friction takes away; static,
+    kinetic: forces [N] >= 0. No slide while |free| <= beta static; beyond it the kinetic force resists.
+    """
     if abs(free) <= beta * static:
         return 0.0, free / beta
     force = kinetic if free > 0 else -kinetic
@@ -22,7 +26,7 @@ def stick(free, beta, static, kinetic):
 
 @njit(error_model="numpy", **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Kinetic force [N] against a slide that is known; no slope."""
+    """Kinetic force [N] against a slide dq [m] that is known, the last force at dq = 0; the slope [N/m] is 0."""
     if dq == 0.0:
         return mem[e, 0], 0.0
     return num[e, 2] if dq > 0 else -num[e, 2], 0.0
@@ -30,18 +34,19 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 @njit(error_model="numpy", **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """All work of the step is dissipated [J]."""
+    """Keep the force [N] of the step; returns the energy dissipated [J], all work of the increment dq [m]."""
     mem[e, 0] = force
     return force * dq
 
 
 @njit(error_model="numpy", **LEAN)
 def at_end(num, e, before, speed, travel):
-    """(kinetic force [N] against a speed [m/s], no slopes)."""
+    """(kinetic force [N] against a speed [m/s], its slopes over speed and travel, both 0); before and travel are not
+    used."""
     return num[e, 2] * np.sign(speed), 0.0, 0.0
 
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]): the force of the last step."""
+    """(force of the last step [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
     return mem[e, 0], 0.0, q

@@ -22,15 +22,20 @@ class ElasticPlastic:
     length: float
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]: one spring that slips."""
+        """The law of a contact under a constant load [N]: one spring of stiffness mu N/eps that slips at mu N."""
         return parallel([self.static * load / self.length], [self.length])._replace(length=self.length)
 
     def start(self, sigma):
-        """State: (traction/mu, density of springs), (2, m) [Pa]."""
+        """State (traction/mu, density of springs), (2, m) [Pa], before any motion: unstressed springs under sigma (m,)
+        [Pa]."""
         return np.stack([np.zeros_like(sigma), sigma])
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] at the mean pressure of its ends; mean traction of the clipped ramp."""
+        """One straight increment dq [m] under a pressure that goes from s0 to s1 (m,) [Pa]; dt is not used.
+
+        The pressure of the step is the mean of its ends. The traction is a ramp cut at mu sigma, whose path mean is
+        exact.
+        """
         sigma = (s0 + s1) / 2
         y0, springs = self._at(state, sigma)
         move = springs * dq / self.length
@@ -45,7 +50,10 @@ class ElasticPlastic:
         return Step(self.static * mean, spent, after)
 
     def press(self, state, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: what exceeds the new limit is dissipated.
+
+        The mean of the Step is the traction after it.
+        """
         after = np.stack(self._at(state, s1))
         return Step(self.static * after[0], self.stored(state) - self.stored(after), after)
 
@@ -55,17 +63,21 @@ class ElasticPlastic:
         return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
 
     def traction(self, state):
-        """Traction (m,) [Pa]."""
+        """Traction (m,) [Pa] of a state, > 0 against slip towards +x."""
         return self.static * state[0]
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]."""
+        """Elastic energy per area mu eps y^2/(2 density) (m,) [J/m2] of a state, y its traction over mu."""
         y, springs = state
         return self.static * self.length * np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
 
 
 def parallel(stiffness, yield_slide) -> Element:
-    """Elements side by side under one slide: stiffness (t,) [N/m], yield slide (t,) [m]."""
+    """Elastic-plastic elements side by side under one slide (eq. 3.12 with its reversal), as the loops take them.
+
+    stiffness (t,) [N/m]; yield_slide (t,) [m], the stretch at which each slips. The Element has the sum of their slip
+    forces as its limit. Kernels: `elastic_plastic_kernels`.
+    """
     k, most = (np.asarray(part, float) for part in (stiffness, yield_slide))
     limit, total = float(k @ most), float(k.sum())
     numbers = np.concatenate([[0.0, k.size], k, most])
@@ -74,5 +86,5 @@ def parallel(stiffness, yield_slide) -> Element:
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:
-    """The law of a [friction] table."""
+    """The elastic-plastic law of a [friction] table, with its bond length as the length; load [N] is not used."""
     return ElasticPlastic(friction.static, friction.bond_length)

@@ -26,9 +26,13 @@ def pulled(start, move, most):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]; 0.4 ns per element."""
+    """Path-mean force [N] of elastic-plastic elements over an increment dq [m], and its slope over dq [N/m].
+
+    q, eps and dt are not used. Cost: 0.4 ns per element.
+    """
     row, past, t = num[e], mem[e], int(num[e, 1])
     force, slope = 0.0, 0.0
+    # no division by a step that small: the force as it stands and the slope of a pure stretch
     if abs(dq) < 1e-290:
         for j in range(t):
             force += row[2 + j] * past[3 + j]
@@ -43,7 +47,8 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move the elements; returns the energy that they dissipate [J]."""
+    """Move the elements over the increment dq [m]; returns the energy that they dissipate [J], limit times slip of
+    each."""
     row, past, t = num[e], mem[e], int(num[e, 1])
     lost, pull, energy, shared, total = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(t):
@@ -70,5 +75,6 @@ def at_end(num, e, before, speed, travel):
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) as they stand."""
+    """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q
+    [m]."""
     return mem[e, 0], mem[e, 1], q - mem[e, 2]

@@ -30,15 +30,18 @@ class Iwan:
     yield_slide: np.ndarray
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]."""
+        """The law of a contact under a constant load [N], as the loops take it: the parallel elements of
+        `elastic_plastic`."""
         return parallel(self.stiffness * load, self.yield_slide)
 
     def start(self, sigma):
-        """State: (stretch (t,) [m] of the elements, pressure (m,) [Pa])."""
+        """State (stretch (t,) [m] of the elements, pressure (m,) [Pa]) before any motion: unstretched under sigma (m,)
+        [Pa]."""
         return np.zeros(self.yield_slide.size), sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under a pressure (m,) [Pa] that stays."""
+        """One straight increment dq [m] under a pressure (m,) [Pa] that stays; s0 and dt are not used. The path mean is
+        exact."""
         stretch, before = state[0], self.stored(state)
         end = np.clip(stretch + dq, -self.yield_slide, self.yield_slide)
         part = np.divide(end - stretch, dq, out=np.ones_like(end), where=dq != 0)
@@ -47,16 +50,20 @@ class Iwan:
         return Step(mean, mean * dq - (self.stored(after) - before), after)
 
     def traction(self, state):
-        """Traction (m,) [Pa]."""
+        """Traction (m,) [Pa] of a state, > 0 against slip towards +x."""
         return state[1] * float(self.stiffness @ state[0])
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]."""
+        """Elastic energy per area (m,) [J/m2] of a state."""
         return state[1] * float(self.stiffness @ state[0]**2) / 2
 
 
 def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
-    """phi_max [m] of a slip force [N] and a stiffness [N/m]: the slide at which everything slips."""
+    """phi_max [m], the slide from which on every slider slips, of a slip force F_S [N] and a stiffness K_T [N/m].
+
+    phi_max = F_S (1 + beta)/(K_T (beta + (chi + 1)/(chi + 2))), with -1 < chi the exponent and beta >= 0 the share of
+    the last slider (Segalman 2005).
+    """
     return force * (1 + beta) / (stiffness * (beta + (chi + 1) / (chi + 2)))
 
 
@@ -79,6 +86,7 @@ def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
 
 
 def from_keys(friction, load: float) -> Iwan:
-    """The law of a [friction] table under a load [N] of the whole contact."""
+    """The Iwan law of a [friction] table under a load [N] of the whole contact, to which its stiffness [N/m] refers; 0
+    counts as 1 N."""
     k, most = sliders(friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta)
     return Iwan(k, most)

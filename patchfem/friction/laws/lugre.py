@@ -28,7 +28,7 @@ class LuGre:
     viscous: float = 0.0
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]."""
+        """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form "flow"."""
         share = np.array([self.stiffness, self.kinetic, self.static, 0.0, self.micro_damping, self.viscous])
         numbers = np.concatenate([[0.0], load * share])
         numbers[4] = self.speed
@@ -36,11 +36,12 @@ class LuGre:
                        self.static / self.stiffness, False, "flow")
 
     def limit(self, speed: float) -> float:
-        """g/N at a speed [m/s], not quite zero where no friction is left."""
+        """g/N [1] at a speed [m/s]: the steady friction force per newton of load, at least 1e-9 mu_s, as z divides by
+        it."""
         return max(self.kinetic + (self.static - self.kinetic) * np.exp(-(speed / self.speed)**2), 1e-9 * self.static)
 
     def start(self, sigma):
-        """State: (z [m], z' [m/s], speed [m/s], pressure (m,) [Pa])."""
+        """State (z [m], z' [m/s], speed [m/s], pressure (m,) [Pa]) at rest and unstretched, under sigma (m,) [Pa]."""
         return 0.0, 0.0, 0.0, sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
@@ -58,17 +59,20 @@ class LuGre:
         return Step(mean, mean * dq - (self.stored(state) - before), state)
 
     def traction(self, state):
-        """Traction (m,) [Pa] at the speed of the last step."""
+        """Traction (m,) [Pa] of a state at the speed of the last step, > 0 against slip towards +x."""
         z, rate, v, sigma = state
         return sigma * (self.stiffness * z + self.micro_damping * rate + self.viscous * v)
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]."""
+        """Elastic energy per area sigma stiffness z^2/2 (m,) [J/m2] of a state."""
         return state[3] * self.stiffness * state[0]**2 / 2
 
 
 def from_keys(friction, load: float) -> LuGre:
-    """The law of a [friction] table under a load [N] of the whole contact."""
+    """The LuGre law of a [friction] table under a load [N] of the whole contact, to which stiffness and damping refer.
+
+    A load of 0 counts as 1 N. Without a kinetic coefficient it is the static one.
+    """
     whole = load or 1.0
     kinetic = friction.static if friction.kinetic is None else friction.kinetic
     return LuGre(friction.static, kinetic, friction.stiffness / whole, friction.stribeck_speed,

@@ -14,7 +14,7 @@ from ..flags_kernels import LEAN, middle
 __all__ = ["commit", "flow", "mean", "middle", "pull", "state"]
 
 
-TRACE = 1e-9
+TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0
 
 
 @njit(error_model="numpy", **LEAN)
@@ -51,7 +51,10 @@ def relaxed(num, e, z, dq, dt):
 
 @njit(error_model="numpy", **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]."""
+    """Path-mean force [N] of the LuGre law over an increment dq [m] in dt [s], and its slope over dq [N/m].
+
+    q and eps are not used; with dt = 0 neither damping acts.
+    """
     after, middle, by_after, by_middle, _, _ = relaxed(num, e, mem[e, 0], dq, dt)
     force, slope = num[e, 1] * middle, num[e, 1] * by_middle
     if dt > 0:
@@ -62,7 +65,8 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 @njit(error_model="numpy", **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move z; returns the energy dissipated [J]."""
+    """Move z over the increment dq [m] in dt [s]; returns the energy dissipated [J], force times dq less the gain in
+    store."""
     z = mem[e, 0]
     mem[e, 0] = relaxed(num, e, z, dq, dt)[0]
     return force * dq - 0.5 * num[e, 1] * (mem[e, 0] * mem[e, 0] - z * z)
@@ -70,7 +74,7 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
 
 @njit(error_model="numpy", **LEAN)
 def pull(num, e, z, v):
-    """(force [N] at a stretch z [m] and a speed v [m/s], its slopes over both)."""
+    """(force [N] at a stretch z [m] and a speed v [m/s], its slopes over z [N/m] and v [N s/m])."""
     way, speed = (1.0 if v > 0 else -1.0), abs(v)
     length, bend = reach(num, e, speed)
     rate = v - speed * z / length
@@ -81,13 +85,13 @@ def pull(num, e, z, v):
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) at a speed [m/s]."""
+    """(force at the speed v [m/s] [N], stored energy [J], irreversible part q - z of the slide [m])."""
     z = mem[e, 0]
     return pull(num, e, z, v)[0], 0.5 * num[e, 1] * z * z, q - z
 
 
 @njit(error_model="numpy", **LEAN)
 def flow(num, e, z, dq, dt):
-    """(z [m] after a slide dq in dt, its slopes over z, dq and dt)."""
+    """(z [m] after a slide dq [m] in dt [s] from the stretch z [m], its slopes over z, dq [1] and dt [m/s])."""
     after, _, by_slide, _, kept, by_time = relaxed(num, e, z, dq, dt)
     return after, kept, by_slide, by_time

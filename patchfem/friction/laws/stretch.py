@@ -7,7 +7,11 @@ from ..protocol import Element
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:
-    """(a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10, a_s = -1 for a constant bond length, and the breakaway share."""
+    """The six numbers of the growth of bonds that compiled code takes: (a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10 and
+    breakaway.
+
+    a_s [m s-2], l_k [m], v_h [m/s], eps_0 and eps_k [m]; a_s = -1 says that the bond length is constant.
+    """
     if not law.grows:
         return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
     return np.array([law.rest_growth, law.slip_growth, law.rest_speed, law.length, law.ratio * law.length,
@@ -32,5 +36,6 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
 
 
 def bonds_of(memory) -> np.ndarray:
-    """Bonds (5, m) of the memory of `points_element`: m, z, s2, local slide and play of every point."""
+    """Bonds (5, m) in the memory of a `points_element`: m [Pa], z [Pa m], s2 [Pa m2], local slide [m] and play [1] per
+    point."""
     return np.asarray(memory)[1:].reshape(5, -1)

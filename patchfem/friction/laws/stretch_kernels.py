@@ -18,20 +18,25 @@ FREE = 7  # of num: share of the bond length that stretches without damage
 
 @njit(error_model="numpy", **LEAN)
 def middle(num, mem, e, v, dt):
-    """Bond length in the middle of the step [m], as of the solve."""
+    """Bond length [m] in the middle of a step of dt [s] at the speed v [m/s] (eq. 2.10), which the solve of the step
+    uses."""
     return grow(mem[e, 0], v, v, abs(v) * dt / 2, dt / 2, num[e, GROWTH:WEIGHT])[0]
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def points(num, mem, e):
-    """(weights (m,), pressures (m,), bonds (5, m)) of an element."""
+    """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds (5, m)) of element e, as views of its numbers."""
     m = int(num[e, 1])
     return num[e, WEIGHT:WEIGHT + m], num[e, WEIGHT + m:WEIGHT + 2 * m], mem[e, 1:1 + 5 * m].reshape((5, m))
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]; 0.3 ns per point, as all bonds together move like one point."""
+    """Path-mean force [N] of eq. 2.17 (stretch, p = 1) over an increment dq [m], and its slope over dq [N/m].
+
+    eps: bond length of the step [m]. Cost: 0.3 ns per point, as all bonds together move like one point; with a
+    breakaway share every point is stepped by itself.
+    """
     if num[e, FREE] == 0:
         row, past, m = num[e], mem[e], int(num[e, 1])
         density, stretch, pressure = 0.0, 0.0, 0.0
@@ -51,7 +56,10 @@ def mean(num, mem, e, q, dq, eps, dt):
 
 @njit(error_model="numpy", **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """Move the bonds; returns the energy that they dissipate [J]."""
+    """Move the bonds over the increment dq [m] and let them grow; returns the energy that they dissipate [J].
+
+    v0, v1: speeds [m/s] at the ends of the step of dt [s]; eps: bond length of its middle [m].
+    """
     weight, source, bonds = points(num, mem, e)
     lost = 0.0
     if num[e, FREE] == 0:
@@ -68,7 +76,11 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
 
 @njit(error_model="numpy", **LEAN)
 def flow(num, e, z, dq, dt):
-    """(stretch z [m] of full-grown bonds of constant length after a slide dq, its slopes over z, dq and dt)."""
+    """(stretch z [m] of full-grown bonds after a slide dq [m], its slopes over z, dq [1] and dt [m/s]), for harmonic
+    balance.
+
+    Holds at constant bond length eps: z relaxes towards eps sgn dq over the path eps. The law knows no time.
+    """
     length = num[e, GROWTH + 3]
     end = length if dq > 0 else -length
     kept = exp(-abs(dq) / length)
@@ -77,7 +89,7 @@ def flow(num, e, z, dq, dt):
 
 @njit(error_model="numpy", **LEAN)
 def pull(num, e, z, v):
-    """(force [N] of full-grown bonds stretched by z [m], its slopes over z and the speed)."""
+    """(force [N] of full-grown bonds stretched by z [m], its slopes over z [N/m] and over the speed, 0)."""
     m, stiffness = int(num[e, 1]), 0.0
     for j in range(m):
         stiffness += num[e, WEIGHT + j] * num[e, WEIGHT + m + j]
@@ -86,7 +98,10 @@ def pull(num, e, z, v):
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) as they stand."""
+    """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q [m].
+
+    The irreversible part is local slide less mean stretch of the bonds, averaged with mu_s sigma area of the points.
+    """
     weight, source, bonds = points(num, mem, e)
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
     for j in range(weight.size):

@@ -19,12 +19,13 @@ class Rate:
     holds: ClassVar[bool] = False
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]."""
+        """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form
+        "speed"."""
         return Element("friction.laws.tanh_kernels", np.array([0.0, self.static * load, self.speed]), np.zeros(0),
                        self.static * load, form="speed")
 
     def start(self, sigma):
-        """State: the last traction (m,) [Pa], 0 before any motion."""
+        """State before any motion: the last traction (m,) [Pa], 0 under a pressure sigma (m,) [Pa]."""
         return np.zeros_like(sigma)
 
     def share(self, dq, dt):
@@ -35,29 +36,35 @@ class Rate:
         return np.where(np.greater(dt, 0), part, np.sign(dq))[()]
 
     def limit(self, sigma, way: float):
-        """Largest traction (m,) [Pa] of a motion of either sign."""
+        """Largest traction mu sigma (m,) [Pa], >= 0, of a motion of either sign under a pressure sigma (m,) [Pa]."""
         return self.static * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] in dt [s] under pressure s0 -> s1 (m,) [Pa]."""
+        """One straight increment dq [m] in dt [s] under a pressure that goes from s0 to s1 (m,) [Pa] (eq. 2.4).
+
+        The mean traction is that of the mean speed and the mean pressure of the step; all work is dissipated.
+        """
         part = self.share(dq, dt)
         mean = self.static * (s0 + s1) / 2 * part
         return Step(mean, mean * dq, self.static * s1 * part)
 
     def press(self, state, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa]; mean: the traction after it."""
+        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is cut to mu s1.
+
+        The mean of the Step is the traction after it; nothing is dissipated.
+        """
         held = np.clip(state, -self.static * s1, self.static * s1)
         return Step(held, np.zeros_like(held), held)
 
     def traction(self, state):
-        """Traction (m,) [Pa] at the end of the last step."""
+        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
         return state
 
     def stored(self, state):
-        """Elastic energy per area (m,) [J/m2]: none."""
+        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
         return np.zeros_like(state)
 
 
 def from_keys(friction, load: float) -> Rate:
-    """The law of a [friction] table."""
+    """The rate law of a [friction] table; load [N] is not used."""
     return Rate(friction.static, friction.reference_speed)

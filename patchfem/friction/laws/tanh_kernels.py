@@ -14,21 +14,21 @@ __all__ = ["at_end", "commit", "mean", "middle", "state"]
 
 @njit(error_model="numpy", **LEAN)
 def creep(speed, limit, reference):
-    """(force [N], slope [N s/m]) of the law at a speed [m/s]."""
+    """(force [N], slope over the speed [N s/m]) of eq. 2.4 at a speed [m/s]; limit [N], reference: v_0 [m/s]."""
     part = tanh(speed / reference)
     return limit * part, limit * (1 - part) * (1 + part) / reference
 
 
 @njit(error_model="numpy", **LEAN)
 def mean(num, mem, e, q, dq, eps, dt):
-    """Path-mean force [N] and slope [N/m]: the law at the mean speed of the step."""
+    """Path-mean force [N] of eq. 2.4 at the mean speed of a step dq [m] in dt > 0 [s], and its slope over dq [N/m]."""
     force, slope = creep(dq / dt, num[e, 1], num[e, 2])
     return force, slope / dt
 
 
 @njit(error_model="numpy", **LEAN)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
-    """All work of the step is dissipated [J]."""
+    """Energy dissipated [J] over the increment dq [m]: all work of the force [N]; there is no memory to move."""
     return force * dq
 
 
@@ -41,5 +41,5 @@ def at_end(num, e, before, speed, travel):
 
 @njit(error_model="numpy", **LEAN)
 def state(num, mem, e, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) at a speed [m/s]."""
+    """(force at the speed v [m/s] [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
     return creep(v, num[e, 1], num[e, 2])[0], 0.0, q

@@ -10,7 +10,7 @@ ALIKE = 1e-9  # relative difference of the limits forward and backward that coun
 
 
 def law_on(model, patch) -> Convolution:
-    """The law of a bench scene; patch None for [normal]."""
+    """The averaged law of a bench scene on its solved patch; patch None for [normal]."""
     f = model.friction
     if patch is None:
         return Convolution(f.static, f.bond_length, f.order)
@@ -20,7 +20,10 @@ def law_on(model, patch) -> Convolution:
 
 
 def limit_share(model, patch) -> float:
-    """Limit force of a rigid block over mu_s N. PatchfemError where it differs between the two ways of the slide."""
+    """Limit force of a rigid block over mu_s N [1]: below 1 for the averaged law on a patch, else 1.
+
+    PatchfemError where it differs between the two ways of the slide.
+    """
     f = model.friction
     if patch is None or not has(f.law, "averaged"):
         return 1.0

@@ -11,7 +11,10 @@ from .watch import Watch
 
 
 def closed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
-    """Slide the interface along path = (time [s], slide [m]), both (k,), with `frames` frames of its tractions."""
+    """Slide the interface of a law without memory along path = (time (k,) [s], slide (k,) [m]), in closed form.
+
+    patch: the solved Patch or None; frames: how many frames of tractions are kept.
+    """
     (time, slide), (sigma, weight), law = path, pressed(model, patch), law_for(model, patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     move = np.diff(slide)

@@ -22,7 +22,10 @@ PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide ne
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """kind: one of the numbers above; choice: how bonds are summed, None without a sum; seconds: per sample."""
+    """How a bench slides its interface.
+
+    kind: one of the numbers above; seconds: per sample; choice: how bonds are summed, None without a sum.
+    """
 
     kind: int
     seconds: float
@@ -30,7 +33,7 @@ class Engine:
 
     @property
     def name(self) -> str:
-        """As summaries and plans have it."""
+        """The name of the engine as summaries and plans have it."""
         return "bench, " + (f"{self.choice.engine} bond list" if self.kind == LIST else NAMES[self.kind])
 
 

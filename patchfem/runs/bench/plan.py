@@ -23,6 +23,6 @@ def cost(model: Model, unknowns: dict) -> tuple:
 
 
 def groups(model: Model) -> dict:
-    """Dimensionless groups of the slide by name."""
+    """Dimensionless groups of the slide by name: its amplitude over the bond length, where the law has one."""
     length = model.friction.bond_length
     return {"amplitude_over_bond_length": model.slide.amplitude / length} if length else {}

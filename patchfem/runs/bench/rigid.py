@@ -18,7 +18,10 @@ from .watch import Watch
 
 
 def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) -> Slid:
-    """Slide the interface along path = (time [s], slide [m]), both (k,), with `frames` frames of its tractions."""
+    """Slide the interface rigidly along path = (time (k,) [s], slide (k,) [m]) by a compiled engine.
+
+    patch: the solved Patch or None; frames: how many frames of tractions are kept; engine: of `engine_of`.
+    """
     (time, slide), f = path, model.friction
     sigma, weight = pressed(model, patch)
     load = float(weight @ sigma)

@@ -42,7 +42,10 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
 
 
 def refuse_costly(model, law, samples: int, points: int, slide) -> None:
-    """Missing where the NumPy sum over bonds would form more products than MOST_WORK."""
+    """Raise Missing where the NumPy sum over bonds would form more strip-point products than MOST_WORK.
+
+    slide: (k,) [m]; bonds older than 25 lengths are taken as cut off.
+    """
     if not hasattr(law, "weights"):
         return
     reach = 25 * model.friction.bond_length

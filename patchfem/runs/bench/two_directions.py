@@ -67,7 +67,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
 
 
 def law_for(model):
-    """The law object in two directions."""
+    """The law object of a bench in two directions: the recursion, or the sum for other orders and readings."""
     law = model.bonds
     if law.reading == "stretch" and law.order == 1:
         return Recursion(law)

@@ -15,7 +15,7 @@ class Watch:
     progress: object = None
 
     def tell(self, share: float) -> None:
-        """Pass on the done share."""
+        """Pass the done share (0 to 1) on to `progress`, if there is one."""
         if self.progress is not None:
             self.progress(share)
 

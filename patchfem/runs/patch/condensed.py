@@ -36,7 +36,7 @@ class Pair:
 
     @property
     def coupling(self) -> float:
-        """The largest normal closing per shear force over the largest slide per shear force."""
+        """Largest normal closing per shear force over the largest slide per shear force [1]; 0 for mirrored pieces."""
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
     def forces(self, nodal) -> tuple:

@@ -23,7 +23,7 @@ DECISIVE = ("pressure_peak", "contact_fraction", "normal_stiffness", "rotation")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Base:
-    """Recipe of the coarsest grids: the layout of their columns and the growth of their rows."""
+    """Recipe of the coarsest grids of a patch: the layout of their columns and the growth of their rows."""
 
     layout: Layout
     growth: float = GROWTH

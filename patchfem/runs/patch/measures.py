@@ -97,7 +97,10 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
 
 
 def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
-    """Power of the cell length with which the error of each measure falls, by name, from 1/2 to 2; 1 where unknown."""
+    """Power of the cell length with which the error of each measure falls, by name, from 1/2 to 2; 1 where unknown.
+
+    fine, coarse, coarsest: the patch on three meshes, each of cells about twice as long as the one before.
+    """
     changes = {name: np.abs(pair) for name, pair in _changes(fine, coarse, coarsest).items()}
     return {name: float(np.clip(np.log2(before / last), 0.5, 2.0)) if last > 0 and before > 0 else 1.0
             for name, (last, before) in changes.items()}

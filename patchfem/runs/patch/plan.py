@@ -7,13 +7,13 @@ from ...model.patch import CHOSEN_POINTS, bars, block_shear
 
 
 def sizes(asked) -> dict:
-    """Sizes by name of a `PatchModel`."""
+    """Sizes of a `PatchModel` by name: interface points, and about how many elastic unknowns."""
     points = CHOSEN_POINTS if asked.chosen else round(asked.length / asked.size) + 1
     return {"interface_points": points, "elastic_unknowns_about": int(points * 2 * 33)}
 
 
 def chain(asked) -> dict:
-    """Links of the stiffness chain by name [N/m], "rigid" where the scene names none."""
+    """Links of the stiffness chain of a `PatchModel` by name [N/m], "rigid" where the scene names none."""
     out = {"holder": asked.slide_spring or "rigid", "pieces_shear": block_shear(asked) if asked.shear else "rigid",
            "asperities": "rigid"}
     if asked.skin is not None and asked.skin.tangential_ratio is not None:
@@ -25,7 +25,10 @@ def chain(asked) -> dict:
 
 
 def groups(model: Model) -> dict:
-    """Dimensionless groups of the patch by name."""
+    """Dimensionless groups of a patch by name, and its slip length [m] where something rubs.
+
+    tilt_over_first_opening: tilt over the one at which the edge of flat pieces lifts off, the pieces taken as bars.
+    """
     out, asked = {}, model.patch
     load = asked.nominal_load
     if model.friction is not None:
@@ -38,7 +41,7 @@ def groups(model: Model) -> dict:
 
 
 def verdict(found: dict) -> list:
-    """Sentences on what the tilt group says."""
+    """Sentences on what the tilt group says: full contact, or about which part of it."""
     tilt = found.get("tilt_over_first_opening")
     if tilt is None:
         return []

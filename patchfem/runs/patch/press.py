@@ -49,7 +49,11 @@ class Patch:
 
 
 def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
-    """Assemble, condense and press the pieces of a `PatchModel`: bodies of `bodies_of`, the upper None where alike."""
+    """Assemble, condense and press the pieces of a `PatchModel`.
+
+    grid, upper_grid: bodies of `bodies_of`, the upper None where it is alike; fresh: operators kept on disk are not
+    used. Refusals as in `pressed` and of the contact.
+    """
     return pressed(asked, condensed(asked, grid, upper_grid, fresh))
 
 
@@ -165,7 +169,11 @@ def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
 
 
 def shear_of(patch: Patch, law, count: int | None, tolerance: float):
-    """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for."""
+    """ShearModes of the pressed patch for a bond law.
+
+    law: its Bonds; count: how many, None: as many as a tenth of the tolerance asks for. PatchfemError where a weakening
+    patch could jump by itself.
+    """
     limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:

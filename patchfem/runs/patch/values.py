@@ -57,7 +57,7 @@ def peak_pressure(x, sigma) -> float:
 
 
 def values(patch: Patch) -> dict:
-    """Value of every static measure by name; loaded_fraction is the mean over the largest pressure."""
+    """Value of every static measure of a pressed patch by name, in SI; `rows` has their meanings."""
     x, weight, p = patch.x, patch.pieces.interface.weight, patch.pressure
     area = weight.sum()
     peak = peak_pressure(x, p.sigma_n)
@@ -91,5 +91,5 @@ def shear_stiffness(patch: Patch) -> float:
 
 
 def edge_cells(x, active) -> np.ndarray:
-    """Lengths [m] of the cells in which the contact set ends, empty for full contact."""
+    """Lengths (e,) [m] of the cells in which the contact set ends; empty for full contact."""
     return np.diff(x)[active[1:] != active[:-1]]

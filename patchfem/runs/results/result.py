@@ -37,12 +37,18 @@ class Result:
 
 
 def worded(measures: dict, apart: str) -> dict:
-    """The measures with their meanings; apart: the thing that a number behind a name counts, interfaces or strips."""
+    """The measures by name, with their meanings.
+
+    apart: what a number behind a name counts, "interface" or "strip".
+    """
     return {name: replace(m, text=meaning(name, apart)) for name, m in measures.items()}
 
 
 def meaning(name: str, apart: str = "interface") -> str:
-    """Meaning of a measure by its name in a summary; slip_amplitude_2 is that of the second interface."""
+    """Meaning of a measure by its name in a summary, in one sentence without a stop.
+
+    slip_amplitude_2 is that of the second interface, or of what `apart` names.
+    """
     if name in STATIC:
         return STATIC[name].text
     from ...response.rows import of_first, row_of
@@ -52,7 +58,7 @@ def meaning(name: str, apart: str = "interface") -> str:
 
 
 def still(patch) -> dict:
-    """Fields of the pressed patch before any motion."""
+    """Fields of the pressed patch before any motion: normal_stress [Pa], gap [m] and status, (1, m) each."""
     return {"time": np.zeros(1), "normal_stress": patch.pressure.sigma_n[None], "gap": patch.pressure.gap[None],
             "status": patch.active.astype(np.int8)[None]}
 
@@ -75,7 +81,10 @@ def frames_of(patch, time, tau, local, slide) -> dict:
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
-    """The line on the rise of the surface temperature, where the scene names one."""
+    """The line on the rise of the surface temperature as a list, empty where the scene names no temperature.
+
+    work [J]: of friction over the run, None: by the trapezoidal rule on the response.
+    """
     if model.heat is None:
         return []
     from .heat import heating

@@ -40,7 +40,10 @@ def laws_of(model, load: float) -> list:
 
 
 def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=None):
-    """Solution of a comparison method at numerics.steps per cycle; arguments as `march.run_march`."""
+    """Solution of a comparison method (Newmark, Duhamel, Euler) at numerics.steps per cycle.
+
+    Arguments as `march.run_march`; no interface frames. PatchfemError for a law that these methods cannot take.
+    """
     load_kernels(say)
     rig, modes, drive = model.rig, model.rig.modes, model.rig.drive
     laws, begin = laws_of(model, borne(model, patch)), perf_counter()

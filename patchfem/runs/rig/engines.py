@@ -16,7 +16,7 @@ from ...response.errors import change, step_error
 
 
 class Variant(NamedTuple):
-    """A coarser run: its numerics and the patch that it takes."""
+    """A coarser run of a rig: its Numerics and the Patch that it takes, None under [normal]."""
 
     numerics: object
     patch: object
@@ -39,7 +39,7 @@ class Engine(NamedTuple):
 
     @property
     def run(self) -> Callable:
-        """The function that solves, imported when it is wanted."""
+        """The function that solves, imported when it is first wanted."""
         module, function = self.solve.split()
         return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
 
@@ -117,7 +117,7 @@ def _no_rungs(*_) -> list:
 
 
 def sampled(values: dict) -> dict:
-    """Errors of the measures that are read off 400 samples a cycle."""
+    """Errors by name of the measures that are read off 400 samples a cycle."""
     loops = ("loop_area", "equivalent_stiffness", "equivalent_damping", "slip_amplitude", "friction_force_peak")
     return {name: 1e-4 * abs(value) if name in loops else 0.005 if name in ("stick_fraction", "slip_start_phase")
             else 1e-9 * abs(value) for name, value in values.items()}

@@ -17,7 +17,10 @@ from .strips import strip_loads
 
 
 def model_of(model: Model, numerics: Numerics, patch):
-    """The contact that a march takes: one, or joints where interfaces or springs stand beside it."""
+    """The contact that a march takes: a ContactModel, or a JointsModel where interfaces or springs stand beside it.
+
+    patch: the solved Patch or None under [normal]. PatchfemError for a law that cannot stand beside others.
+    """
     rig, many = model.rig, len(model.rig.modes.interfaces) > 1
     alone = None if many else contact_model(model, numerics, patch)
     if not many and not rig.bends:
@@ -50,7 +53,10 @@ def _element(one: Rubbing, load: float, speed: float) -> Element:
 
 
 def contact_model(model: Model, numerics: Numerics, patch):
-    """The ContactModel of the one interface of a rig; patch: the solved Patch or None under [normal]."""
+    """The ContactModel of the one interface of a rig, by its law, load and what gives way.
+
+    patch: the solved Patch or None under [normal]. PatchfemError for what is not built.
+    """
     f, soft = model.friction, model.soft
     if f is None:
         return models.coulomb_model(0.0, 0.0)

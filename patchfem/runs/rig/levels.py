@@ -10,7 +10,7 @@ MOST = 40  # halvings of the bracket of an onset
 
 
 def ends(rig) -> tuple:
-    """Cycles after which the levels of a drive end; () without levels."""
+    """Cycles (l,) after which the levels of a drive end; () without levels."""
     return tuple(rig.level_cycles * (k + 1) for k in range(len(rig.levels)))
 
 
@@ -28,7 +28,10 @@ def rows(sizes, marks, values, held: float | None) -> tuple:
 
 
 def with_errors(fine, half, quarter, steps: int) -> tuple:
-    """The levels with the error of the time step as `response.errors.step_error` has it."""
+    """The levels with the error of the time step, from runs at `steps`, half and a quarter of them per cycle.
+
+    The rule is that of `response.errors.step_error`.
+    """
     return tuple(replace(a, errors=step_error(a.values, b.values, c.values, steps))
                  for a, b, c in zip(fine, half, quarter))
 
@@ -55,7 +58,7 @@ def onset(levels, slips, tolerance: float) -> tuple | None:
 
 
 def drive_with(drive, number: int, level: float):
-    """The drive with the level of this number [m s-2] in place of its own, and none after it."""
+    """The drive with `level` [m s-2] in place of the level of this number (from 0), and none after it."""
     return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
 
 

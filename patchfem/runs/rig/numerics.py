@@ -31,7 +31,10 @@ class Numerics:
 
 
 def choose(model: Model, per_point: bool = False) -> Numerics:
-    """Engine and numerical choices of a coupled run; PatchfemError for a method that cannot do it."""
+    """Engine and numerical choices of a coupled run: those of the scene, else what the tolerance asks for.
+
+    per_point: bonds are followed at every node. PatchfemError for a method that cannot do it.
+    """
     accuracy, rig, drive = model.accuracy, model.rig, model.rig.drive
     engine = engine_of(model).name
     window = int(max(1, min(10, rig.cycles // 10)))
@@ -68,7 +71,10 @@ def unique_steps(model: Model) -> int:
 
 
 def quadrature_of(model: Model, numerics: Numerics):
-    """The engines.Choice of a nonlocal law; a stroke is taken as the drive's own amplitude."""
+    """How the bonds of a nonlocal law are summed, as a Choice of `friction.bonds.engines`.
+
+    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives.
+    """
     from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy
@@ -78,7 +84,7 @@ def quadrature_of(model: Model, numerics: Numerics):
 
 
 def list_cost(model: Model, numerics: Numerics) -> tuple:
-    """Expected strips and seconds of a shared list of bonds."""
+    """Expected strips of a shared list of bonds and the seconds of the run with it."""
     found = quadrature_of(model, numerics)
     steps = numerics.cycles * numerics.steps
     strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)

@@ -44,7 +44,11 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
 
 
 def groups(model: Model) -> dict:
-    """Dimensionless groups of the motion by name, those without a meaning left out."""
+    """Dimensionless groups of the motion by name, those without a meaning left out.
+
+    D: friction limit over the largest push of the drive, which is D of 2.3 at resonance; knee [m s-2]: input beyond
+    which friction alone does not bound a motion at resonance.
+    """
     out, f, rig = {}, model.friction, model.rig
     limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
     push = rig.force if rig.force else rig.mass * largest(rig.drive)

@@ -45,14 +45,18 @@ class Solution:
 
 
 def borne(model, patch) -> float | None:
-    """Normal load [N] of the first interface; None where nothing rubs."""
+    """Normal load [N] on the first interface, of the pressed patch or of the point; None where nothing rubs."""
     if model.friction is None:
         return None
     return patch.pressure.load if patch is not None else model.point.load
 
 
 def seen(model, patch, window, extremes, book: dict, steps: int, **more) -> Seen:
-    """The last cycles of a run of a model; `drive` among `more` where it is not the model's own."""
+    """The last cycles of a run of a model, as the measures see them (`response.rows.Seen`).
+
+    window: Response; extremes: (c, 2) [m] of the output; book: energies; steps: samples per cycle; more: the other
+    fields of Seen, with `drive` where it is not the model's own.
+    """
     drive = more.pop("drive", model.rig.drive)
     return Seen(window, drive, steps, extremes, book, borne(model, patch), model.rig.stiffness, sinusoidal(drive),
                 **more)
@@ -74,7 +78,10 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
 
 
 def curve_measures(extra: dict) -> dict:
-    """Measures of a curve: where its largest amplitude lies."""
+    """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude, to one spacing of its points.
+
+    extra: of a Solution; {} without a curve.
+    """
     curve = extra.get("curve")
     if curve is None:
         return {}

@@ -10,12 +10,12 @@ from ...response.run_events import of_log
 
 
 def strip_loads(patch) -> np.ndarray:
-    """Normal load of every strip of a solved patch (s,) [N]."""
+    """Normal load (s,) [N] of every strip of a solved patch."""
     return patch.strips.force.sum(axis=1)
 
 
 def joined(done, patch):
-    """A MarchResult of strips as that of the patch."""
+    """A MarchResult of strips as that of the patch, averaged by `as_one`."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
     window = as_one(done.window, loads, offsets)
     marks = tuple(replace(mark, window=as_one(mark.window, loads, offsets)) for mark in done.marks)
