@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..core import BaseSine, ModalBasis
+from ..effects import module_of
 from ..structure.drive_sizes import own_period
 
 
@@ -20,8 +21,7 @@ def drive_of(scene, modes: ModalBasis):
     if drive.waveform == "sine":
         omega = 2 * np.pi * drive.frequency
         return BaseSine(float(_size(drive, modes, omega)), float(omega), moving)
-    from ..structure import drives
-
+    drives = module_of(f"drive.waveform={drive.waveform}")
     if drive.waveform == "levels":
         return drives.levels(drive.levels, 2 * np.pi * drive.frequency, cycles_per_level(scene))
     if drive.waveform == "step":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..core import PatchfemError
+from ..effects import module_of
 from ..friction.bonds.parameters import Bonds
 
 
@@ -41,9 +42,7 @@ def acting(f, width: float | None, where):
         return f
     new = {"temperature": None, "spread": None}
     if f.temperature is not None and f.rest_growth is not None:
-        from ..friction.bonds.temperature import growth_at
-
-        t = f.temperature
+        t, growth_at = f.temperature, module_of("friction.temperature").growth_at
         try:
             new["rest_growth"], new["slip_growth"] = growth_at(f.rest_growth, f.slip_growth, t.surface, t.reference,
                                                                t.rest_activation, t.slip_activation)

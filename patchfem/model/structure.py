@@ -9,6 +9,8 @@ from math import pi
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
+from ..effects import module_of
+from ..structure import starts
 from ..structure.modes import basis
 
 
@@ -25,12 +27,10 @@ def modes_of(scene) -> ModalBasis:
     bonded = scene.structure.bonded
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
-    from ..structure.bonded import bonded as fold
-
     if len(found.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
-    return fold(found, bonded.stiffness, bonded.damping)
+    return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
 
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
@@ -57,18 +57,21 @@ def _unbonded(scene) -> ModalBasis:
                             [(d.between, d.coefficient) for d in structure.damper],
                             [i.between for i in structure.interface], structure.output_mass or 1,
                             pushed_mass(scene) if forced else None)
-    from .structure_files import basis_of_file
-
-    return basis_of_file(scene)
+    return _read(scene)[0]
 
 
 def notes_of(scene) -> list:
     """Sentences for the user on a structure.file that was read otherwise than as it stands; [] without a file."""
     if scene.structure is None or scene.structure.file is None:
         return []
-    from .structure_files import notes_of_file
+    return _read(scene)[1]
 
-    return notes_of_file(scene)
+
+def _read(scene) -> tuple:
+    """(basis, notes) of structure.file."""
+    from .structure_files import found_in_file
+
+    return found_in_file(scene)
 
 
 def pushed_mass(scene) -> int:
@@ -83,8 +86,6 @@ def start_state(scene, found: ModalBasis) -> Start:
     moved (structure.output_mass unless given), else the output by drive.displacement in the shape of a static force
     there. A base step in displacement leaves everything where it was. Otherwise at rest.
     """
-    from ..structure import starts
-
     structure, drive = scene.structure, scene.drive
     if structure.start is not None:
         try:
@@ -108,9 +109,7 @@ def start_state(scene, found: ModalBasis) -> Start:
 
 def step_start(found: ModalBasis, displacement: float) -> Start:
     """Start after the base has jumped by `displacement` [m]: nothing has moved yet, z = -displacement base."""
-    from ..structure.starts import base_step
-
-    return base_step(found, displacement)
+    return starts.base_step(found, displacement)
 
 
 def motions(found: ModalBasis, modal) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
 from .measures import slip_noise
+from .ringing import ringing
 
 OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
 SOURCE = "located by the event engine"
@@ -58,8 +59,6 @@ def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
         return {}, {}
     if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
         return {}, {}
-    from .ringing import ringing
-
     last = drive.segments[-1]
     spans = sticks(events_of(window, drive, log, held), window.time[0], window.time[-1],
                    moving(window, drive, log, held))

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import BaseSine, Outcome, Start
 from ...dynamics.events.histories import simulate
+from ...dynamics.one_mode import sdof
 from ...effects import has
 from ...response import run_events
 from ...response.levels import Level
@@ -77,13 +78,9 @@ def _over_strips(done, patch):
 def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
     modes, travel = rig.modes, rig.travel
     if modes.omega.size == 1 and len(modes.interfaces) == 1:
-        from ...dynamics.one_mode import sdof
-
         fast = cycles > sdof.COMPILED_FROM
         if fast:
-            from ...compiled import load
-
-            load("dynamics.one_mode.event_kernels", say)
+            sdof.kernels(True, say)
         return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
                              start, fast)
 
