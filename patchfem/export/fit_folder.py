@@ -11,6 +11,9 @@ from ..identify.least_squares import Fit
 from ..model.model import build, resolved
 from ..scene.ranges import Range
 from ..scene.scene import loads
+from .fit import draw, write_rows
+from .results import Folder
+from .summary import write_json
 
 
 def fitted_scene(fitted: Fitted, folder: Path) -> str:
@@ -58,10 +61,6 @@ def _value(one: Range, found: Fit, k: int) -> dict:
 
 def fit_into(fitted: Fitted, target: Path) -> dict:
     """Write the results folder of a fit (fit.json, fit.csv, fit.svg, scene.fitted.toml); the object of fit.json."""
-    from .fit import draw, write_rows
-    from .results import Folder
-    from .summary import write_json
-
     answer, loop = answer_of(fitted), fitted.loop
     with Folder(target) as folder:
         write_json(answer, folder.path / "fit.json")

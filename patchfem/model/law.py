@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from ..core import PatchfemError
 from ..effects import module_of
-from ..friction.bonds.parameters import Bonds
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,11 +55,13 @@ def acting(f, width: float | None, where):
     return f.model_copy(update=new)
 
 
-def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
-    """Bond parameters of the keys of a law.
+def bonds_of(f, speed: float, least: float = 0.0):
+    """The friction.bonds.parameters.Bonds of the keys of a law.
 
     The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
     """
+    from ..friction.bonds.parameters import Bonds
+
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)

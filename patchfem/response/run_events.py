@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..dynamics.events import event_list as listed
 from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
 from .measures import slip_noise
 from .ringing import ringing
@@ -81,8 +82,6 @@ def all_stick(window, held: float) -> bool:
 
 def joined_logs(logs, shifts) -> object:
     """EventLogs of runs one after the other, begun `shifts` [s] later, with a border between them."""
-    from ..dynamics.events import event_list as listed
-
     first = logs[0]
     columns = {name: [] for name in ("time", "phase", "interface", "what", "slide")}
     for number, (log, shift) in enumerate(zip(logs, shifts)):

@@ -5,7 +5,8 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
-from ..results.result import FRAMES, Result, frames_of, unripe, warming, without_errors
+from ..results.notes import unripe, warming
+from ..results.result import FRAMES, Result, frames_of, without_errors
 from . import bench
 from .errors import errors_of
 from .watch import Watch

@@ -1,11 +1,30 @@
 """What a pressed patch hands back by itself, and the warnings that it deserves."""
 
 from ...core import Outcome
+from ...model.pieces import bodies_of
+from ...model.source import placed
 from ..results.result import Result, still
 from .ladder import solve_all
 from .measures import measures, plane_band, strip_error
+from .values import values
 
-__all__ = ["measures", "solve_all", "static", "strained"]
+__all__ = ["bodies", "measures", "probed", "solve_all", "static", "strained"]
+
+
+def probed(model) -> dict:
+    """Static measures of the patch of a model, solved alone and without errors."""
+    with placed(model.source):
+        return values(solve_all(model.patch, model.accuracy.tolerance, False)[0])
+
+
+def bodies(model) -> tuple:
+    """Meshes of the pieces of a model, (lower, upper or None where it is alike); a mesh that the tolerance chooses is
+    the one that a run takes."""
+    with placed(model.source):
+        if not model.patch.chosen:
+            return bodies_of(model.patch)
+        pair = solve_all(model.patch, model.accuracy.tolerance)[0].pair
+        return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
 
 
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:

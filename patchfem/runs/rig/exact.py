@@ -15,6 +15,7 @@ from ...response.measures import circular_mean, harmonic, swing, window_amplitud
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
+from ..bench.averaged import limit_share
 from . import levels as rig_levels
 from .solution import Solution, borne, seen
 from .strips import as_one, other_measures, strip_loads
@@ -55,8 +56,6 @@ def forces_of(model, patch) -> tuple:
         pairs = [one.limits(one.load) for one in rig.interfaces]
     else:
         if has(model.friction.law, "averaged"):
-            from ..bench.averaged import limit_share
-
             share = limit_share(model, patch)
         static, kinetic = model.limits(borne(model, patch))
         pairs = [(static * share, kinetic if model.friction.kinetic is not None else static * share)]

@@ -12,7 +12,9 @@ from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
-from ..results.result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
+from ..bench.averaged import limit_tractions
+from ..results.notes import creeping, unripe, warming
+from ..results.result import FRAMES, Result, frames_of, without_errors
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors
@@ -154,8 +156,6 @@ def _rig_fields(model, numerics, patch, raw) -> dict:
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
         if f is not None and has(f.law, "averaged"):
-            from ..bench.averaged import limit_tractions
-
             tau = limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
