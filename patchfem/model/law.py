@@ -84,7 +84,7 @@ def pad_width(scene) -> float | None:
     return scene.normal.width if scene.normal is not None else None
 
 
-def interface_names(scene) -> list:
+def interface_names(structure) -> list:
     """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
-    found = [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    found = [f"{i.between[0]}-{i.between[1]}" for i in structure.interface]
     return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]

@@ -56,7 +56,7 @@ def _unbonded(scene) -> ModalBasis:
         return masses.basis(structure.masses, [(s.between, s.stiffness) for s in structure.spring],
                             [(d.between, d.coefficient) for d in structure.damper],
                             [i.between for i in structure.interface], structure.output_mass or 1,
-                            pushed_mass(scene) if forced else None)
+                            pushed_mass(structure, drive) if forced else None)
     return _read(scene)[0]
 
 
@@ -74,9 +74,9 @@ def _read(scene) -> tuple:
     return found_in_file(scene)
 
 
-def pushed_mass(scene) -> int:
+def pushed_mass(structure, drive) -> int:
     """The mass that a force drives or a release moves, from 1: drive.mass, or else structure.output_mass."""
-    return scene.drive.mass or scene.structure.output_mass or 1
+    return drive.mass or structure.output_mass or 1
 
 
 def start_state(scene, found: ModalBasis) -> Start:
@@ -98,9 +98,9 @@ def start_state(scene, found: ModalBasis) -> Start:
         if not named:
             return starts.released(found, drive.displacement)
         moved = np.zeros(len(found.names))
-        if pushed_mass(scene) > moved.size:
+        if pushed_mass(structure, drive) > moved.size:
             raise PatchfemError(f"{scene.where('drive.mass')}: the rig has {moved.size} coordinates")
-        moved[pushed_mass(scene) - 1] = drive.displacement
+        moved[pushed_mass(structure, drive) - 1] = drive.displacement
         return starts.given(found, moved)
     if drive.kind == "base" and drive.waveform == "step" and drive.displacement is not None:
         return step_start(found, drive.displacement)
@@ -117,10 +117,10 @@ def motions(found: ModalBasis, modal) -> np.ndarray:
     return modal if found.shapes is None else modal @ found.shapes.T
 
 
-def frequencies(scene, modes: ModalBasis) -> np.ndarray:
+def frequencies(structure, modes: ModalBasis) -> np.ndarray:
     """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
-    if scene.structure.mode and scene.structure.bonded is None:
-        return np.array([mode.frequency for mode in scene.structure.mode])
+    if structure.mode and structure.bonded is None:
+        return np.array([mode.frequency for mode in structure.mode])
     return modes.omega / (2 * pi)
 
 
