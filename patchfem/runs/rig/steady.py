@@ -1,8 +1,8 @@
 """The engine `harmonic`: the steady motion of a scene found directly, and its curve over frequency or level.
 
 Coulomb interfaces by shooting on the map of their events (`steady_events`), other laws by harmonic balance
-(`steady_balance`). What is found is a motion
-that repeats with the drive; its regime, multipliers and stability are named.
+(`steady_balance`). What is found is a motion that repeats with the drive; its regime, multipliers and stability are
+named.
 """
 
 from dataclasses import replace
