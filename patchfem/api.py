@@ -89,6 +89,13 @@ def _without(sets: dict, kind: str) -> None:
         raise PatchfemError(f"a {kind} is made once: {', '.join(sets)} cannot be set in it; set it in the scene")
 
 
+def _folder():
+    """export.folder, which brings what draws and writes."""
+    from .export import folder
+
+    return folder
+
+
 class Measures(Mapping):
     """The measures of a run by name, read-only; also as attributes. It shows itself as a table."""
 
@@ -163,14 +170,9 @@ class Plots:
             if self._result.plan.kind == "patch" else "no motion was computed"
 
     def _drawn(self, names: tuple, lack: str) -> Figure:
-        from .export.folder import report_data
-        from .export.report import picture
-
-        data = report_data(self._result)
-        for name in names:
-            one = picture(name, data)
-            if one is not None:
-                return one.draw.figure(*one.values)
+        found = _folder().figure(self._result, names)
+        if found is not None:
+            return found
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
 
 
@@ -194,18 +196,12 @@ class Result(found.Result):
 
     def to_xarray(self) -> Dataset:
         """Histories and fields with units and the scene they came from: the Dataset that result.nc holds."""
-        from .export.folder import dataset
-
-        return dataset(self)
+        return _folder().dataset(self)
 
     def save(self, folder: str | Path) -> Path:
         """Write the results folder that `patchfem run -o` writes, and give its path; an older one is replaced.
 
         PatchfemError for a folder that holds other files.
         """
-        from .export.folder import write
-        from .export.results import Folder
-
-        with Folder(Path(folder)) as claimed:
-            write(self, claimed.path)
+        _folder().save(self, Path(folder))
         return Path(folder)

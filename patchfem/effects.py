@@ -11,6 +11,7 @@ without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averag
 "timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds).
 """
 
+from importlib import import_module
 from typing import NamedTuple
 
 
@@ -121,6 +122,11 @@ EFFECTS = {
 # an interface between two masses carries the keys of [friction] itself
 EFFECTS |= {f"structure.interface.{name.removeprefix('friction.')}": effect._replace(needs=())
             for name, effect in EFFECTS.items() if name.startswith(("friction.law=", "friction.reading="))}
+
+def module_of(name: str):
+    """The module that computes an effect, imported now."""
+    return import_module(EFFECTS[name].module)
+
 
 def absent(named) -> list:
     """Every effect that is not among `named`, in the order of the chain."""

@@ -8,7 +8,8 @@ ROOT is any checkout; nothing of it is imported. What the figures mean:
   rooms. The order is free and the best one found counts, so none means that the rooms form no circle.
 - cycle of files: files that import each other over any number of steps. Imports inside functions or for types alone
   count, and so does a module of compiled code that is loaded by its literal name.
-- own lazy import: a name of ours imported below the outermost level of a file; `from .x import a, b` has two.
+- own lazy import: a name of ours imported below the outermost level of a file; `from .x import a, b` has two. What
+  stands under `if TYPE_CHECKING` never runs and is none.
 - parameters: all but `self`, `*args` and `**kwargs` included. Length of a function: its lines without its docstring.
 """
 
@@ -28,7 +29,8 @@ DEFS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 class Import(NamedTuple):
     """target: dotted name inside the package ("" is its top), or the package of others; taken: the name taken from the
-    target, "" for the module itself; lazy: below the outermost level; by_name: the module's name was given as text."""
+    target, "" for the module itself; lazy: below the outermost level, and not for types alone; by_name: the module's
+    name was given as text."""
 
     target: str
     taken: str
@@ -55,7 +57,8 @@ def imports(name: str, text: str, tree: dict) -> list:
     """Every import that a walk of the file finds, one entry for each name imported; np.load("data.npz") is none."""
     package = [PACKAGE, *(part for part in folder_of(name, tree).split(".") if part)]
     parsed, out = ast.parse(text), []
-    outer = {id(node) for node in parsed.body}
+    outer = {id(node) for node in parsed.body} | {id(inner) for node in parsed.body if _for_types(node)
+                                                  for inner in node.body}
     for node in ast.walk(parsed):
         for dotted, taken in _asked(node, package):
             head, _, target = dotted.partition(".")
@@ -65,6 +68,10 @@ def imports(name: str, text: str, tree: dict) -> list:
             if not (by_name and ours) or (target and any(f"{one}.".startswith(f"{target}.") for one in tree)):
                 out.append(Import(target if ours else head, taken, ours, id(node) not in outer, by_name))
     return out
+
+
+def _for_types(node) -> bool:
+    return isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
 
 
 def _asked(node, package: list):

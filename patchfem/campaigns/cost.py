@@ -133,17 +133,9 @@ def _timed(turned, label: str, value, say, estimate: bool = False):
 
 def _split_file(model: Model, level: int) -> tuple:
     """Static measures on the mesh of a file with every edge halved `level` times."""
-    from ..mesh.anymesh import halved
-    from ..mesh.tensor import TensorGrid, finer
-    from ..model.pieces import bodies_of
-    from ..runs.patch.press import solve
-    from ..runs.patch.values import values
+    from ..runs.patch.ladder import solve_split
 
-    low, high = bodies_of(model.patch)
-    for _ in range(level):
-        low, high = (None if body is None else finer(body) if isinstance(body, TensorGrid) else halved(body)
-                     for body in (low, high))
-    return values(solve(model.patch, low, high, True)), {name: row.unit for name, row in TABLE.items()}
+    return solve_split(model.patch, level), {name: row.unit for name, row in TABLE.items()}
 
 
 def turned_by(runs: list) -> list:

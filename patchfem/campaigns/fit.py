@@ -78,7 +78,7 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
         return (bench(values) - loop.reading)[~held] / scale
 
     try:
-        found, step_error = _refined(bench, residual, wanted, scene, say)
+        found, step_error = _refined(bench, residual, wanted, say)
     except NotConverged:
         if bench.made == 0:
             raise bench.refused from None
@@ -93,11 +93,11 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
                   perf_counter() - begin)
 
 
-def _refined(bench, residual, wanted, scene, say) -> tuple:
+def _refined(bench, residual, wanted, say) -> tuple:
     """The fit, and the change of the model when its steps are halved; steps are halved until they change the fit too
     little."""
     low, high = [one.low for one in wanted], [one.high for one in wanted]
-    start, starts, before, agreed = _own_values(scene, wanted), 3, (0, 0, ""), 0
+    start, starts, before, agreed = _own_values(bench.scene, wanted), 3, (0, 0, ""), 0
     while True:
         found = fit(residual, low, high, start=start, starts=starts, bars=bench.exact)
         agreed = found.agreed if starts > 1 else agreed
@@ -110,7 +110,7 @@ def _refined(bench, residual, wanted, scene, say) -> tuple:
         fine = bench(found.values)
         change, peak = float(np.abs(fine - coarse).max()), float(np.abs(fine).max())
         # a tenth of the tolerance: the steps are not to show in the fit
-        if bench.pinned or change <= 0.1 * scene.accuracy.tolerance * peak or bench.pieces >= MOST_PIECES:
+        if bench.pinned or change <= 0.1 * bench.scene.accuracy.tolerance * peak or bench.pieces >= MOST_PIECES:
             bench.pieces //= 2
             last = _counted(fit(residual, low, high, start=found.values, starts=1), before)
             return replace(last, agreed=agreed), change

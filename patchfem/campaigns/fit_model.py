@@ -5,8 +5,12 @@ import numpy as np
 from ..core import Outcome, PatchfemError
 from ..effects import has
 from ..inputs.loops import Loop
+from ..model.gap import shape_side
 from ..model.model import Model, build
 from ..model.source import placed
+from ..runs.bench import bench as law_bench
+from ..runs.bench.engine import smooth_sum_of
+from ..runs.bench.watch import Watch
 from ..scene.scene import Scene, SceneError, loads
 
 
@@ -46,10 +50,6 @@ class BenchModel:
             return self._reading(model)
 
     def _reading(self, model: Model) -> np.ndarray:
-        from ..runs.bench import bench as law_bench
-        from ..runs.bench.engine import smooth_sum_of
-        from ..runs.bench.watch import Watch
-
         patch = self._patch(model)
         corner = np.arange(self.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
@@ -86,7 +86,6 @@ class BenchModel:
     def _on_lower(self) -> bool:
         if self.scene.contact is None:
             return False
-        from ..model.gap import shape_side
 
         return shape_side(self.scene.contact) == "lower"
 

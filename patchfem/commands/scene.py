@@ -32,12 +32,9 @@ def plan(scene: Path, /, *, set_: Sets = (), json_: Json = False,
     found = make(scene_of(scene, set_))
     answer, asked = found.as_json(), found.model.patch
     if probe and asked is not None:
-        from ..model.source import placed
-        from ..runs.patch.ladder import solve_all
-        from ..runs.patch.values import values
+        from ..runs.patch.result import probed
 
-        with placed(found.model.source):
-            solved = values(solve_all(asked, found.model.accuracy.tolerance, False)[0])
+        solved = probed(found.model)
         answer["stiffness_chain"]["pieces_shear"] = solved["tangential_stiffness"] if asked.shear else "rigid"
         answer["probe"] = solved
     if json_:
@@ -68,17 +65,9 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])
     if found.patch is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")
     from ..mesh.files import write_mesh
-    from ..model.pieces import bodies_of
-    from ..model.source import placed
+    from ..runs.patch.result import bodies
 
-    with placed(found.source):
-        if found.patch.chosen:
-            from ..runs.patch.ladder import solve_all
-
-            pair = solve_all(found.patch, found.accuracy.tolerance)[0].pair
-            low, high = pair.grid, None if pair.upper is pair.piece else pair.upper_grid
-        else:
-            low, high = bodies_of(found.patch)
+    low, high = bodies(found)
     write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
         print(f"{out}: {name} piece, {body.x.size} interface nodes, {body.length:.6g} m long, {body.height:.6g} m tall")

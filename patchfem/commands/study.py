@@ -16,21 +16,21 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
          set_: Sets = (), json_: Json = False,
          quiet: Quiet = False):
     """Error against time of SCENE for a knob (--over element_size, steps_per_cycle, shear_modes), or for all it has."""
-    from ..campaigns.cost import KNOBS, cheapest, curve, knobs_of, turned_by
+    from ..campaigns import cost as campaign
 
     found = model_of(scene, set_)
-    if over and over not in KNOBS:
-        raise Refused(f"cost --over {over}: the knobs are {', '.join(KNOBS)}; others are not yet built")
-    knobs = [over] if over else knobs_of(found)
+    if over and over not in campaign.KNOBS:
+        raise Refused(f"cost --over {over}: the knobs are {', '.join(campaign.KNOBS)}; others are not yet built")
+    knobs = [over] if over else campaign.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
     from ..export.cost import write
 
     target, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}
     for knob in knobs:
-        runs = curve(found, knob, None if quiet else say)
-        names = [name for name in MAIN if name in turned_by(runs)]
-        best = cheapest(runs, found.accuracy.tolerance)
+        runs = campaign.curve(found, knob, None if quiet else say)
+        names = [name for name in MAIN if name in campaign.turned_by(runs)]
+        best = campaign.cheapest(runs, found.accuracy.tolerance)
         table, picture = write(target, knob, runs, found.accuracy.tolerance, names)
         answer[knob] = {"runs": [{"label": one.label, "value": one.value, "seconds": one.seconds, "values": one.values,
                                   "errors": one.errors} for one in runs], "cheapest": best}

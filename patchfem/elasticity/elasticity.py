@@ -11,6 +11,7 @@ from scipy.sparse.linalg import splu
 from skfem import Basis, ElementQuad1, MeshQuad
 
 from ..core import frozen_array
+from .condense import mirrored_sweep, sweep
 from .stiffness import stiffness
 
 
@@ -148,8 +149,6 @@ def interface_compliance(piece: Piece) -> tuple:
     piece that is its own mirror image costs half (`condense.mirrored_sweep`). LinAlgError where the stiffness is not
     positive definite.
     """
-    from .condense import mirrored_sweep, sweep
-
     mirrored = np.abs(piece.x + piece.x[::-1]).max() <= 1e-13 * np.ptp(piece.x)  # round-off of x
     both = (mirrored_sweep if mirrored else sweep)(piece.matrix, piece.x.size)
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))

@@ -11,6 +11,9 @@ from ..identify.least_squares import Fit
 from ..model.model import build, resolved
 from ..scene.ranges import Range
 from ..scene.scene import loads
+from .fit import draw, write_rows
+from .results import Folder
+from .summary import write_json
 
 
 def fitted_scene(fitted: Fitted, folder: Path) -> str:
@@ -61,10 +64,6 @@ def fit_into(fitted: Fitted, target: Path) -> dict:
 
     Files: fit.json, fit.csv, fit.svg, scene.fitted.toml. PatchfemError and Missing as in `results.Folder`.
     """
-    from .fit import draw, write_rows
-    from .results import Folder
-    from .summary import write_json
-
     answer, loop = answer_of(fitted), fitted.loop
     with Folder(target) as folder:
         write_json(answer, folder.path / "fit.json")

@@ -10,11 +10,14 @@ import numpy as np
 from .. import __version__
 from ..effects import EFFECTS
 from ..model.structure import motions
+from ..response.events import MEANINGS
+from ..response.levels import KEPT
+from ..response.rows import TABLE
 from ..runs.results.result import Result
 from ..runs.run import run
 from ..structure.drive_sizes import largest
 from . import netcdf
-from .report import write_report
+from .report import picture, write_report
 from .results import Folder
 from .summary import summary, write_json
 
@@ -144,8 +147,6 @@ def dataset(result: Result):
     names = list(rig.names) if histories and rig is not None else []
     data = netcdf.dataset(histories, modal, fields, x, weight, strips, levels, names)
     if "events" in extra:
-        from ..response.events import MEANINGS
-
         e = extra["events"]
         data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
     if "curve" in extra:
@@ -164,9 +165,6 @@ def _multiplier(extra: dict) -> float:
 
 def _levels(levels) -> dict:
     """Columns of a run in levels: the drive, whether it held, every measure and its error."""
-    from ..response.levels import KEPT
-    from ..response.rows import TABLE
-
     out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
            "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
     for name in KEPT:
@@ -208,3 +206,16 @@ def report_data(result: Result) -> dict:
         if rig is not None:
             data["measured"]["input"] = largest(rig.drive)
     return data
+
+
+def figure(result: Result, names: tuple):
+    """The first of the named pictures in which a run has something to show, as a matplotlib Figure; None without."""
+    data = report_data(result)
+    shown = (picture(name, data) for name in names)
+    return next((one.draw.figure(*one.values) for one in shown if one is not None), None)
+
+
+def save(result: Result, folder: Path) -> None:
+    """Write the results folder of a run that is done; an older one is replaced."""
+    with Folder(folder) as claimed:
+        write(result, claimed.path)

@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..core import BaseSine, ModalBasis
+from ..effects import module_of
 from ..structure.drive_sizes import own_period
 
 
@@ -20,10 +21,9 @@ def drive_of(scene, modes: ModalBasis):
     if drive.waveform == "sine":
         omega = 2 * np.pi * drive.frequency
         return BaseSine(float(_size(drive, modes, omega)), float(omega), moving)
-    from ..structure import drives
-
+    drives = module_of(f"drive.waveform={drive.waveform}")
     if drive.waveform == "levels":
-        return drives.levels(drive.levels, 2 * np.pi * drive.frequency, cycles_per_level(scene))
+        return drives.levels(drive.levels, 2 * np.pi * drive.frequency, cycles_per_level(drive))
     if drive.waveform == "step":
         if moving and drive.acceleration is None:
             return drives.release(own_period(modes))  # the base jumps: the start says so
@@ -50,27 +50,26 @@ def sweep_duration(drive) -> float:
     return abs(np.log2(drive.to / drive.from_)) / drive.log_rate
 
 
-def levelled(scene) -> bool:
+def levelled(asked) -> bool:
     """Whether the drive is raised in levels."""
-    return scene.drive.kind == "base" and scene.drive.waveform == "levels"
+    return asked.kind == "base" and asked.waveform == "levels"
 
 
-def cycles_per_level(scene) -> float:
+def cycles_per_level(asked) -> float:
     """Drive cycles of each level: whole ones, so that a level begins where the sine does."""
-    drive = scene.drive
-    cycles = drive.cycles if drive.cycles is not None else drive.duration * drive.frequency
+    cycles = asked.cycles if asked.cycles is not None else asked.duration * asked.frequency
     return float(max(1, round(cycles)))
 
 
-def cycles_of(scene, drive) -> float:
-    """Length of the run in cycles of the drive; of levels, all of them."""
-    if levelled(scene):
-        return cycles_per_level(scene) * len(scene.drive.levels)
-    if scene.drive.cycles is not None:
-        return scene.drive.cycles
-    duration = scene.drive.duration
+def cycles_of(asked, drive) -> float:
+    """Length of the run in cycles of the drive that [drive] asks for; of levels, all of them."""
+    if levelled(asked):
+        return cycles_per_level(asked) * len(asked.levels)
+    if asked.cycles is not None:
+        return asked.cycles
+    duration = asked.duration
     if duration is None:
-        duration = sweep_duration(scene.drive) if scene.drive.waveform == "sweep" else float(drive.time[-1])
+        duration = sweep_duration(asked) if asked.waveform == "sweep" else float(drive.time[-1])
     return max(duration / drive.period, 0.25)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..core import PatchfemError
-from ..friction.bonds.parameters import Bonds
+from ..effects import module_of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,9 +41,7 @@ def acting(f, width: float | None, where):
         return f
     new = {"temperature": None, "spread": None}
     if f.temperature is not None and f.rest_growth is not None:
-        from ..friction.bonds.temperature import growth_at
-
-        t = f.temperature
+        t, growth_at = f.temperature, module_of("friction.temperature").growth_at
         try:
             new["rest_growth"], new["slip_growth"] = growth_at(f.rest_growth, f.slip_growth, t.surface, t.reference,
                                                                t.rest_activation, t.slip_activation)
@@ -57,11 +55,13 @@ def acting(f, width: float | None, where):
     return f.model_copy(update=new)
 
 
-def bonds_of(f, speed: float, least: float = 0.0) -> Bonds:
-    """Bond parameters of the keys of a law.
+def bonds_of(f, speed: float, least: float = 0.0):
+    """The friction.bonds.parameters.Bonds of the keys of a law.
 
     The floor v_h of the speed defaults to 1e-3 of the peak speed [m/s], but not below `least`.
     """
+    from ..friction.bonds.parameters import Bonds
+
     ratio = f.kinetic / f.static if f.static > 0 else 1.0
     return Bonds(f.static, f.bond_length, f.order, f.reading, ratio, f.rest_growth, f.slip_growth,
                  f.rest_speed or max(1e-3 * speed, least), f.initial_bonds, f.breakaway)
@@ -87,7 +87,7 @@ def pad_width(scene) -> float | None:
     return scene.normal.width if scene.normal is not None else None
 
 
-def interface_names(scene) -> list:
+def interface_names(structure) -> list:
     """Names of the interfaces of a rig of masses, "1-2" between the masses 1 and 2; [] of any other."""
-    found = [f"{i.between[0]}-{i.between[1]}" for i in scene.structure.interface]
+    found = [f"{i.between[0]}-{i.between[1]}" for i in structure.interface]
     return [name if found.count(name) == 1 else f"{name} ({k})" for k, name in enumerate(found, 1)]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..effects import absent
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
+from .law import acting, bonds_of, pad_width
 from .source import Source
 
 if TYPE_CHECKING:
@@ -82,8 +83,6 @@ class Model:
 
         The floor of the speed defaults to 1e-3 of the speeds to expect, in a rig to 1e-12 m/s at least.
         """
-        from .law import bonds_of
-
         return bonds_of(self.friction, self.speed, 0.0 if self.rig is None else 1e-12)
 
     def limits(self, load: float) -> tuple:
@@ -136,8 +135,6 @@ def _law(scene: Scene) -> tuple:
         scene.friction
     if given is None:
         return None, None, None, None
-    from .law import acting, pad_width
-
     pad = pad_width(scene)
     return acting(given, pad, scene.where), given.temperature, given.spread, pad
 

@@ -25,12 +25,12 @@ def bodies_of(patch: PatchModel) -> tuple:
     """
     if patch.mesh is None:
         return grid_of(patch, patch.lower), None if patch.alike else grid_of(patch, patch.upper)
-    from ..mesh.files import read_grid, read_pieces
+    from ..mesh import files
 
     try:
-        low, high = read_grid(patch.mesh), None
+        low, high = files.read_grid(patch.mesh), None
     except PatchfemError:  # no tensor grid of alike pieces; what is wrong with the file is said by the general reader
-        pair = read_pieces(patch.mesh)
+        pair = files.read_pieces(patch.mesh)
         low, high = pair.lower, pair.upper
     for side, body in (("lower", low), ("upper", high or low)):
         _matches(patch, side, body)

@@ -72,13 +72,13 @@ def rig_asked(scene) -> Rig:
     structure, asked, modes = scene.structure, scene.drive, modes_of(scene)
     drive, bonded = drive_of(scene, modes), structure.bonded
     own, mass = first_of(scene)
-    rows = levelled(scene)
+    rows = levelled(asked)
     bends = bonded is not None and bonded.wavelength is not None
     return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
-               asked.levels if rows else (), cycles_per_level(scene) if rows else 0.0, float(cycles_of(scene, drive)),
-               asked.force if asked.kind == "force" else None, rubbings_of(scene), tuple(interface_names(scene)),
+               asked.levels if rows else (), cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
+               asked.force if asked.kind == "force" else None, rubbings_of(scene), tuple(interface_names(structure)),
                acts(scene), yaws(scene), structure.travel or np.inf,
                structure.stiffening.cubic if structure.stiffening is not None else None,
                (bonded.stiffness, bonded.wavelength) if bends else None,
-               bonded.stiffness if bonded is not None else None, mass, own, frequencies(scene, modes),
+               bonded.stiffness if bonded is not None else None, mass, own, frequencies(structure, modes),
                bool(structure.mode), tuple(notes_of(scene)))

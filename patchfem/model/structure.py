@@ -9,6 +9,8 @@ from math import pi
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
+from ..effects import module_of
+from ..structure import starts
 from ..structure.modes import basis
 
 
@@ -25,12 +27,10 @@ def modes_of(scene) -> ModalBasis:
     bonded = scene.structure.bonded
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
-    from ..structure.bonded import bonded as fold
-
     if len(found.interfaces) != 1 and not scene.structure.mode:
         raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
-    return fold(found, bonded.stiffness, bonded.damping)
+    return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
 
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:
@@ -56,24 +56,27 @@ def _unbonded(scene) -> ModalBasis:
         return masses.basis(structure.masses, [(s.between, s.stiffness) for s in structure.spring],
                             [(d.between, d.coefficient) for d in structure.damper],
                             [i.between for i in structure.interface], structure.output_mass or 1,
-                            pushed_mass(scene) if forced else None)
-    from .structure_files import basis_of_file
-
-    return basis_of_file(scene)
+                            pushed_mass(structure, drive) if forced else None)
+    return _read(scene)[0]
 
 
 def notes_of(scene) -> list:
     """Sentences for the user on a structure.file that was read otherwise than as it stands; [] without a file."""
     if scene.structure is None or scene.structure.file is None:
         return []
-    from .structure_files import notes_of_file
-
-    return notes_of_file(scene)
+    return _read(scene)[1]
 
 
-def pushed_mass(scene) -> int:
+def _read(scene) -> tuple:
+    """(basis, notes) of structure.file."""
+    from .structure_files import found_in_file
+
+    return found_in_file(scene)
+
+
+def pushed_mass(structure, drive) -> int:
     """The mass that a force drives or a release moves, from 1: drive.mass, or else structure.output_mass."""
-    return scene.drive.mass or scene.structure.output_mass or 1
+    return drive.mass or structure.output_mass or 1
 
 
 def start_state(scene, found: ModalBasis) -> Start:
@@ -83,8 +86,6 @@ def start_state(scene, found: ModalBasis) -> Start:
     moved (structure.output_mass unless given), else the output by drive.displacement in the shape of a static force
     there. A base step in displacement leaves everything where it was. Otherwise at rest.
     """
-    from ..structure import starts
-
     structure, drive = scene.structure, scene.drive
     if structure.start is not None:
         try:
@@ -97,9 +98,9 @@ def start_state(scene, found: ModalBasis) -> Start:
         if not named:
             return starts.released(found, drive.displacement)
         moved = np.zeros(len(found.names))
-        if pushed_mass(scene) > moved.size:
+        if pushed_mass(structure, drive) > moved.size:
             raise PatchfemError(f"{scene.where('drive.mass')}: the rig has {moved.size} coordinates")
-        moved[pushed_mass(scene) - 1] = drive.displacement
+        moved[pushed_mass(structure, drive) - 1] = drive.displacement
         return starts.given(found, moved)
     if drive.kind == "base" and drive.waveform == "step" and drive.displacement is not None:
         return step_start(found, drive.displacement)
@@ -108,9 +109,7 @@ def start_state(scene, found: ModalBasis) -> Start:
 
 def step_start(found: ModalBasis, displacement: float) -> Start:
     """Start after the base has jumped by `displacement` [m]: nothing has moved yet, z = -displacement base."""
-    from ..structure.starts import base_step
-
-    return base_step(found, displacement)
+    return starts.base_step(found, displacement)
 
 
 def motions(found: ModalBasis, modal) -> np.ndarray:
@@ -118,10 +117,10 @@ def motions(found: ModalBasis, modal) -> np.ndarray:
     return modal if found.shapes is None else modal @ found.shapes.T
 
 
-def frequencies(scene, modes: ModalBasis) -> np.ndarray:
-    """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included; rigid ones are 0."""
-    if scene.structure.mode and scene.structure.bonded is None:
-        return np.array([mode.frequency for mode in scene.structure.mode])
+def frequencies(structure, modes: ModalBasis) -> np.ndarray:
+    """Natural frequencies (n,) [Hz] of the coordinates, bonded spring included, rigid ones 0."""
+    if structure.mode and structure.bonded is None:
+        return np.array([mode.frequency for mode in structure.mode])
     return modes.omega / (2 * pi)
 
 

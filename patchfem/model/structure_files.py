@@ -2,22 +2,14 @@
 
 from functools import lru_cache
 
-from ..core import ModalBasis, PatchfemError
+from ..core import PatchfemError
+from ..structure import arrays, places, universal
 
 PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 
 
-def basis_of_file(scene) -> ModalBasis:
-    """Coordinates of structure.file; PatchfemError with its line."""
-    return _found(scene)[0]
-
-
-def notes_of_file(scene) -> list:
-    """Sentences on what was read otherwise than as it stands."""
-    return _found(scene)[1]
-
-
-def _found(scene) -> tuple:
+def found_in_file(scene) -> tuple:
+    """(basis, sentences on what was read otherwise than it stands) of structure.file; PatchfemError with its line."""
     path = scene.beside(scene.structure.file)
     try:
         stamp = path.stat()
@@ -37,11 +29,7 @@ def _found(scene) -> tuple:
 @lru_cache(maxsize=8)
 def _read(path, changed: int, size: int):
     """Content of a file of this age: arrays by name, or Shapes."""
-    if path.suffix.lower() in (".uff", ".unv"):
-        from ..structure.universal import read
-    else:
-        from ..structure.arrays import read
-    return read(path)
+    return (universal if path.suffix.lower() in (".uff", ".unv") else arrays).read(path)
 
 
 @lru_cache(maxsize=8)
@@ -54,8 +42,6 @@ def _built(path, changed: int, size: int, structure, kind: str, mass: int | None
 
 
 def _arrays(data, structure, kind, mass, rubs) -> tuple:
-    from ..structure import arrays
-
     forced = kind == "force"
     pairs = [one.between for one in structure.interface]
     found = arrays.basis(data, pairs, mass if forced else None, forced, structure.moving_mass)
@@ -65,8 +51,6 @@ def _arrays(data, structure, kind, mass, rubs) -> tuple:
 
 
 def _measured(shapes, structure, kind, mass) -> tuple:
-    from ..structure import places
-
     forced = kind == "force"
     if mass is not None:
         raise PatchfemError("drive.mass: a universal file has no numbered masses; use structure.force_at or output_at")

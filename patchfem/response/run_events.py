@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..dynamics.events import event_list as listed
 from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
 from .measures import slip_noise
+from .ringing import ringing
 
 OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
 SOURCE = "located by the event engine"
@@ -61,8 +63,6 @@ def rings(window, modes, drive, log=None, held: float = 0.0) -> tuple:
         return {}, {}
     if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
         return {}, {}
-    from .ringing import ringing
-
     last = drive.segments[-1]
     spans = sticks(events_of(window, drive, log, held), window.time[0], window.time[-1],
                    moving(window, drive, log, held))
@@ -86,8 +86,6 @@ def all_stick(window, held: float) -> bool:
 
 def joined_logs(logs, shifts) -> object:
     """One EventLog of runs one after the other, begun `shifts` [s] later than the first, with a border between them."""
-    from ..dynamics.events import event_list as listed
-
     first = logs[0]
     columns = {name: [] for name in ("time", "phase", "interface", "what", "slide")}
     for number, (log, shift) in enumerate(zip(logs, shifts)):

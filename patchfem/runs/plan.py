@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..core import Missing
-from ..effects import EFFECTS, has
+from ..effects import EFFECTS
 from ..model.model import Model, build
 from ..model.source import placed
 
@@ -86,28 +86,13 @@ def _planned(model: Model, per_point: bool) -> Plan:
         seconds, groups = seconds + more, of_bench.groups(model) | groups
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
-    if model.spread is not None:
-        from ..friction.bonds.spread import pad_factor
+    if model.friction is not None:
+        from . import law
 
-        groups["share_of_the_spread"] = pad_factor(model.pad, model.spread)
+        chain |= law.link(model)
+        groups |= law.groups(model)
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2), size,
-                chain | _bonds(model), groups, tuple(_verdict(model, groups, size, said)))
-
-
-def _bonds(model: Model) -> dict:
-    """Last link of the stiffness chain: bonds, or slip."""
-    f, load = model.friction, model.nominal_load
-    if f is None or not load > 0:
-        return {}
-    rigid = "none: it creeps" if has(f.law, "creeps") else "rigid until it slips"
-    if has(f.law, "bonds"):
-        return {"bonds": f.static * load / f.bond_length}
-    if has(f.law, "averaged"):
-        return {"bonds": rigid}
-    from ..friction.record import law_from
-
-    one = law_from(f, load).element(load)
-    return {"bonds": one.limit / one.length if one.length else rigid}
+                chain, groups, tuple(_verdict(model, groups, size, said)))
 
 
 def _verdict(model: Model, groups: dict, size: int, said: list) -> list:

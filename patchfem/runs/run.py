@@ -1,18 +1,18 @@
 """A run from its plan to its result: plan(scene) says what would run, run(plan) runs it."""
 
 from dataclasses import replace
+from importlib import import_module
 from time import perf_counter
 
-import numpy as np
-
 from ..core import Measure, Outcome
-from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
-from .results.result import FRAMES, Result, frames_of, still, unripe, warming, without_errors, worded
+from .results.result import Result, worded
 
 __all__ = ["Plan", "Result", "plan", "run"]
+KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
+         "linear": "rig.rig coupled"}  # the function that runs it, imported when it is wanted
 
 
 def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False) -> Result:
@@ -34,11 +34,11 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     seconds, warnings = {}, list(model.source.remarks)
     patch, coarse = None, (None, None)
     if model.patch is not None:
-        from .patch.ladder import solve_all
+        from .patch import result as of_patch
 
-        patch, *coarse = solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
+        patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
-        warnings += [*_strained(model.patch, patch), *patch.notes]
+        warnings += [*of_patch.strained(model.patch, patch), *patch.notes]
         if estimate and coarse[0] is None:
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; lower "
                             "contact.element_size")
@@ -47,7 +47,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
                             f"is {patch.pair.coupling:.2g} of the tangential compliance")
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
-        result = _static(what, patch, coarse, seconds, warnings)
+        result = of_patch.static(what, patch, coarse, seconds, warnings)
     elif _unloaded(model):
         warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
         result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
@@ -59,7 +59,12 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
 
             evolved = evolve(model, patch, coarse, progress)
             patch, coarse = evolved.patch, evolved.coarse
-        result = _KINDS[what.kind](what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        module, function = KINDS[what.kind].split()
+        solve = getattr(import_module(f"patchfem.runs.{module}"), function)
+        result = solve(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        if patch is not None and what.kind != "patch":
+            found = {name: m for name, m in result.measures.items() if name != "normal_load"}
+            result = replace(result, measures=of_patch.measures(patch, *coarse) | found)
         if model.wear is not None:
             from .wear.measures import worn
 
@@ -94,95 +99,3 @@ def _loose(result: Result) -> list:
     remedies += [f"raise accuracy.{finer}"] if model.kind in ("rig", "bench") else []
     return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; "
             f"{' or '.join(remedies)}"]
-
-
-def _strained(asked, patch) -> list:
-    """Warnings where the answer leaves small strains, or where bilinear cells lock."""
-    out, pieces = [], (asked.lower, asked.upper)
-    stuff = [m for piece in pieces for m in (piece.substrate, piece.coating and piece.coating.material) if m]
-    deep = patch.pressure.sigma_n.max(initial=0.0) / min(m.young for m in stuff)
-    closed = patch.pressure.approach / sum(piece.height for piece in pieces)
-    for share, what in ((deep, "the peak pressure is {:.3g} of the lowest Young's modulus"),
-                        (closed, "the approach is {:.3g} of the pieces' height")):
-        if share > 0.02:
-            out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
-    stiff = max(m.poisson for m in stuff)
-    if asked.plane == "strain" and stiff > 0.47:
-        out.append(f"Poisson's ratio {stiff:g} in plane strain: bilinear cells lock towards 0.5; the pressure peak is "
-                   "some 2 % too high at 0.45, 7 % at 0.499 and wrong beyond")
-    return out
-
-
-def _overhang(asked, fine) -> list:
-    """Warnings of a bench whose slide leaves the patch or whose law has no finite peak."""
-    out, travel = [], float(np.abs(fine.slide).max()) / asked.length
-    if fine.lateral is not None and (aside := float(np.abs(fine.lateral).max()) / asked.width) > 0.1:
-        out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
-    lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
-    if lost > 0.01:
-        out.append(f"the upper piece slides off the pressure: {100 * lost:.0f} % of the load is not carried at the end")
-    elif travel > 0.1:
-        out.append(f"the slide is {travel:.2g} of the patch; the pressure rides on the upper piece and the overhang is "
-                   "not modelled")
-    return out
-
-
-def _static(what, patch, coarse, seconds, warnings, *_) -> Result:
-    from .patch.measures import measures, plane_band, strip_error
-
-    p, extra = patch.pressure, {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
-    if p.outcome is Outcome.NO_CONTACT:
-        warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    elif coarse[-1] is not None and what.kind == "patch":
-        warnings = [*warnings, *plane_band(what.model.patch, coarse[0])]
-    found = measures(patch, *coarse)
-    if patch.strips is not None and coarse[0] is not None:
-        found = strip_error(what.model.patch, coarse[0], found)
-    return Result(what, p.outcome, found, None, None, patch, still(patch), seconds, warnings, extra)
-
-
-def _bench(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
-    from ..response.errors import with_errors
-    from .bench import bench
-    from .bench.errors import errors_of
-    from .bench.watch import Watch
-
-    model, f = what.model, what.model.friction
-    if has(f.law, "bonds") and f.order < 0 and f.initial_bonds > 0:
-        warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
-                    "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
-    if has(f.law, "bonds"):
-        warnings = [*warnings, *unripe(model.bonds, model.speed)]
-        if f.reading == "report" and model.load_varies:
-            warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
-                        "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
-    steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, f.bond_length)
-    frames = FRAMES if patch is not None else 0
-    fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
-    seconds["bench"] = fine.seconds
-    others = []
-    if estimate:
-        others, seconds["error"] = errors_of(model, patch, coarse[0], fine, steps, say)
-    found = with_errors(fine.values, *others, least=1e-10)
-    fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
-    if f.reading == "report" and created > 1e-6 * power:
-        warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
-                    "that went to and fro: reading = \"stretch\" creates none"]
-    warnings = [*warnings, *warming(model, patch, fine)]
-    if patch is not None:
-        from .patch.measures import measures
-
-        found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
-        warnings = warnings + _overhang(model.patch, fine)
-        fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
-    return Result(what, Outcome.DONE, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
-                  {"engine": fine.engine.name, "steps": steps})
-
-
-def _coupled(*words) -> Result:
-    from .rig.rig import coupled
-
-    return coupled(*words)
-
-
-_KINDS = {"patch": _static, "bench": _bench, "rig": _coupled, "linear": _coupled}

@@ -1,8 +1,9 @@
-"""Traction and local slip at every node of the interface, read back from elements or bond points."""
+"""Shear modes of a pressed patch, and traction and local slip at every node, read back from elements or bond points."""
 
 import numpy as np
 
 from ..friction.bonds.parameters import Bonds
+from .shear_modes import SHEAR_MODES, enough_modes, shear_modes
 
 
 def element_fields(patch, found, states, length: float) -> tuple:
@@ -37,3 +38,12 @@ def point_fields(patch, law: Bonds, shear, states) -> tuple:
         stretch = np.divide(bonds[1], bonds[0], out=np.zeros(index.size), where=bonds[0] > 0)
         local[i, index] = bonds[3] - stretch
     return tau, local
+
+
+def shear_of(patch, law: Bonds, count: int | None, tolerance: float):
+    """ShearModes of the pressed patch for a bond law: `count` of them, or as many as the tolerance asks for."""
+    limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
+    weakening = 1 / law.ratio if law.ratio > 0 else np.inf
+    if count is not None:
+        return shear_modes(patch.giving, limit, law.length, count, weakening)
+    return enough_modes(patch.giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)

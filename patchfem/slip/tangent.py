@@ -6,7 +6,9 @@ import numpy as np
 
 from ..core import NotConverged, PatchfemError, frozen_array
 from ..elasticity.threads import one_thread
-from .partial_slip import Operators
+from .partial_slip import Operators, operators_of
+
+__all__ = ["OperatingTangent", "operating_tangent", "operators_of"]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
-from patchfem.export import pictures, report
+from patchfem.export import report
+from patchfem.export.drawing import pictures
 from patchfem.scene.keys.quantities import KINDS
 
 PERIOD, MIL = 1 / 143, 25.4e-6

@@ -51,8 +51,8 @@ def test_exact_no_pitch_is_the_plain_rig():
 
 def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
-    sets = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
-    patch = result_of(PITCH, *FEW, *sets, "drive.cycles=1").patch
+    words = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
+    patch = result_of(PITCH, *FEW, *words, "drive.cycles=1").patch
     sets, x, turn, spring = sets_of(patch, 2e4), patch.x, 2e-6, 2e4
     touching = sets.at(0.0, turn)
     force = touching.forces(0.0, turn)

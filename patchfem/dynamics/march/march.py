@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...compiled import load
 from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
+from ..propagator import propagator
 from .models import ContactModel, load_kernels
 
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
@@ -63,13 +65,12 @@ def _response(rows, number, dt, modes, drive) -> Response:
 
 def plant_of(modes: ModalBasis, prop):
     """The modal_kernels.Plant of a basis and its Propagator."""
-    from ..modal_kernels import Plant
-
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     own = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping, prop.free,
            prop.push, prop.dense, prop.reach, prop.loss, prop.dense_loss)
-    return Plant(*(np.array(v, float, order="C") for v in own), float(prop.dt), float(prop.beta[0, 0]),
-                 float(modes.mass), np.zeros((3, modes.omega.size)))
+    arrays = [np.array(v, float, order="C") for v in own]
+    plant = load("dynamics.modal_kernels").Plant
+    return plant(*arrays, float(prop.dt), float(prop.beta[0, 0]), float(modes.mass), np.zeros((3, modes.omega.size)))
 
 
 def _runner(model):
@@ -145,8 +146,6 @@ class Run:
     """The arrays of one march and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
-        from ..propagator import propagator
-
         self.modes, self.drive, self.model, self.travel, self.hub = modes, drive, model, travel, hub
         self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
         self.contact = model.build(hub)[0]

@@ -119,10 +119,10 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    from ...friction.bonds.list_numbers import law_numbers, room, share_table
+    from ...friction.bonds import list_numbers as numbers
 
-    fields = {"force": [limit], "bondlist": np.zeros((10, room(law, reach, merge))),
+    fields = {"force": [limit], "bondlist": np.zeros((10, numbers.room(law, reach, merge))),
               "now": [0.0, 0.0, 0.0, 0.0, law.length, 0.0], "tally": np.zeros(12),
-              "law": law_numbers(law, reach, merge), "table": share_table(law), "growth": growth_numbers(law),
-              "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
+              "law": numbers.law_numbers(law, reach, merge), "table": numbers.share_table(law),
+              "growth": growth_numbers(law), "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
     return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)

@@ -52,6 +52,15 @@ def scene_of(modes: ModalBasis, drive, static: float, kinetic: float, duration: 
                  np.array(table, float), slide, float(modes.output[0]), drive)
 
 
+def kernels(compiled: bool, say=None):
+    """The event loop as Python, or compiled; `say` is told where it has to be compiled first."""
+    if not compiled:
+        return sdof_kernels
+    from ...compiled import load
+
+    return load("dynamics.one_mode.event_kernels", say)
+
+
 def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: float, window: int = 10,
              travel: float = inf, progress=None, start: Start | None = None, compiled: bool = False) -> EventRun:
     """Run `cycles` drive periods with friction forces [N] from rest or `start`; keeps the last `window` cycles whole.
@@ -59,9 +68,7 @@ def simulate(modes: ModalBasis, drive, static: float, kinetic: float, cycles: fl
     The ledger's `stored` is what has been added since the start.
     """
     block = scene_of(modes, drive, static, kinetic, cycles * drive.period)
-    engine = sdof_kernels
-    if compiled:
-        from . import event_kernels as engine
+    engine = kernels(compiled)
     z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
     far = travel / abs(block.output) if block.output else inf
     if abs(z) > far:
@@ -78,9 +85,7 @@ def events(modes: ModalBasis, drive, static: float, kinetic: float, cycles: floa
     +-1 is a slip, 0 a stick; the first row is the start. Errors as `simulate`.
     """
     block = scene_of(modes, drive, static, kinetic, cycles * drive.period)
-    engine = sdof_kernels
-    if compiled:
-        from . import event_kernels as engine
+    engine = kernels(compiled)
     z, v = (float(start.z[0]), float(start.v[0])) if start is not None else (0.0, 0.0)
     rows, state, book = np.zeros((most, sdof_kernels.ROW)), np.zeros(9), np.zeros(10)
     engine.enter(state, block.segments, 0, 0.0, 0.0, z, v, 1.0, *block.friction, block.w**2)

@@ -5,8 +5,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from ...compiled import load
 from ...core import ModalBasis, PatchfemError, Start
 from . import orbit_kernels
+from .jenkins import Jenkins
 from .sdof import scene_of
 
 
@@ -94,9 +96,7 @@ def point(modes: ModalBasis, drive, static: float, kinetic: float, start: Start 
     row, output = _row(modes, drive, static, kinetic, start)
     found, phases = np.zeros(12), np.full(orbit_kernels.PHASES, np.nan)
     if compiled:
-        from .steady_kernels import points
-
-        points(np.array([row], float), patience, found[None], phases[None])
+        load("dynamics.one_mode.steady_kernels").points(np.array([row], float), patience, found[None], phases[None])
     else:
         orbit_kernels.point(*row, patience, np.empty(orbit_kernels.OUT), phases, found)
     return _steady(row, found, phases, output)
@@ -111,12 +111,11 @@ def _steady(row, found, phases, output: float) -> Steady:
 
 
 def response(modes: ModalBasis, drives, static: float, kinetic: float, patience: int = 4000) -> Curve:
-    """Steady motions under each of `drives` from rest, compiled (`steady_kernels` loaded before)."""
-    from . import steady_kernels
-
+    """Steady motions under each of `drives` from rest, compiled."""
     rows, output = zip(*(_row(modes, drive, static, kinetic, None) for drive in drives))
     table, found = np.array(rows, float), np.zeros((len(rows), 12))
-    steady_kernels.points(table, patience, found, np.full((len(rows), orbit_kernels.PHASES), np.nan))
+    phases = np.full((len(rows), orbit_kernels.PHASES), np.nan)
+    load("dynamics.one_mode.steady_kernels").points(table, patience, found, phases)
     condition = np.array([_condition(*case) for case in zip(rows, found, output)])
     regime = np.array([REGIMES[int(k)] for k in found[:, 0]])
     return Curve(table[:, 5].copy(), regime, found[:, 1], found[:, 2] * output[0], found[:, 4],
@@ -128,8 +127,6 @@ def jenkins_point(modes: ModalBasis, drive, limit: float, stiffness: float) -> t
 
     stiffness: tangential [N/m]; limit [N]. Amplitude 0 and residual inf where no motion that slips was found.
     """
-    from .jenkins import Jenkins
-
     row, output = _row(modes, drive, limit, limit, None)
     share = float(modes.interfaces[0, 0])**2 / modes.mass
     size, multipliers, miss = Jenkins(row[0], row[1], stiffness * share, row[2], row[4], row[5]).steady()

@@ -6,7 +6,7 @@ The list has two settings, the tail that its cut-off may lose and the width up t
 """
 
 from dataclasses import dataclass
-from math import ceil, sqrt
+from math import ceil, inf, sqrt
 
 from .list_numbers import AGED, MOMENTS, POWER, SHARES, form_of
 from .parameters import Bonds
@@ -34,6 +34,10 @@ class Choice:
     error: float
     strips: float
     seconds: float
+
+    def reach(self, order: float) -> float:
+        """Age [bond lengths] from which bonds of this order are left out; inf where none is."""
+        return cutoff(order, self.tail) if self.tail > 0 else inf
 
     def said(self) -> str:
         """One line for a plan: engine, length of the list, cost per step, settings and bound of the error."""

@@ -3,20 +3,23 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import has
-from ...friction.laws.convolution import Convolution, average, limits
+from ...effects import has, module_of
 
 ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
 
 
-def law_on(model, patch) -> Convolution:
-    """The averaged law of a bench scene on its solved patch; patch None for [normal]."""
-    f = model.friction
+def _law():
+    return module_of("friction.law=convolution")
+
+
+def law_on(model, patch):
+    """The law of a bench scene; patch None for [normal]."""
+    f, law = model.friction, _law()
     if patch is None:
-        return Convolution(f.static, f.bond_length, f.order)
+        return law.Convolution(f.static, f.bond_length, f.order)
 
     pattern = patch.pressure.sigma_n if model.side == "lower" else None
-    return Convolution(f.static, f.bond_length, f.order, patch.x, pattern)
+    return law.Convolution(f.static, f.bond_length, f.order, patch.x, pattern)
 
 
 def limit_share(model, patch) -> float:
@@ -28,7 +31,7 @@ def limit_share(model, patch) -> float:
     if patch is None or not has(f.law, "averaged"):
         return 1.0
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-    forward, back = limits(patch.x, sigma, weight, f.bond_length, f.order)
+    forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError(f"'convolution' on a pressure that is not symmetric: the "
                             f"limit is {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
@@ -40,6 +43,7 @@ def limit_tractions(model, patch, force) -> np.ndarray:
     """Tractions (f, m) [Pa] of resultants force (f,) [N] of a rigid block: the averaged pressure of their way."""
     f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
+    average = _law().average
     shape = [np.where(sigma > 0, average(x, x, sigma, way, f.bond_length, f.order), 0.0) for way in (1.0, -1.0)]
     one = [part / max(weight @ part, 1e-300) for part in shape]
     return np.array([value * one[0 if value >= 0 else 1] for value in force])

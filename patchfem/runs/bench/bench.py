@@ -7,7 +7,9 @@ import numpy as np
 
 from ...effects import has
 from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
+from .closed import closed
 from .engine import CLOSED, STEPPED, Engine, engine_of
+from .stepped import stepped
 from .watch import UNWATCHED, Watch
 
 
@@ -72,12 +74,8 @@ def _slid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
 
         return with_shear(model, patch, *path, frames, watch), {}
     if engine.kind == STEPPED:
-        from .stepped import stepped
-
         return stepped(model, patch, *path, frames, watch), {}
     if engine.kind == CLOSED:
-        from .closed import closed
-
         return closed(model, patch, path, frames, watch), {}
     from .rigid import rigid
 

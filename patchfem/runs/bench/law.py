@@ -5,6 +5,7 @@ import numpy as np
 from ...effects import has
 from ...friction.bonds.quadrature import Quadrature
 from ...friction.bonds.recursion import Recursion
+from ...friction.record import law_from
 
 
 def law_for(model, patch=None):
@@ -15,8 +16,6 @@ def law_for(model, patch=None):
 
         return law_on(model, patch)
     if not has(f.law, "bonds"):
-        from ...friction.record import law_from
-
         return law_from(f, patch.pressure.load if patch is not None else model.point.load)
 
     law = model.bonds

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
 from ...effects import has
-from ...friction.bonds.quadrature import cutoff
 from ...friction.record import law_from
 from .engine import ELEMENTS, Engine
 from .follow import follow
@@ -44,5 +43,4 @@ def one_point(model, load: float, engine: Engine) -> ContactModel:
     law, found = model.bonds, engine.choice
     if found.engine == "recursion":
         return points_model(law, [1.0], [load])
-    reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
-    return list_model(law, f.static * load, reach, found.merge)
+    return list_model(law, f.static * load, found.reach(law.order), found.merge)

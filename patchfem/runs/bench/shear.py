@@ -6,9 +6,8 @@ from ...core import NotConverged, PatchfemError
 from ...dynamics.march.models import jenkins_model, points_model
 from ...effects import has
 from ...friction.record import law_from
-from ...slip.fields import element_fields, point_fields
+from ...slip.fields import element_fields, point_fields, shear_of
 from ...slip.shear_modes import jenkins_set
-from ..patch.press import shear_of
 from .follow import follow
 from .ledger import Slid
 from .watch import Watch

@@ -1,8 +1,26 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
-from ...mesh.tensor import TensorGrid, coarser
+from ...mesh.tensor import TensorGrid, coarser, finer
 from ...model.pieces import bodies_of
+from .grading import solve_graded
 from .press import solve
+from .values import values
+
+
+def solve_split(asked, level: int) -> tuple:
+    """Static measures of a patch on the mesh of its file with every edge halved `level` times."""
+    low, high = bodies_of(asked)
+    for _ in range(level):
+        low, high = (None if body is None else _halved(body) for body in (low, high))
+    return values(solve(asked, low, high, True))
+
+
+def _halved(body):
+    if isinstance(body, TensorGrid):
+        return finer(body)
+    from ...mesh.anymesh import halved
+
+    return halved(body)
 
 
 def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
@@ -13,17 +31,13 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     anew, whatever is kept on disk.
     """
     if estimate and asked.chosen:
-        from .grading import solve_graded
-
         return solve_graded(asked, tolerance, fresh)
     low, high = bodies_of(asked)
     out = [solve(asked, low, high, fresh), None, None]
     if not estimate or low.x.size <= 8:
         return tuple(out)
     if not isinstance(low, TensorGrid):
-        from ...mesh.anymesh import halved
-
-        out[1] = solve(asked, halved(low), halved(high))
+        out[1] = solve(asked, _halved(low), _halved(high))
         return tuple(out)
     for k in (1, 2):
         if low.x.size > 8:

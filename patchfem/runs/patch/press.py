@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
-from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from .condensed import Pair, condensed
 
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
@@ -166,16 +165,3 @@ def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
     ratio = asperities.tangential_ratio
     tangential = pieces.tangential + np.diag(crush / ratio) if ratio is not None else pieces.tangential
     return Compliance(pieces.interface, frozen_array(pieces.normal + np.diag(crush)), frozen_array(tangential))
-
-
-def shear_of(patch: Patch, law, count: int | None, tolerance: float):
-    """ShearModes of the pressed patch for a bond law.
-
-    law: its Bonds; count: how many, None: as many as a tenth of the tolerance asks for. PatchfemError where a weakening
-    patch could jump by itself.
-    """
-    limit = law.static * patch.pressure.sigma_n * patch.pieces.interface.weight
-    weakening = 1 / law.ratio if law.ratio > 0 else np.inf
-    if count is not None:
-        return shear_modes(patch.giving, limit, law.length, count, weakening)
-    return enough_modes(patch.giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)

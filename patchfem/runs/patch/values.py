@@ -84,10 +84,10 @@ def shear_stiffness(patch: Patch) -> float:
     """
     if not patch.pair.closing.any():
         return tangential_stiffness(patch.pieces.tangential, patch.active)
-    from ...slip.partial_slip import operators_of
-    from ...slip.tangent import operating_tangent
+    from ...slip import tangent
 
-    return operating_tangent(operators_of(patch.pieces, patch.pair.closing), patch.active).tangential
+    operators = tangent.operators_of(patch.pieces, patch.pair.closing)
+    return tangent.operating_tangent(operators, patch.active).tangential
 
 
 def edge_cells(x, active) -> np.ndarray:

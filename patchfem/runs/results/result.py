@@ -51,10 +51,10 @@ def meaning(name: str, apart: str = "interface") -> str:
     """
     if name in STATIC:
         return STATIC[name].text
-    from ...response.rows import of_first, row_of
+    from ...response import rows
 
-    first = of_first(name)
-    return row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
+    first = rows.of_first(name)
+    return rows.row_of(name).text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 
 def still(patch) -> dict:
@@ -80,44 +80,6 @@ def frames_of(patch, time, tau, local, slide) -> dict:
             "holder_slide": np.concatenate([[0.0], slide])}
 
 
-def warming(model, patch, response, work: float | None = None) -> list:
-    """The line on the rise of the surface temperature as a list, empty where the scene names no temperature.
-
-    work [J]: of friction over the run, None: by the trapezoidal rule on the response.
-    """
-    if model.heat is None:
-        return []
-    from .heat import heating
-
-    if work is None:
-        work = float(np.trapezoid(response.force, response.slide))
-        if response.lateral is not None:
-            work += float(np.trapezoid(response.lateral_force, response.lateral))
-    return heating(model, patch, work, float(response.time[-1]))
-
-
 def without_errors(found: dict, estimate: bool) -> dict:
     """The measures as they are, or without their errors where none were estimated."""
     return found if estimate else {k: Measure(m.value, m.unit, None, m.floor) for k, m in found.items()}
-
-
-def unripe(law, speed: float) -> list:
-    """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
-    from ...friction.bonds.parameters import ripening
-
-    a = ripening(law, speed) if law.reading == "report" else 0.0
-    if a <= 0.3:
-        return []
-    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit 0.3), so friction as "
-            "printed falls below 2.18-2.21; lower friction.slip_growth, or use reading = \"stretch\""]
-
-
-def creeping(law, outcome, found) -> list:
-    """Warning of a bounded motion whose middle moves on, as a list: Dahl's creep, not a property of the joint."""
-    drift = found.get("drift_per_cycle")
-    if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
-        return []
-    if law.breakaway or law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
-        return []
-    return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds that are damaged at any "
-            "stretch do so under a biased load; friction.breakaway of half the swing of the force over mu N stops it"]

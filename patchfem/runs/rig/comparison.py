@@ -11,7 +11,7 @@ from ...dynamics.comparison import point_laws
 from ...dynamics.comparison.point_laws import Coulomb
 from ...dynamics.march.march import hermite_extremes
 from ...dynamics.march.models import load_kernels
-from ...effects import carries, has, refusal
+from ...effects import carries, has, module_of, refusal
 from ...friction.record import law_from
 from ...response import run_events
 from ...response.measures import window_amplitudes, window_ends
@@ -83,21 +83,16 @@ def _integrated(model, numerics, laws):
     duration = numerics.cycles * drive.period
     if not laws:
         laws = [Coulomb(1e-300, 1e-300)] * len(modes.interfaces)
+    method = module_of(f"accuracy.method={accuracy.method}")
     if accuracy.method == "duhamel":
-        from ...dynamics.comparison import duhamel
-
         criterion = accuracy.convergence or "force"
         speed, omega = peak_speed(drive, start), omega_of(drive)
         unit = {"displacement": speed / omega, "velocity": speed, "force": max(law.limit for law in laws)}[criterion]
-        return duhamel.run(modes, drive, laws, duration, numerics.steps, criterion,
-                           (accuracy.convergence_tolerance or TOLERANCE) * unit, start=start)
+        return method.run(modes, drive, laws, duration, numerics.steps, criterion,
+                          (accuracy.convergence_tolerance or TOLERANCE) * unit, start=start)
     if accuracy.method == "newmark":
-        from ...dynamics.comparison import newmark
-
-        return newmark.run(modes, drive, laws, duration, numerics.steps, accuracy.stick_speed, start=start)
-    from ...dynamics.comparison import euler
-
-    return euler.run(modes, drive, laws, duration, numerics.steps, start)
+        return method.run(modes, drive, laws, duration, numerics.steps, accuracy.stick_speed, start=start)
+    return method.run(modes, drive, laws, duration, numerics.steps, start)
 
 
 def _with_interfaces(response, modes):

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import BaseSine, Outcome, Start
 from ...dynamics.events.histories import simulate
+from ...dynamics.one_mode import sdof
 from ...effects import has
 from ...response import run_events
 from ...response.levels import Level
@@ -14,6 +15,7 @@ from ...response.measures import circular_mean, harmonic, swing, window_amplitud
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
+from ..bench.averaged import limit_share
 from . import levels as rig_levels
 from .solution import Solution, borne, seen
 from .strips import as_one, other_measures, strip_loads
@@ -54,8 +56,6 @@ def forces_of(model, patch) -> tuple:
         pairs = [one.limits(one.load) for one in rig.interfaces]
     else:
         if has(model.friction.law, "averaged"):
-            from ..bench.averaged import limit_share
-
             share = limit_share(model, patch)
         static, kinetic = model.limits(borne(model, patch))
         pairs = [(static * share, kinetic if model.friction.kinetic is not None else static * share)]
@@ -77,13 +77,9 @@ def _over_strips(done, patch):
 def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
     modes, travel = rig.modes, rig.travel
     if modes.omega.size == 1 and len(modes.interfaces) == 1:
-        from ...dynamics.one_mode import sdof
-
         fast = cycles > sdof.COMPILED_FROM
         if fast:
-            from ...compiled import load
-
-            load("dynamics.one_mode.event_kernels", say)
+            sdof.kernels(True, say)
         return sdof.simulate(modes, drive, float(forces[0][0]), float(forces[1][0]), cycles, window, travel, progress,
                              start, fast)
 

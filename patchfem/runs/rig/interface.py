@@ -10,8 +10,10 @@ from ...friction.protocol import Element
 from ...friction.record import law_from
 from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
+from ...slip.fields import shear_of
 from ...slip.shear_modes import jenkins_set
 from ...structure.drive_sizes import omega_of
+from ..bench.averaged import limit_share
 from .numerics import Numerics, quadrature_of
 from .strips import strip_loads
 
@@ -68,8 +70,6 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if has(f.law, "bonds"):
         return _bonds(model, numerics, patch, load)
     if has(f.law, "averaged"):
-        from ..bench.averaged import limit_share
-
         return models.coulomb_model(*(f.static * load * limit_share(model, patch),) * 2)
     one = law_from(f, load).element(load)
     if not soft:
@@ -86,13 +86,8 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if found.engine != "recursion":
-        from ...friction.bonds.quadrature import cutoff
-
-        reach = cutoff(law.order, found.tail) if found.tail > 0 else np.inf
-        return models.list_model(law, limit, reach, found.merge)
+        return models.list_model(law, limit, found.reach(law.order), found.merge)
     if model.soft:
-        from ..patch.press import shear_of
-
         reduced = shear_of(patch, law, numerics.shear_modes, model.accuracy.tolerance)
         return models.points_model(law, patch.pieces.interface.weight, patch.pressure.sigma_n, reduced)
     if numerics.per_point:

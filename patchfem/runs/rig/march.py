@@ -5,6 +5,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Outcome
+from ...dynamics.march import march as hub
 from ...effects import has
 from ...response import run_events
 from ...response.measures import step_harmonic, window_amplitudes, window_ends
@@ -12,15 +13,13 @@ from ...response.outcome import steady_of
 from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, peak_speed
 from . import levels as rig_levels
+from .interface import model_of
 from .solution import Solution, sampled_loop, seen
 from .strips import joined, other_measures
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One march at numerics.steps per cycle; patch: the solved Patch or None."""
-    from ...dynamics.march import march as hub
-    from .interface import model_of
-
     rig, begin = model.rig, perf_counter()
     contact = model_of(model, numerics, patch)
     reduced = perf_counter() - begin
@@ -93,8 +92,6 @@ class _Read:
 
     def _levels(self, done) -> tuple:
         """Levels of the drive, and slips as `levels.onset` asks."""
-        from ...dynamics.march import march as hub
-
         rig, numerics = self.model.rig, self.numerics
         rubs = self.model.friction is not None
         found = rig_levels.rows(rig.levels, done.marks, lambda mark: self.values(mark, mark.amplitudes, None),
@@ -107,14 +104,3 @@ class _Read:
             return run.slip_amplitude(round(rig.level_cycles), numerics.window) >= self.held
 
         return found, slips
-
-
-def created_warning(model, book: dict, cycles: float) -> list:
-    """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
-    if model.friction is None or model.friction.reading != "report":
-        return []
-    made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
-    if made <= 1e-9 * work or made <= 0:
-        return []
-    return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
-            "it dissipated; reading = \"stretch\" creates none"]

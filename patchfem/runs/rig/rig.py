@@ -12,11 +12,12 @@ from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
-from ..results.result import FRAMES, Result, creeping, frames_of, unripe, warming, without_errors
+from ..bench.averaged import limit_tractions
+from ..results.notes import creeping, unripe, warming
+from ..results.result import FRAMES, Result, frames_of, without_errors
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors
-from .march import created_warning
 from .numerics import MOST_STEPS, choose, refuse_costly
 from .solution import curve_measures
 
@@ -52,9 +53,6 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         extra["events"] = events_of(raw.window, drive, raw.log, raw.held)
     fields = {}
     if patch is not None:
-        from ..patch.measures import measures
-
-        found = measures(patch, *coarse) | {k: m for k, m in found.items() if k != "normal_load"}
         fields = rig_fields(model, numerics, patch, raw)
     extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
@@ -73,10 +71,28 @@ def _said(model, patch, raw, outcome, found) -> list:
         out = [*out, *unripe(law, float(np.abs(raw.window.slide_rate).max())), *creeping(law, outcome, found)]
     out = [*out, *created_warning(model, raw.book, model.rig.cycles)]
     if patch is not None and model.rig.load_varies:
-        from .varying_load import shear_note
-
         out = [*out, *shear_note(model, raw.contact)]
     return out
+
+
+def created_warning(model, book: dict, cycles: float) -> list:
+    """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
+    if model.friction is None or model.friction.reading != "report":
+        return []
+    made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
+    if made <= 1e-9 * work or made <= 0:
+        return []
+    return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
+            "it dissipated; reading = \"stretch\" creates none"]
+
+
+def shear_note(model, contact) -> list:
+    """The sentence on the shear modes of a run whose load changes; empty where none stand for the pieces."""
+    if contact is None or contact.reduction is None:
+        return []
+    kept, nodes = contact.reduction.stiffness.size, contact.sets.x.size
+    return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
+            f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
 
 
 def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
@@ -140,8 +156,6 @@ def rig_fields(model, numerics, patch, raw) -> dict:
                          len(raw.window.time) - 1, FRAMES).round().astype(int)
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
         if f is not None and has(f.law, "averaged"):
-            from ..bench.averaged import limit_tractions
-
             tau = limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])

@@ -33,15 +33,6 @@ def model_of(model: Model, patch, count: int | None = None):
     return march.model_of(model.rig.modes, law, sets, load, shear)
 
 
-def shear_note(model: Model, contact) -> list:
-    """The sentence on the shear modes of a run whose load changes; empty where none stand for the pieces."""
-    if contact is None or contact.reduction is None:
-        return []
-    kept, nodes = contact.reduction.stiffness.size, contact.sets.x.size
-    return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
-            f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
-
-
 def frames_of(model: Model, patch, raw) -> dict:
     """Interface frames (f, x) of a run, the pressed state first; status 0 open, 1 stick, 2 slip."""
     law, sets, weight = raw.contact.law, raw.contact.sets, patch.pieces.interface.weight

@@ -86,8 +86,8 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
                         shear=reduced(sets, law))
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
     slides, forces, loads = dense(single, drive, SOFT[name], sets, done.response, steps)
-    r, sets = done.response, (loads > 0).sum(axis=1)
-    assert sets.min() < 10 and sets.max() == 21 and np.abs(r.force).max() > 0.9 * 0.3 * LOAD
+    r, touching = done.response, (loads > 0).sum(axis=1)
+    assert touching.min() < 10 and touching.max() == 21 and np.abs(r.force).max() > 0.9 * 0.3 * LOAD
     assert r.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
     assert r.force == pytest.approx(forces, abs=1e-7 * 0.3 * LOAD)
     assert done.outcome is None and balance(done, basis) <= 1e-11

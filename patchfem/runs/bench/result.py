@@ -1,0 +1,57 @@
+"""A bench from its plan to its result: the slide, its errors, and the warnings on law and overhang."""
+
+import numpy as np
+
+from ...core import Outcome
+from ...effects import has
+from ...response.errors import with_errors
+from ..results.notes import unripe, warming
+from ..results.result import FRAMES, Result, frames_of, without_errors
+from . import bench
+from .errors import errors_of
+from .watch import Watch
+
+
+def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
+    """Run a plan of kind bench; arguments as `run.run` has them."""
+    model, f = what.model, what.model.friction
+    if has(f.law, "bonds") and f.order < 0 and f.initial_bonds > 0:
+        warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
+                    "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
+    if has(f.law, "bonds"):
+        warnings = [*warnings, *unripe(model.bonds, model.speed)]
+        if f.reading == "report" and model.load_varies:
+            warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
+                        "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
+    steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, f.bond_length)
+    frames = FRAMES if patch is not None else 0
+    fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
+    seconds["bench"] = fine.seconds
+    others = []
+    if estimate:
+        others, seconds["error"] = errors_of(model, patch, coarse[0], fine, steps, say)
+    found = with_errors(fine.values, *others, least=1e-10)
+    fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
+    if f.reading == "report" and created > 1e-6 * power:
+        warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
+                    "that went to and fro: reading = \"stretch\" creates none"]
+    warnings = [*warnings, *warming(model, patch, fine)]
+    if patch is not None:
+        warnings = warnings + _overhang(model.patch, fine)
+        fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
+    return Result(what, Outcome.DONE, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
+                  {"engine": fine.engine.name, "steps": steps})
+
+
+def _overhang(asked, fine) -> list:
+    """Warnings of a bench whose slide leaves the patch or whose law has no finite peak."""
+    out, travel = [], float(np.abs(fine.slide).max()) / asked.length
+    if fine.lateral is not None and (aside := float(np.abs(fine.lateral).max()) / asked.width) > 0.1:
+        out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
+    lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
+    if lost > 0.01:
+        out.append(f"the upper piece slides off the pressure: {100 * lost:.0f} % of the load is not carried at the end")
+    elif travel > 0.1:
+        out.append(f"the slide is {travel:.2g} of the patch; the pressure rides on the upper piece and the overhang is "
+                   "not modelled")
+    return out

@@ -1,0 +1,39 @@
+"""Sentences of a run on its law: how it warms, ripens and creeps."""
+
+import numpy as np
+
+from ...core import Outcome
+from ...friction.bonds.parameters import ripening
+
+
+def warming(model, patch, response, work: float | None = None) -> list:
+    """The line on the rise of the surface temperature, where the scene names one."""
+    if model.heat is None:
+        return []
+    from .heat import heating
+
+    if work is None:
+        work = float(np.trapezoid(response.force, response.slide))
+        if response.lateral is not None:
+            work += float(np.trapezoid(response.lateral_force, response.lateral))
+    return heating(model, patch, work, float(response.time[-1]))
+
+
+def unripe(law, speed: float) -> list:
+    """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
+    a = ripening(law, speed) if law.reading == "report" else 0.0
+    if a <= 0.3:
+        return []
+    return [f"bonds ripen over {a:.2g} of their length at the peak speed {speed:.3g} m/s (limit 0.3), so friction as "
+            "printed falls below 2.18-2.21; lower friction.slip_growth, or use reading = \"stretch\""]
+
+
+def creeping(law, outcome, found) -> list:
+    """Warning of a bounded motion whose middle moves on, as a list: Dahl's creep, not a property of the joint."""
+    drift = found.get("drift_per_cycle")
+    if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
+        return []
+    if law.breakaway or law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
+        return []
+    return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds that are damaged at any "
+            "stretch do so under a biased load; friction.breakaway of half the swing of the force over mu N stops it"]

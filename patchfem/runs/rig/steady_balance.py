@@ -1,0 +1,102 @@
+"""The steady motion of laws with memory and of springs that bend, by harmonic balance; its curve through folds."""
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from ...compiled import load
+from ...core import BaseSine, Outcome, PatchfemError
+from ...dynamics.harmonic import branch as branches
+from ...dynamics.harmonic.balance import cycle_energy, periodic_response, regime
+from ...dynamics.harmonic.forces import Group
+from ...dynamics.harmonic.laws import Interlock, Spring
+from ...dynamics.harmonic.point import point as periodic_point
+from ...dynamics.harmonic.stability import with_stability
+from ...response.rows import measures_of
+from .interface import contact_model
+from .solution import Solution, sampled_loop, seen
+from .strips import other_measures
+
+SAMPLES = 1024  # of the cycle that measures are read off
+
+
+class Balance:
+    """Laws with memory and springs that bend, by harmonic balance."""
+
+    def __init__(self, model, numerics, patch, say):
+        load("dynamics.harmonic.cycle_kernels", say)
+        rig = model.rig
+        if len(rig.modes.interfaces) > 1:
+            raise PatchfemError("'harmonic' with several interfaces of laws without an exact solution: not yet built; "
+                                "use method = \"march\"", "accuracy.method")
+        parts = []
+        if model.friction is not None:
+            parts.append((0, contact_model(model, numerics, patch)))
+        if rig.interlock is not None:
+            parts.append((0, Interlock(*rig.interlock)))
+        if rig.cubic is not None:
+            parts.append((rig.modes.output, Spring(0.0, rig.cubic)))
+        self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
+        self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
+
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle;
+        errors from half the harmonics and the balance's own."""
+        begin = perf_counter()
+        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
+        fewer = periodic_point(self.modes, drive, self.group, max(1, found.harmonics // 2), self.tolerance,
+                               start=near and found)
+        stable = with_stability(found, self.modes)
+        values, response, book = self._measured(found, drive)
+        rough = self._measured(fewer, drive)[0]
+        # the higher harmonics follow those of `found`, not those of `fewer`: measured, 20 times less is left out
+        errors = {name: abs(v - rough.get(name, v)) / 10 + abs(v) * min(found.error, 1.0) for name, v in values.items()}
+        if "slip_start_phase" in errors:
+            errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / SAMPLES
+            errors["stick_fraction"] = errors.get("stick_fraction", 0.0) + 4 / SAMPLES
+        name, _ = regime(found)
+        held = name == "stuck"
+        extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
+                 "residual": found.residual, "harmonics": found.harmonics}
+        amplitude = np.array([values["relative_displacement_amplitude"]])
+        outcome = Outcome.STUCK if held else Outcome.STEADY
+        raw = Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin)
+        return raw, errors, extra
+
+    def _measured(self, found, drive) -> tuple:
+        response = periodic_response(found, self.modes, drive, SAMPLES)
+        if not drive.moving:
+            response = replace(response, base_acceleration=0 * response.base_acceleration)
+        book = cycle_energy(found, self.modes) | {"stored": 0.0, "iterations": float(found.iterations)}
+        speed = np.arange(len(found.modal))[:, None] * found.omega * np.abs(found.modal)
+        book |= {"power": abs(book["work_in"]), "peak_stored": self.modes.mass / 2 * float(np.sum(speed**2))}
+        top = found.amplitude(self.modes.output)
+        middle = (response.output.max() + response.output.min()) / 2
+        extremes = np.array([[middle - top, middle + top]])
+        known = {"drift_per_cycle": 0.0}
+        values = measures_of(seen(self.model, self.patch, response, extremes, book, SAMPLES, drive=drive, known=known,
+                                  loop=sampled_loop(response, drive, book["friction"])))
+        if self.model.friction is not None:
+            values |= other_measures(response, drive, SAMPLES)
+        return values, response, book
+
+    def curve(self, drive) -> tuple:
+        """(curve as arrays by name through its folds, the sine of its largest amplitude, the point there)."""
+        if hasattr(drive, "low"):
+            first = BaseSine(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
+            branch = branches.response(self.modes, first, self.group, (drive.low, drive.high), self.harmonics,
+                              self.tolerance, True)
+        else:
+            sizes = [s.amplitude for s in drive.segments]
+            first = BaseSine(sizes[0], drive.segments[0].omega, drive.moving)
+            branch = branches.levels(self.modes, first, self.group, sizes if len(sizes) != 2 else
+                                     [sizes[0], np.mean(sizes), sizes[1]], self.harmonics, self.tolerance, True)
+        amplitude = branch.amplitudes(self.modes.output)
+        curve = {"frequency": np.array([p.omega / (2 * np.pi) for p in branch.points]),
+                 "level": np.array([p.level for p in branch.points]), "amplitude": amplitude,
+                 "regime": np.array(["stable" if p.stable else "unstable" for p in branch.points]),
+                 "multiplier": np.array([np.abs(p.multipliers).max(initial=0.0) for p in branch.points]),
+                 "folds": np.array(branch.folds)}
+        best = branch.points[int(np.argmax(amplitude))]
+        return curve, BaseSine(best.level, best.omega, drive.moving), best
