@@ -9,6 +9,10 @@ of pieces that give way, "joints" (several interfaces, springs that bend, strips
 "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events. Traits: "set-valued" (it holds
 without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
 "timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds).
+
+A shape of the gap is an effect, its table in `scene.tables` and a function of `contact.gaps`. A waveform of the drive
+is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its motion or
+the curve of them), "endless" (it needs cycles or a duration to end).
 """
 
 from importlib import import_module
@@ -17,7 +21,8 @@ from typing import NamedTuple
 
 class Effect(NamedTuple):
     """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction
-    the keys that it must have and those that it may have besides, what carries it, and its traits."""
+    or a waveform the keys that it must have and those that it may have besides; of a law what carries it; of both their
+    traits; means: key -> what it means, of keys that the effect alone has."""
 
     module: str
     equations: str
@@ -26,10 +31,21 @@ class Effect(NamedTuple):
     keys: tuple = ("", "")
     carries: str = ""
     traits: str = ""
+    means: dict | None = None
+
+
+GAPS = "patchfem.contact.gaps"  # a shape of the gap is a function there of the places x and the keys of its table
 
 
 def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "") -> Effect:
     return Effect(f"patchfem.friction.{module}", equations, ("pressure",), ("traction",), keys, carries, traits)
+
+
+_SIZE = "acceleration displacement force"
+
+
+def _wave(equations: str, keys: tuple, traits: str = "", module: str = "patchfem.structure.drives") -> Effect:
+    return Effect(module, equations, (), (), (keys[0], f"{keys[1]} cycles duration".strip()), "", traits)
 
 
 EFFECTS = {
@@ -40,15 +56,19 @@ EFFECTS = {
     "contact.lower": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
-    "contact.step": Effect("patchfem.contact.gaps", "g += height H(x - at)"),
+    "contact.step": Effect(GAPS, "g += height H(x - at)", means={
+        "height": "how much wider the gap is beyond the step", "at": "place of the step from the middle of the patch"}),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
     "contact.asperities.law=exponential": Effect("patchfem.contact.skin", "f = A p_0 exp(-s/u_0), s = g + theta x - "
                                                  "delta + C f"),
     "contact.asperities.law=hertz": Effect("patchfem.contact.skin", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) "
                                            "dz"),
-    "contact.tilt": Effect("patchfem.contact.gaps", "g += angle x"),
+    "contact.tilt": Effect(GAPS, "g += angle x", means={
+        "angle": "angle between the pieces; > 0 opens the gap at +x",
+        "on": "the piece that carries the shape, and with it the pressure as it slides"}),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
-    "contact.crown": Effect("patchfem.contact.gaps", "g += x^2/(2 radius)"),
+    "contact.crown": Effect(GAPS, "g += x^2/(2 radius)", means={
+        "radius": "radius of the rounding: the gap grows as x^2/(2 radius)"}),
     "contact.profile": Effect("patchfem.surface.nodes", "g += z(x), levelled, averaged over each node's cells"),
     "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R q - g - roll y_j per strip, one holder q"),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
@@ -95,11 +115,13 @@ EFFECTS = {
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
-    "drive.waveform=sine": Effect("", "a(t) = a sin(2 pi f t)"),
-    "drive.waveform=step": Effect("patchfem.structure.drives", "a(t) = a, or the base jumps by X: z(0) = -base X"),
-    "drive.waveform=sweep": Effect("patchfem.structure.drives", "a(t) = a sin(2 pi int f dt), f' or f'/f constant"),
-    "drive.waveform=levels": Effect("patchfem.structure.drives", "a(t) = a_k sin(2 pi f t), level after level"),
-    "drive.waveform=file": Effect("patchfem.structure.drives", "a(t) straight between the rows of a table"),
+    "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "steady endless", module=""),
+    "drive.waveform=step": _wave("a(t) = a, or the base jumps by X: z(0) = -base X", ("", _SIZE), "endless"),
+    "drive.waveform=sweep": _wave("a(t) = a sin(2 pi int f dt), f' or f'/f constant",
+                                  ("from to", f"rate log_rate {_SIZE}"), "steady"),
+    "drive.waveform=levels": _wave("a(t) = a_k sin(2 pi f t), level after level", ("frequency levels", ""),
+                                   "steady endless"),
+    "drive.waveform=file": _wave("a(t) straight between the rows of a table", ("file", "")),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.events", "closed form between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
@@ -134,6 +156,9 @@ def absent(named) -> list:
 
 LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
         if name.startswith("friction.law=")}
+SHAPES = {name.removeprefix("contact."): effect for name, effect in EFFECTS.items() if effect.module == GAPS}
+WAVEFORMS = {name.removeprefix("drive.waveform="): effect for name, effect in EFFECTS.items()
+             if name.startswith("drive.waveform=")}
 LAW_KEYS = {  # what a key of one or a few laws means
     "stiffness": "slope of the force at first loading, of the whole contact; a patch shares it as the normal force",
     "chi": "exponent of the sliders' density: a small cycle loses energy as its amplitude to the power chi + 3",
@@ -150,6 +175,13 @@ LISTED = "two-directions"  # what carries the readings and orders of 2.17 that n
 def has(law: str | None, trait: str) -> bool:
     """Whether a law of friction, by its name in a scene, has a trait; none has that is not there."""
     return law in LAWS and trait in LAWS[law].traits.split()
+
+
+def waves(waveform: str | None, trait: str) -> bool:
+    """Whether a waveform of the drive, by its name in a scene, has a trait or takes a key; none has that is not
+    there."""
+    found = WAVEFORMS.get(waveform)
+    return found is not None and trait in f"{' '.join(found.keys)} {found.traits}".split()
 
 
 def listed(friction) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
-from ..effects import EFFECTS
+from ..effects import EFFECTS, WAVEFORMS
 from ..response.rows import ROWS as MOTION
 from ..runs.results.patch_rows import ROWS as STATIC
 from ..scene.keys.materials import MATERIALS
@@ -17,11 +17,11 @@ from ..scene.keys.tables import Coating, Material, Tables
 from ..scene.keys.types import keys, kind_of, model_of, parts
 from ..scene.reader import is_value
 from ..scene.rules.draft import ASPERITIES, LAWS, SLIDES
-from ..scene.rules.drive import WAVEFORMS
 from ..scene.rules.limits import NOT_YET_BUILT
 
 FILE = Path(__file__).parents[1] / "scene" / "README.md"
-NEEDS = {"friction.law": LAWS, "slide.kind": SLIDES, "contact.asperities.law": ASPERITIES, "drive.waveform": WAVEFORMS}
+NEEDS = {"friction.law": LAWS, "slide.kind": SLIDES, "contact.asperities.law": ASPERITIES,
+         "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}}
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
 # What a scene may say, and what a run answers

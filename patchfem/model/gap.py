@@ -1,6 +1,7 @@
 """The gap between the unloaded pieces: the sum of the shapes that a scene names.
 
-A shape is one row of SHAPES: its table in [contact] and its height from the places x and the keys of that table.
+A shape is a table of [contact] and the function of the same name in `contact.gaps`, whose arguments are the places x
+and the keys of that table; `effects.SHAPES` lists them.
 """
 
 from dataclasses import dataclass
@@ -9,12 +10,10 @@ from time import perf_counter
 
 import numpy as np
 
-from ..contact.gaps import crown, step, tilt
+from ..contact import gaps
 from ..core import PatchfemError
+from ..effects import SHAPES
 from ..scene.keys.tables import Contact
-
-SHAPES = {"tilt": lambda x, part: tilt(x, part.angle), "crown": lambda x, part: crown(x, part.radius),
-          "step": lambda x, part: step(x, part.height, part.at)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,7 +41,8 @@ class Gap:
         gap, seconds, notes = np.zeros(x.size), {}, ()
         for name, part in self.shapes:
             begin = perf_counter()
-            gap = gap + SHAPES[name](x, part)
+            keys = {key: value for key, value in part if key != "on"}
+            gap = gap + getattr(gaps, name)(x, **keys)
             seconds[name] = perf_counter() - begin
         if self.profile is not None:
             from .profile import profile_gap
@@ -59,7 +59,7 @@ def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
 
     PatchfemError where the shapes lie on different pieces.
     """
-    shapes = tuple((name, getattr(contact, name)) for name in SHAPES if getattr(contact, name) is not None)
+    shapes = tuple((name, part) for name, part in contact.shapes.items() if name in SHAPES)
     profile = contact.profile
     return Gap(shapes, beside(profile.file) if profile is not None else None, size, contact.asperities is not None,
                shape_side(contact))

@@ -1,8 +1,41 @@
-"""Sizes of a drive that defaults and measures need: largest acceleration, speed, frequency, cycle."""
+"""What a scene asks of its drive, and sizes that defaults and measures need: acceleration, speed, frequency, cycle."""
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import BaseSine, ModalBasis, Start
+
+
+class Asked(NamedTuple):
+    """What a scene asks of its drive.
+
+    keys: those of [drive] in SI; mass [kg] of the modes; period [s] of the first coordinate that is not rigid; read()
+    -> (time (k,) [s], value (k,)) of drive.file.
+    """
+
+    keys: object
+    mass: float
+    period: float
+    read: Callable
+
+    @property
+    def moving(self) -> bool:
+        """Whether the base accelerates."""
+        return self.keys.kind == "base"
+
+    def size(self, omega: float) -> float:
+        """Amplitude [m s-2]: of the acceleration, a displacement times omega^2, or a force over the modal mass."""
+        if self.keys.kind == "force":
+            return self.keys.force / self.mass
+        return self.keys.acceleration if self.keys.acceleration is not None else self.keys.displacement * omega**2
+
+
+def level_cycles(keys) -> float:
+    """Drive cycles of each level: whole ones, so that a level begins where the sine does."""
+    cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
+    return float(max(1, round(cycles)))
 
 
 def own_period(modes: ModalBasis) -> float:
@@ -20,11 +53,7 @@ def largest(drive) -> float:
         return drive.acceleration
     if drive.segments:
         return max(abs(s.constant) + abs(s.amplitude) for s in drive.segments)
-    if hasattr(drive, "value"):
-        return float(np.abs(drive.value).max())
-    if drive.displacement is not None:
-        return drive.displacement * (2 * np.pi * max(drive.low, drive.high))**2
-    return drive.acceleration
+    return drive.largest
 
 
 def omega_of(drive) -> float:
@@ -46,9 +75,7 @@ def peak_speed(drive, start: Start | None = None) -> float:
 
 def fastest(drive) -> float:
     """Highest frequency of a drive over that of its cycle."""
-    if hasattr(drive, "low"):
-        return max(drive.low, drive.high) * drive.period
-    return 1.0
+    return 1.0 if drive.segments else drive.fastest
 
 
 def sinusoidal(drive) -> bool:

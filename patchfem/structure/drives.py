@@ -1,7 +1,9 @@
 """Drives beyond the plain sine: steps, levels and releases in closed form, sweeps, recorded signals.
 
 Every drive has `period` [s] of what counts as its cycle, `moving` (the base accelerates; False: a force over the modal
-mass), `segments` (core.Segment, () where no closed form exists) and `values(t)` [m s-2].
+mass), `segments` (core.Segment, () where no closed form exists) and `values(t)` [m s-2]. One without segments has
+`largest` [m s-2], `fastest`, its highest frequency over that of its cycle, and `duration` [s], after which it ends.
+`MADE` has the function that makes the drive of each waveform.
 """
 
 from dataclasses import dataclass
@@ -9,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import PatchfemError, Segment
+from .drive_sizes import Asked, level_cycles
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -81,6 +84,18 @@ class Sweep:
         """Period [s] of the frequency at the end of the sweep."""
         return 1 / self.high
 
+    @property
+    def largest(self) -> float:
+        """Largest acceleration [m s-2]."""
+        if self.displacement is not None:
+            return self.displacement * (2 * np.pi * max(self.low, self.high))**2
+        return self.acceleration
+
+    @property
+    def fastest(self) -> float:
+        """Highest frequency over that of the cycle."""
+        return max(self.low, self.high) * self.period
+
     def frequency(self, t):
         """Instantaneous frequency [Hz] at times t (k,) >= 0 [s]; that of the end from `duration` on."""
         part = np.clip(np.asarray(t, float) / self.duration, 0.0, 1.0)
@@ -127,6 +142,48 @@ class Recorded:
         """Empty, as a recorded signal is marched."""
         return ()
 
+    @property
+    def largest(self) -> float:
+        """Largest acceleration [m s-2]."""
+        return float(np.abs(self.value).max())
+
+    @property
+    def fastest(self) -> float:
+        """One: the cycle is that of the rig."""
+        return 1.0
+
+    @property
+    def duration(self) -> float:
+        """Length of the record [s]."""
+        return float(self.time[-1])
+
     def values(self, t):
         """Drive [m s-2] at times t (k,) >= 0 [s], linear between the rows."""
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
+
+
+def _levels(asked: Asked) -> Piecewise:
+    return levels(asked.keys.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys))
+
+
+def _step(asked: Asked) -> Piecewise:
+    if asked.moving and asked.keys.acceleration is None:
+        return release(asked.period)  # the base jumps: the start says so
+    return step(float(asked.size(0.0)), asked.period, asked.moving)
+
+
+def _sweep(asked: Asked) -> Sweep:
+    keys, low, high = asked.keys, asked.keys.from_, asked.keys.to
+    displaced = keys.displacement if asked.moving and keys.acceleration is None else None
+    size = 0.0 if displaced is not None else float(asked.size(0.0))
+    duration = abs(high - low) / keys.rate if keys.rate is not None else abs(np.log2(high / low)) / keys.log_rate
+    return Sweep(low, high, duration, size, displaced, keys.rate is None, asked.moving)
+
+
+def _recorded(asked: Asked) -> Recorded:
+    time, value = asked.read()
+    scale = 1.0 if asked.moving else 1 / asked.mass
+    return Recorded(time, scale * value, asked.period, asked.moving)
+
+
+MADE = {"levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}

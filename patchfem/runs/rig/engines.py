@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 from ...core import PatchfemError
-from ...effects import LAWS, has, listed
+from ...effects import LAWS, has, listed, waves
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
 from ...response.errors import change, step_error
@@ -103,7 +103,7 @@ def _comparison_refuses(model: Model) -> PatchfemError | None:
 
 def _harmonic_refuses(model: Model) -> PatchfemError | None:
     rig = model.rig
-    if rig.kind == "free" or rig.waveform not in ("sine", "sweep", "levels"):
+    if rig.kind == "free" or not waves(rig.waveform, "steady"):
         return PatchfemError("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over "
                              "levels; use method = \"march\"", "accuracy.method")
     if rig.waveform == "sweep" and rig.drive.displacement is not None:

@@ -3,7 +3,7 @@
 The first word is not a capital unless it is a name; a default that follows from other keys stands in the sentence.
 """
 
-from ...effects import LAW_KEYS
+from ...effects import LAW_KEYS, SHAPES, WAVEFORMS
 
 MEANINGS = {
     "Tables": {"title": "a line of text that stands over the results"},
@@ -34,10 +34,6 @@ MEANINGS = {
         "substrate": "what this piece is made of; contact.substrate unless given",
         "coating": 'layer of this piece, {material = ..., thickness = ...}, or "none"; contact.coating unless given',
     },
-    "Tilt": {
-        "angle": "angle between the pieces; > 0 opens the gap at +x",
-        "on": "the piece that carries the shape, and with it the pressure as it slides",
-    },
     "LoadLine": {
         "offset": "distance of the line of the load from the middle of the patch; > 0 moves the pressure to +x",
         "moment": "moment about the middle of the patch in place of the offset",
@@ -46,15 +42,6 @@ MEANINGS = {
     "Holder": {
         "rotational_stiffness": "stiffness against rotation between the far face and what holds it",
         "tangential_stiffness": "stiffness along x between the far face and what holds it; rigid unless given",
-    },
-    "Crown": {
-        "radius": "radius of the rounding: the gap grows as x^2/(2 radius)",
-        "on": "the piece that carries the shape",
-    },
-    "Step": {
-        "height": "how much wider the gap is beyond the step",
-        "at": "place of the step from the middle of the patch",
-        "on": "the piece that carries the shape",
     },
     "ProfileFile": {
         "file": "table of places along x and heights of the gap; a peak of the file is an opening",
@@ -208,6 +195,11 @@ MEANINGS = {
         "acceleration_gain": "factor by which the reading exceeds the true acceleration",
     },
 }
+
+MEANINGS |= {name.capitalize(): {"on": "the piece that carries the shape"} | (shape.means or {})
+             for name, shape in SHAPES.items()}
+for one in WAVEFORMS.values():
+    MEANINGS["Drive"] |= one.means or {}
 
 # what makes a key necessary where neither its table alone nor a selector does
 CONDITIONS = {

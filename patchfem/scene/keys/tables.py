@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from ...effects import LAWS
+from ...effects import LAWS, WAVEFORMS
 from .accuracy import Accuracy
 from .materials import MATERIALS
 from .types import Table, choices, number, quantity, whole
@@ -22,7 +22,7 @@ Mass, Seconds, Frequency = quantity("mass", gt=0), quantity("time", gt=0), quant
 Speed, Acceleration = quantity("velocity", gt=0), quantity("acceleration", gt=0)
 Kelvin, PerMetre = quantity("temperature", gt=0), quantity("participation")
 Piece = Literal["upper", "lower"]
-LawName = Literal[tuple(LAWS)]
+LawName, WaveName = Literal[tuple(LAWS)], Literal[tuple(WAVEFORMS)]
 
 
 class Material(Table):
@@ -327,7 +327,7 @@ class Drive(Table):
     """What sets the rig in motion; which keys it needs depends on `kind` and `waveform`."""
 
     kind: Literal["base", "force", "free"]
-    waveform: Literal["sine", "step", "sweep", "levels", "file"] = "sine"
+    waveform: WaveName = "sine"
     frequency: Frequency | None = None
     from_: Frequency | None = Field(None, alias="from")
     to: Frequency | None = None

@@ -1,6 +1,6 @@
 """Rules of [accuracy]: methods, what each of them can do, and the keys that a method does not use."""
 
-from ...effects import carries, has
+from ...effects import WAVEFORMS, carries, has, waves
 from .draft import Draft
 from .limits import NOT_YET_BUILT
 
@@ -24,7 +24,8 @@ def _method(draft: Draft, kind: str) -> None:
 def _harmonic(draft: Draft) -> None:
     """A steady motion needs a drive that repeats, and one way to find it for every force in the scene."""
     drive, structure, law = draft.tables.drive, draft.tables.structure, draft.tables.friction
-    if drive is not None and (drive.kind == "free" or drive.waveform in ("step", "file")):
+    once = drive is not None and drive.waveform in WAVEFORMS and not waves(drive.waveform, "steady")
+    if drive is not None and (drive.kind == "free" or once):
         draft.say("accuracy.method", "'harmonic' finds the steady motion under a sine, or its curve over a sweep or "
                                      "over levels; use 'march' or leave method out")  # fmt: skip
     elif drive is not None and drive.kind == "base" and drive.waveform == "sweep" and drive.displacement is not None:

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...effects import WAVEFORMS, waves
 from .draft import Draft
 from .structure import drives_mass
 
-# waveform -> keys it needs, keys it can use
-WAVEFORMS: dict[str, tuple[str, str]] = {
-    "sine": ("frequency", "acceleration displacement force cycles duration"),
-    "step": ("", "acceleration displacement force cycles duration"),
-    "sweep": ("from to", "rate log_rate acceleration displacement force cycles duration"),
-    "levels": ("frequency levels", "cycles duration"),
-    "file": ("file", "cycles duration"),
-}
-SIZED = ("sine", "step", "sweep")
 LEAST = 0.25  # of a cycle, of a run
 
 
@@ -25,7 +17,7 @@ def check_drive(draft: Draft) -> None:
     if drive is None:
         return
     if drive.kind in ("base", "force") and drive.waveform in WAVEFORMS:
-        for key in WAVEFORMS[drive.waveform][0].split():
+        for key in WAVEFORMS[drive.waveform].keys[0].split():
             if not draft.given(f"drive.{key}"):
                 draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs it")
         for key in sorted(waveform_unused(drive)):
@@ -34,7 +26,7 @@ def check_drive(draft: Draft) -> None:
     cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
     if cycles and duration:
         draft.say("drive.duration", "cycles and duration exclude each other: keep one")
-    if not cycles and not duration and (drive.kind == "free" or drive.waveform in ("sine", "step", "levels")):
+    if not cycles and not duration and (drive.kind == "free" or waves(drive.waveform, "endless")):
         draft.lacks("drive.cycles", "or drive.duration instead")
     _size(draft, drive)
     if drive.kind in ("base", "force") and drive.waveform == "sweep":
@@ -54,7 +46,7 @@ def _sweep(draft: Draft, drive: Any) -> None:
 
 
 def _size(draft: Draft, drive: Any) -> None:
-    sized = drive.waveform in SIZED
+    sized = waves(drive.waveform, "acceleration")
     acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
     if drive.kind == "base" and sized:
         if acceleration and displacement:
@@ -86,8 +78,8 @@ def drive_unused(drive: Any) -> list[str]:
 
 def waveform_unused(drive: Any) -> set[str]:
     """Keys of [drive] that its waveform gives no meaning, among those that depend on it."""
-    needs, can = WAVEFORMS[drive.waveform]
-    dependent = {key for pair in WAVEFORMS.values() for keys in pair for key in keys.split()}
+    needs, can = WAVEFORMS[drive.waveform].keys
+    dependent = {key for one in WAVEFORMS.values() for keys in one.keys for key in keys.split()}
     return dependent - set(needs.split()) - set(can.split())
 
 
