@@ -10,9 +10,9 @@ of pieces that give way, "joints" (several interfaces, springs that bend, strips
 without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
 "timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds).
 
-A shape of the gap is an effect, its table in `scene.tables` and a function of `contact.gaps`. A waveform of the drive
-is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its motion or
-the curve of them), "endless" (it needs cycles or a duration to end).
+A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
+drive is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its
+motion or the curve of them), "endless" (it needs cycles or a duration to end).
 """
 
 from importlib import import_module

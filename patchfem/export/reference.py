@@ -10,10 +10,11 @@ from typing import Literal, get_args, get_origin
 from ..effects import EFFECTS, WAVEFORMS
 from ..response.rows import ROWS as MOTION
 from ..runs.results.patch_rows import ROWS as STATIC
+from ..scene.keys.contact import Coating, Material
 from ..scene.keys.materials import MATERIALS
 from ..scene.keys.meanings import CONDITIONS, meaning
 from ..scene.keys.quantities import EXAMPLES, KINDS
-from ..scene.keys.tables import Coating, Material, Tables
+from ..scene.keys.tables import Tables
 from ..scene.keys.types import keys, kind_of, model_of, parts
 from ..scene.reader import is_value
 from ..scene.rules.draft import ASPERITIES, LAWS, SLIDES

@@ -13,7 +13,7 @@ import numpy as np
 from ..contact import gaps
 from ..core import PatchfemError
 from ..effects import SHAPES
-from ..scene.keys.tables import Contact
+from ..scene.keys.contact import Contact
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -4,7 +4,7 @@ solved."""
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..scene.keys.tables import Asperities, Coating, Contact, Material
+from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from .gap import Gap, gap_asked
 
 CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance

@@ -8,7 +8,8 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 
 from .keys import quantities
-from .keys.tables import Material, Tables
+from .keys.contact import Material
+from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
 
 _LAST = 10**9  # sorts the mistakes of --set behind those of the file

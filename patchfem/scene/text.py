@@ -6,8 +6,9 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from .keys.contact import Asperities, Material, OnePiece
 from .keys.quantities import format_si
-from .keys.tables import Accuracy, Asperities, Drive, Friction, Material, OnePiece, Slide
+from .keys.tables import Accuracy, Drive, Friction, Slide
 from .keys.types import Table, keys, kind_of
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused

@@ -4,9 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from .types import Table, number, quantity, whole
-
-Positive, NotNegative, Speed = number(gt=0), number(ge=0), quantity("velocity", gt=0)
+from .types import NotNegative, Positive, Speed, Table, whole
 
 
 def _still_summed(value: object) -> object:

@@ -1,4 +1,4 @@
-"""What each key of a scene means, in one sentence, by the table of `tables` that holds it.
+"""What each key of a scene means, in one sentence, by the table of `tables` or `contact` that holds it.
 
 The first word is not a capital unless it is a name; a default that follows from other keys stands in the sentence.
 """

@@ -56,6 +56,15 @@ def whole(least: int) -> Any:
     return Annotated[int, Strict(), Field(ge=least)]
 
 
+# kinds that many keys share
+Text = Annotated[str, Field(min_length=1)]
+Number, Share, Positive, NotNegative = number(), number(ge=0, le=1), number(gt=0), number(ge=0)
+Place, Length, Force = quantity("length"), quantity("length", gt=0), quantity("force", ge=0)
+Mass, Seconds, Frequency = quantity("mass", gt=0), quantity("time", gt=0), quantity("frequency", gt=0)
+Speed, Acceleration = quantity("velocity", gt=0), quantity("acceleration", gt=0)
+Kelvin, PerMetre = quantity("temperature", gt=0), quantity("participation")
+
+
 class Table(BaseModel):
     """Base of all tables: unknown keys refused, frozen; a dict given as context collects the keys that are right."""
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...effects import carries, has, listed, named, refusal
-from ..keys.tables import Contact, Friction, Tables
+from ..keys.contact import Contact
+from ..keys.tables import Friction, Tables
 from .draft import Draft
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
