@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ..core import NotConverged, Outcome, PatchfemError
-from ..effects import has
+from ..effects import has, unbuilt
 from ..identify.least_squares import Fit, fit
 from ..identify.words import remarks
 from ..inputs.loops import Loop, read_loop
@@ -58,8 +58,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
     """
     begin = perf_counter()
     if scene.kind != "bench":
-        raise SceneError([f"{scene.path}: fit: a {scene.kind} scene; only loops of [slide] scenes are fitted, fits of "
-                          "other kinds are not yet built"])
+        raise SceneError([unbuilt(f"{scene.path}: fit: a {scene.kind} scene; only loops of [slide] scenes are fitted",
+                                  "prescribe the motion by [slide]")])
     wanted, wrong = ranges(free)
     if wrong:
         raise SceneError(wrong)

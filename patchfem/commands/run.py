@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..effects import unbuilt
 from .shared import Json, NotReached, Out, Quiet, Refused, Sets, progress_bar, say, scene_of
 
 
@@ -17,7 +18,7 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
         verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
     """Run SCENE and write its results folder, by default out/<scene name>; --fresh ignores kept operators."""
     if resume:
-        raise Refused("run: --resume is not yet built; run the scene again")
+        raise Refused(unbuilt("run: --resume", "run the scene again"))
     from ..export.folder import run_into
     from ..runs.plan import plan as make
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..effects import unbuilt
 from .shared import Json, NotReached, Out, Quiet, Refused, Sets, model_of, say, scene_of
 
 MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak",
@@ -20,7 +21,8 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
 
     found = model_of(scene, set_)
     if over and over not in campaign.KNOBS:
-        raise Refused(f"cost --over {over}: the knobs are {', '.join(campaign.KNOBS)}; others are not yet built")
+        raise Refused(unbuilt(f"cost --over {over}: no knob of this name",
+                              f"the knobs are {', '.join(campaign.KNOBS)}"))
     knobs = [over] if over else campaign.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")

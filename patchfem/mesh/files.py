@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
+from ..effects import unbuilt
 from .anymesh import PairMesh, Tagged, pieces
 from .decks import read_inp, read_unv
 from .pairs import blocks
@@ -122,7 +123,7 @@ def _load(path: Path, known: tuple = (".msh",)):
     if not path.is_file():
         raise PatchfemError(f"{path}: no such mesh file")
     if path.suffix not in known:
-        raise PatchfemError(f"{path}: only .msh meshes are read; other formats are not yet built")
+        raise PatchfemError(unbuilt(f"{path}: only .msh meshes are read", "write it as one"))
     if path.suffix == ".msh":
         _plausible(path)
     try:
@@ -157,8 +158,7 @@ def _quads(path: Path, mesh) -> tuple:
             cells.append(block.data)
             labels += [names.get((2, int(t)), f"tag {int(t)}") for t in physical]
         elif block.type != "vertex":
-            raise PatchfemError(f"{path}: {block.type} cells; only the quads of `patchfem mesh` can be used, "
-                                "other meshes are not yet built")
+            raise PatchfemError(unbuilt(f"{path}: {block.type} cells", "use the quads of `patchfem mesh`"))
     missing = {"upper_substrate", "lower_substrate"} - set(labels) | set(EDGE_TAGS) - edges
     if missing:
         raise PatchfemError(f"{path}: nothing is tagged {', '.join(sorted(missing))}")
@@ -196,7 +196,7 @@ def read_grid(path: Path) -> TensorGrid:
     size = np.ptp(lower.x)
     if not same or np.abs(lower.x - upper.x).max() > 1e-9 * size or \
             np.abs(lower.depth - upper.depth).max() > 1e-9 * size or lower.coating_rows != upper.coating_rows:
-        raise PatchfemError(f"{path}: the two pieces differ or are shifted; unlike pieces are not yet built")
+        raise PatchfemError(unbuilt(f"{path}: the two pieces differ or are shifted", "give both the same nodes"))
     middle = (lower.x[0] + lower.x[-1]) / 2
     return TensorGrid(frozen_array(lower.x - middle), lower.depth, lower.coating_rows)
 
@@ -218,8 +218,8 @@ def _piece(points, quads, label, piece: str, side: float, path: Path) -> TensorG
               and np.allclose(high[:, 0], x[np.minimum(column + 1, x.size - 1)], atol=1e-9 * span, rtol=0)
               and np.allclose(high[:, 1], depth[np.minimum(row + 1, depth.size - 1)], atol=1e-9 * span, rtol=0))
     if not tensor or abs(depth[0]) > 1e-9 * span:
-        raise PatchfemError(f"{path}: the {piece} piece is no tensor grid with its interface at y = 0; "
-                            "other meshes are not yet built")
+        raise PatchfemError(unbuilt(f"{path}: the {piece} piece is no tensor grid with its interface at y = 0",
+                                    "use a mesh of `patchfem mesh`"))
     coat = label[mine] == f"{piece}_coating"
     rows = int(row[coat].max() + 1) if coat.any() else 0
     if not np.array_equal(coat, row < rows):

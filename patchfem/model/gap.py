@@ -11,7 +11,6 @@ from time import perf_counter
 import numpy as np
 
 from ..contact import gaps
-from ..core import PatchfemError
 from ..effects import SHAPES
 from ..scene.keys.contact import Contact
 
@@ -34,7 +33,7 @@ class Gap:
     @property
     def angle(self) -> float:
         """Angle [rad] at which a tilted upper piece is held."""
-        return next((part.angle for name, part in self.shapes if name == "tilt" and self.side == "upper"), 0.0)
+        return next((part.angle for name, part in self.shapes if name == "tilt" and part.on == "upper"), 0.0)
 
     def at(self, x) -> tuple:
         """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape."""
@@ -55,9 +54,9 @@ class Gap:
 
 
 def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
-    """The shapes of [contact]; size [m]: of the elements, None: those of a mesh file; beside(name) -> path of a file.
+    """The shapes of [contact].
 
-    PatchfemError where the shapes lie on different pieces.
+    size [m]: of the elements, None: those of a mesh file; beside(name) -> path of a file.
     """
     shapes = tuple((name, part) for name, part in contact.shapes.items() if name in SHAPES)
     profile = contact.profile
@@ -66,8 +65,6 @@ def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
 
 
 def shape_side(contact: Contact) -> str:
-    """The piece that carries the shapes, and with them the pressure; PatchfemError when they disagree."""
-    sides = {part.on for part in contact.shapes.values()}
-    if len(sides) > 1:
-        raise PatchfemError("contact: the shapes lie on different pieces (key `on`); not yet built: put all on one")
-    return sides.pop() if sides else "upper"
+    """The piece that carries the shapes, and with them the pressure; "upper" where both do, which only a static patch
+    takes."""
+    return "lower" if {part.on for part in contact.shapes.values()} == {"lower"} else "upper"

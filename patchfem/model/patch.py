@@ -101,10 +101,7 @@ class PatchModel:
 
 
 def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
-    """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names.
-
-    PatchfemError where the shapes lie on different pieces.
-    """
+    """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names."""
     size = None if contact.mesh is not None else contact.element_size or contact.length / AUTOMATIC_CELLS
     line, holder, strips = contact.load_line, contact.holder, contact.strips
     chosen = kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None)

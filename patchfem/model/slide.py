@@ -6,9 +6,10 @@ from math import ceil, sqrt
 
 import numpy as np
 
-from ..core import Missing
+from ..core import Missing, PatchfemError
 from ..inputs.paths import read_path
 from ..scene.keys.quantities import KINDS
+from ..scene.rules.limits import sideways
 
 LEAST = 8  # steps between two rows of a path file: two of them are left in the coarsest run of the error estimate
 REST = 4
@@ -115,13 +116,16 @@ class SlidePath:
 
 
 def slide_asked(scene) -> SlidePath:
-    """The slide of a scene with [slide]; PatchfemError names what a path file lacks."""
+    """The slide of a scene with [slide]; PatchfemError names what a path file lacks, or what in the scene cannot stand
+    beside the lateral column of one."""
     slide, corners, across, amplitude = scene.slide, None, None, scene.slide.amplitude or scene.slide.distance
     if slide.kind == "file":
         path = scene.beside(slide.file)
         found = _read(path, path.stat().st_mtime_ns if path.exists() else 0)
         corners, across = found[:2], found[2] if len(found) == 3 else None
         amplitude = float(max(np.ptp(column) for column in found[1:])) / 2
+        if across is not None and (reason := sideways(scene.tables())):
+            raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
     elif slide.kind == "dwell":
         corners = _dwell_corners(slide)
     run_in = (slide.distance or 0.0) if slide.kind == "triangle" else 0.0

@@ -19,12 +19,12 @@ from .keys import tables
 from .keys.types import keys as keys_of
 from .lines import key_lines
 from .reader import Draft, apply_set
-from .rules.accuracy import method_unused
 from .rules.check import check
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
 from .rules.friction import kinetic_unused, temperature_unused
 from .rules.limits import combinations, not_yet_built
+from .rules.methods import method_unused
 from .text import effects, toml
 
 

@@ -170,14 +170,12 @@ def test_exact_another_law_is_the_scene_with_that_set():
 
 TINY = SMALL_PATCH.replace('"0.5 mm"', '"1 nm"')
 STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
-NEWMARK = SMALL_PATCH + SHEAR + COULOMB + SHORT + '[accuracy]\nmethod = "newmark"\n'
 
 
 @pytest.mark.parametrize("text, key, line, says", [
     (STILL, "drive.kind", 'kind = "base"', "the drive pushes no mode"),
-    (NEWMARK, "accuracy.method", 'method = "newmark"', "takes an interface as a whole"),
     (TINY, "", "", "GB are needed"),
-], ids=["a key of a run", "a key of a plan", "a size"])
+], ids=["a key of a run", "a size"])
 def test_refuses_with_file_and_line_once_whoever_asks(text, key, line, says):
     """The same sentence from the scene, its model and its plan; file and line of the key once, at the beginning."""
     where = f"a.toml:{line_of(text, line)}: {key}: " if key else "a.toml: "
@@ -202,6 +200,7 @@ def test_refuses_what_no_model_can_be_made_of_with_file_and_line_once():
 
 
 def test_refuses_a_key_of_a_set_with_the_file_alone():
-    with pytest.raises(PatchfemError, match=r"^a\.toml: accuracy\.method: 'newmark' takes") as caught:
-        plan(loads(NEWMARK.partition("[accuracy]")[0], "a.toml", ["accuracy.method=newmark"]))
+    sets = ["drive.kind=base", "drive.frequency=143 Hz", "drive.acceleration=5 g", "drive.cycles=20"]
+    with pytest.raises(PatchfemError, match=r"^a\.toml: drive\.kind: the drive pushes no mode") as caught:
+        run(loads(STILL.partition("[drive]")[0], "a.toml", sets))
     assert str(caught.value).count("a.toml") == 1

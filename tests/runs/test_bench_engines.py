@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchfem.core import Missing, PatchfemError
+from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import LONGEST, Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.model.model import build
@@ -17,7 +17,7 @@ from patchfem.runs.bench.watch import BLOCK, UNWATCHED, Watch
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
+from patchfem.scene.scene import SceneError, loads
 
 POINT = '[normal]\nload = "100 N"\n'
 PATCH = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "100 N"\n'
@@ -145,7 +145,7 @@ def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
                      "accuracy.steps_per_cycle=4000")
     with pytest.raises(Missing, match=f"more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle"):
         plan(model)
-    with pytest.raises(PatchfemError, match="'merged' where the pressure of a point changes"):
+    with pytest.raises(SceneError, match="'merged' where the pressure of a point changes"):
         plan(model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", where=PATCH + 'on = "lower"\n'))
 
 

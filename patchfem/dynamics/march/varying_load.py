@@ -13,6 +13,7 @@ import numpy as np
 from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets, sides
 from ...core import ModalBasis, Outcome, PatchfemError, Response
+from ...effects import unbuilt
 from ...friction.laws.stretch import growth_numbers
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from .march import GOAL, Run
@@ -54,8 +55,7 @@ def plastic(static: float, length: float) -> Rubbing:
 def bonds(law) -> Rubbing:
     """The stretch reading with p = 1 of a friction.law.Bonds at every point. PatchfemError for any other."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
-        raise PatchfemError("friction: under a load that changes only reading = \"stretch\" with order = 1 and no "
-                            "breakaway; the others are not yet built")
+        raise PatchfemError(unbuilt("friction: such bonds beside a load that changes", "recursion"))
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
@@ -67,10 +67,9 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
     if patch.skin is not None:
-        raise PatchfemError("contact.asperities: the exponential and hertz laws beside modes with normal or pitch: use "
-                            "law = \"linear\"; not yet built")
+        raise PatchfemError(unbuilt("contact.asperities.law: a smooth skin beside a load that changes", "linear"))
     if patch.strips is not None:
-        raise PatchfemError("contact.strips: beside modes with normal or pitch: leave it out; not yet built")
+        raise PatchfemError(unbuilt("contact.strips: beside a load that changes", "either"))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     c, x = patch.pieces.normal, patch.x
     if spring > 0:
@@ -167,8 +166,7 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS):
-        raise PatchfemError("contact.shear: under a load that changes it takes law 'elastic-plastic' (for Coulomb with "
-                            "a short bond_length) or 'nonlocal'; not yet built")
+        raise PatchfemError(unbuilt("friction.law: this one beside a load that changes and [contact.shear]", "stiff"))
     if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):

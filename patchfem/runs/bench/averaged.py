@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import has, module_of
+from ...effects import has, module_of, unbuilt
 
 ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
 
@@ -33,9 +33,10 @@ def limit_share(model, patch) -> float:
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
-        raise PatchfemError(f"'convolution' on a pressure that is not symmetric: the "
-                            f"limit is {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the "
-                            "patch symmetric or use a bench, [slide]; not yet built", "friction.law")
+        raise PatchfemError(unbuilt(
+            f"'{f.law}' on a pressure that is not symmetric",
+            f"the limit is {forward * f.static:.6g} N forward and {back * f.static:.6g} N back; make the patch "
+            "symmetric or use a bench, [slide]"), "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 
 

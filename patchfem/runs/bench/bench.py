@@ -43,11 +43,6 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
     """Slide the interface of a model along its path with `steps` per cycle, or along `path` in the form of
     `SlidePath.samples`; patch None for [normal]; frames: fields kept on the way."""
     begin = perf_counter()
-    sideways = model.slide.across is not None
-    if sideways:
-        from .two_directions import refuse
-
-        refuse(model)
     time, slide, first, omega = model.slide.samples(steps) if path is None else path
     if model.load_varies:
         start = time[first]

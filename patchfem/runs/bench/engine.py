@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import Missing, PatchfemError
+from ...core import Missing
 from ...effects import has, listed
 from ...friction.bonds.engines import Choice
 from ...friction.bonds.engines import choose as choose_sum
@@ -41,7 +41,7 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
     """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
     summed where that is known already.
 
-    PatchfemError for a pinned engine that cannot sum such a bench, Missing where the sum would take too long.
+    Missing where the sum would take too long.
     """
     f, soft = model.friction, bool(model.soft)
     if model.slide.across is not None:
@@ -112,11 +112,6 @@ def _summed(model, slide, points: int, found: Choice) -> Engine:
 
 
 def _stepped(model, slide, points: int) -> Engine:
-    f, pinned = model.friction, model.accuracy.quadrature
-    if has(f.law, "bonds") and pinned == "merged":
-        raise PatchfemError("'merged' where the pressure of a point changes "
-                            "during the slide, or beside friction.breakaway: use 'auto', 'direct' or 'truncated'; not "
-                            "yet built", "accuracy.quadrature")
     return Engine(STEPPED, _stepped_seconds(model, slide, points))
 
 

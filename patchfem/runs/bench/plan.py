@@ -6,10 +6,6 @@ from .engine import engine_of
 
 def cost(model: Model, unknowns: dict) -> tuple:
     """(engine, steps of all passes, seconds) of a bench."""
-    if model.slide.across is not None:
-        from .two_directions import refuse
-
-        refuse(model)
     accuracy = model.accuracy
     per_cycle = model.slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
     time, slide = model.slide.samples(per_cycle)[:2]

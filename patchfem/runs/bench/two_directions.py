@@ -2,34 +2,11 @@
 
 import numpy as np
 
-from ...core import PatchfemError
-from ...effects import carries, refusal
 from ...friction.bonds.quadrature import Quadrature
 from ...friction.bonds.recursion import Recursion
 from .ledger import Slid, frame_numbers, ledger_of, split
 from .stepped import refuse_costly
 from .watch import BLOCK, Watch
-
-
-def refuse(model) -> None:
-    """PatchfemError naming what a slide in two directions cannot do yet."""
-    f = model.friction
-    reason = ""
-    if not carries(f, "two-directions"):
-        reason = f"law '{f.law}': {refusal('two-directions').removesuffix('; not yet built')}"
-    elif model.spread is not None:
-        reason = "friction.spread, whose width turns with the path: leave one of them out"
-    elif f.breakaway:
-        reason = "friction.breakaway: leave one of them out"
-    elif model.soft:
-        reason = f"{model.soft}: leave one of them out"
-    elif model.side == "lower":
-        reason = "the pressure on the lower piece: put the shapes on the upper piece"
-    elif model.load_varies:
-        reason = "normal.amplitude: leave one of them out"
-    if reason:
-        raise PatchfemError(f"a lateral column beside {reason}, or leave the column out; "
-                            "not yet built", "slide.file")
 
 
 def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:

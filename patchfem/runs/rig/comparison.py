@@ -6,12 +6,12 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import Outcome, PatchfemError
+from ...core import Outcome
 from ...dynamics.comparison import point_laws
 from ...dynamics.comparison.point_laws import Coulomb
 from ...dynamics.march.march import hermite_extremes
 from ...dynamics.march.models import load_kernels
-from ...effects import carries, has, module_of, refusal
+from ...effects import has, module_of
 from ...friction.record import law_from
 from ...response import run_events
 from ...response.measures import window_amplitudes, window_ends
@@ -25,13 +25,10 @@ TOLERANCE = 1e-6  # of a converged step, relative, where the scene does not say
 
 
 def laws_of(model, load: float) -> list:
-    """A law of dynamics.point_laws per interface; PatchfemError for laws with a memory of bonds."""
+    """A law of dynamics.point_laws per interface."""
     out, accuracy = [], model.accuracy
     for one in model.rig.interfaces:
         f, bears = one.numbers, load if one.load is None else one.load
-        if not carries(f, "comparison"):
-            raise PatchfemError(f"'{accuracy.method}' with law '{f.law}': {refusal('comparison')}; or use method = "
-                                "\"march\"", "accuracy.method")
         if has(f.law, "set-valued"):
             out.append(point_laws.Coulomb(*one.limits(bears), accuracy.stick_speed or 0.0))
         else:

@@ -1,6 +1,7 @@
-"""The engines of a rig as records: what each refuses, how it solves, how a run of it can be coarser, what it costs.
+"""The engines of a rig as records: what each cannot do, how it solves, how a run of it can be coarser, what it costs.
 
-`engine_of` takes the engine that the scene names, or the first that does not refuse.
+`engine_of` takes the engine that the scene names, or the first that can. What a named engine does not take the rules of
+the scene have refused, `scene.rules.methods`.
 """
 
 from collections.abc import Callable
@@ -8,11 +9,11 @@ from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
-from ...core import PatchfemError
-from ...effects import LAWS, has, listed, waves
+from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
 from ...response.errors import change, step_error
+from ...scene.rules import methods
 
 
 class Variant(NamedTuple):
@@ -25,13 +26,13 @@ class Variant(NamedTuple):
 class Engine(NamedTuple):
     """One engine of a rig.
 
-    refuses(model) -> None, or the PatchfemError that says why and what to do; solve: "module function" of this folder,
-    function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch) and
-    in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays.
+    lacks(model) -> why it has no answer to a model that names no engine, "" where it has; solve: "module function" of
+    this folder, function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch)
+    and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays.
     """
 
     name: str
-    refuses: Callable
+    lacks: Callable
     solve: str
     in_time: Callable
     in_space: Callable
@@ -47,23 +48,13 @@ class Engine(NamedTuple):
 def no_closed_form(model: Model, steady: bool = False) -> str:
     """Why a run has no exact solution; empty where it has one. steady: under the sine of a curve, not the drive's own
     waveform."""
-    rig, soft = model.rig, model.soft
+    rig = model.rig
     laws = [one.numbers.law for one in rig.interfaces]
-    if odd := [law for law in laws if "exact" not in LAWS[law].carries.split()]:
-        return f"for law '{odd[0]}'{f' with {soft}' if soft else ''}"
-    if soft and laws:
-        return f"with {soft}"
-    if rig.load_varies:
-        return "under a load that changes"
-    if rig.strips_slide_apart and rig.waveform == "levels":
-        return "with strips that yaw, level by level"
-    if not steady and not rig.drive.segments:
-        return f"under a drive of waveform '{rig.waveform}'"
-    if rig.cubic is not None:
-        return "with [structure.stiffening]"
-    if rig.interlock is not None:
-        return "with structure.bonded.wavelength"
-    return ""
+    spring = "[structure.stiffening]" if rig.cubic is not None else \
+        "structure.bonded.wavelength" if rig.interlock is not None else ""
+    waveform = "" if steady or rig.kind == "free" else rig.waveform
+    return methods.no_closed_form(laws, model.soft, "under a load that changes" if rig.load_varies else "",
+                                  rig.strips_slide_apart, waveform, spring)
 
 
 def set_valued(model: Model, numerics) -> bool:
@@ -73,43 +64,8 @@ def set_valued(model: Model, numerics) -> bool:
     return numerics.engine == "march" and not gives and any(has(law, "set-valued") for law in laws)
 
 
-def _exact_refuses(model: Model) -> PatchfemError | None:
-    why = no_closed_form(model)
-    return PatchfemError(f"no exact solution exists {why}; use method = \"march\"", "accuracy.method") if why else None
-
-
-def _march_refuses(model: Model) -> PatchfemError | None:
-    f, soft, lower = model.friction, model.soft, model.side == "lower"
-    if f is not None:
-        recursion = has(f.law, "bonds") and not listed(f)
-        if lower and (soft or not recursion):
-            what = soft if soft else f"law '{f.law}' other than the stretch reading with order = 1"
-            return PatchfemError(f"pressure on the lower piece with {what} in the rig: not yet built; put the shapes "
-                                 "on the upper piece", "")
-        if soft and listed(f):
-            return PatchfemError(f"{soft} with order = {f.order:g}: not yet built; use order = 1", "")
-    if lower and model.accuracy.quadrature not in ("auto", "recursion"):
-        return PatchfemError(f"accuracy.quadrature: '{model.accuracy.quadrature}' with pressure on the lower piece in "
-                             "the rig: not yet built; use \"recursion\" or the upper piece", "")
-    return None
-
-
-def _comparison_refuses(model: Model) -> PatchfemError | None:
-    if not model.soft:
-        return None
-    return PatchfemError(f"'{model.accuracy.method}' takes an interface as a whole, not {model.soft}; use method = "
-                         "\"march\"", "accuracy.method")
-
-
-def _harmonic_refuses(model: Model) -> PatchfemError | None:
-    rig = model.rig
-    if rig.kind == "free" or not waves(rig.waveform, "steady"):
-        return PatchfemError("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over "
-                             "levels; use method = \"march\"", "accuracy.method")
-    if rig.waveform == "sweep" and rig.drive.displacement is not None:
-        return PatchfemError("'harmonic' keeps the acceleration over a sweep; give drive.acceleration",
-                             "accuracy.method")
-    return None
+def _nothing(model: Model) -> str:
+    return ""
 
 
 def _no_rungs(*_) -> list:
@@ -178,21 +134,16 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
     return [Rung((), lambda fine: solution.errors)]
 
 
-EXACT = Engine("exact", _exact_refuses, "exact run_exact", _no_rungs, _exact_in_space)
-MARCH = Engine("march", _march_refuses, "march run_march", _march_in_time, _march_in_space)
-HARMONIC = Engine("harmonic", _harmonic_refuses, "steady run_steady", _no_rungs, _own_errors, 0.0)
+EXACT = Engine("exact", no_closed_form, "exact run_exact", _no_rungs, _exact_in_space)
+MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
+HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0)
 COMPARED = ("duhamel", "newmark", "euler")
 ENGINES = {one.name: one for one in (EXACT, MARCH, HARMONIC, *(
-    Engine(name, _comparison_refuses, "comparison run_comparison", _march_in_time, _march_in_space)
+    Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space)
     for name in COMPARED))}
 AUTOMATIC = (EXACT, MARCH)  # in the order in which they are tried
 
 
 def engine_of(model: Model) -> Engine:
-    """The engine that a scene names, or the first of AUTOMATIC that does not refuse; PatchfemError with its reason."""
-    named = ENGINES.get(model.accuracy.method)
-    for one in AUTOMATIC if named is None else (named,):
-        reason = one.refuses(model)
-        if reason is None:
-            return one
-    raise reason
+    """The engine that a scene names, or the first of AUTOMATIC that lacks nothing."""
+    return ENGINES.get(model.accuracy.method) or next(one for one in AUTOMATIC if not one.lacks(model))

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from ...core import PatchfemError
 from ...dynamics.march import models
-from ...effects import carries, has, named, refusal
+from ...effects import has
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import law_from
@@ -47,8 +46,6 @@ def model_of(model: Model, numerics: Numerics, patch):
 def _element(one: Rubbing, load: float, speed: float) -> Element:
     """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers
-    if not carries(f, "joints"):
-        raise PatchfemError(f"{named(f)} beside other interfaces: {refusal('joints')}", f"{one.key}.law")
     if has(f.law, "bonds"):
         return points_element(bonds_of(f, speed, 1e-12), [1.0], [load])
     return law_from(f, load).element(load)
@@ -57,7 +54,7 @@ def _element(one: Rubbing, load: float, speed: float) -> Element:
 def contact_model(model: Model, numerics: Numerics, patch):
     """The ContactModel of the one interface of a rig, by its law, load and what gives way.
 
-    patch: the solved Patch or None under [normal]. PatchfemError for what is not built.
+    patch: the solved Patch or None under [normal].
     """
     f, soft = model.friction, model.soft
     if f is None:
@@ -75,9 +72,6 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if not soft:
         return models.element_model(one)
 
-    if has(f.law, "set-valued") and f.kinetic < f.static:
-        raise PatchfemError(f"friction.kinetic below static with {soft}: not yet built; the exact set of elements "
-                            "needs static = kinetic", "")
     found = jenkins_set(patch.giving, f.static * patch.pressure.sigma_n * patch.pieces.interface.weight, one.length)
     return models.jenkins_model(found.stiffness, found.yield_slide, found)
 

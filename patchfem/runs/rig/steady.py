@@ -16,11 +16,10 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     """The steady motion at a sine, or the largest on a curve over a sweep or over levels, whose sine is extra["at"]."""
     drive = model.rig.drive
     sine = drive if isinstance(drive, BaseSine) else None
-    exact = model.friction is None or not no_closed_form(model, steady=True)
-    if exact:
-        from .steady_events import Events as Finder
-    else:
+    if no_closed_form(model, steady=True):
         from .steady_balance import Balance as Finder
+    else:
+        from .steady_events import Events as Finder
     finder = Finder(model, numerics, patch, say)
     if sine is not None:
         raw, errors, extra = finder.point(sine)

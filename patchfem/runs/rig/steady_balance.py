@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ...compiled import load
-from ...core import BaseSine, Outcome, PatchfemError
+from ...core import BaseSine, Outcome
 from ...dynamics.harmonic import branch as branches
 from ...dynamics.harmonic.balance import cycle_energy, periodic_response, regime
 from ...dynamics.harmonic.forces import Group
@@ -27,9 +27,6 @@ class Balance:
     def __init__(self, model, numerics, patch, say):
         load("dynamics.harmonic.cycle_kernels", say)
         rig = model.rig
-        if len(rig.modes.interfaces) > 1:
-            raise PatchfemError("'harmonic' with several interfaces of laws without an exact solution: not yet built; "
-                                "use method = \"march\"", "accuracy.method")
         parts = []
         if model.friction is not None:
             parts.append((0, contact_model(model, numerics, patch)))

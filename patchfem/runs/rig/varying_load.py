@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ...core import PatchfemError
 from ...dynamics.march import varying_load as march
 from ...model.model import Model
 
@@ -16,8 +15,6 @@ def rubbing_of(model: Model):
         return march.rate(f.static, f.reference_speed)
     if f.law == "elastic-plastic":
         return march.plastic(f.static, f.bond_length)
-    if f.law != "nonlocal":
-        raise PatchfemError(f"friction.law: '{f.law}' under a load that changes: not yet built", "")
     return march.bonds(model.bonds)
 
 

@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
+from ...effects import unbuilt
 from ...wear.depth import critical_jump, rates, refuse_explicit
 from ...wear.jumps import Wearing, Worn, after, replayed, start
 from ..patch.press import pressed, presser
@@ -80,8 +81,8 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     PatchfemError for an explicit jump beyond the critical one and for a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
-        raise PatchfemError("beside a slide in two directions: leave out [wear] or the lateral column; not yet built",
-                            "wear")
+        text = unbuilt("beside a slide in two directions", "leave out [wear] or the lateral column")
+        raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
     asked = Wearing(presser(model.patch, patch.pair), motion, patch.pieces.interface.weight, wear.coefficient,
                     wear.cycles, wear.explicit)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ...effects import has
 from ..keys.tables import Friction
-from .accuracy import _method, _quadrature
+from .accuracy import _quadrature
 from .contact import _contact, _load_line
 from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
@@ -22,7 +22,7 @@ def check(draft: Draft) -> str:
     for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_method, _quadrature, _sliding, check_length, check_wear):
+    for rule in (_quadrature, _sliding, check_length, check_wear):
         rule(draft, kind)
     return kind
 

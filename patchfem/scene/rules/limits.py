@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from ...effects import carries, has, listed, named, refusal
+from ...effects import MEANWHILE, carries, has, listed, named, refusal, takes, unbuilt
 from ..keys.contact import Contact
 from ..keys.tables import Friction, Tables
 from .draft import Draft
+from .methods import beside_load, changing_load, check_method, turning
 
 # Valid in a scene but without an implementation -> what serves meanwhile.
 NOT_YET_BUILT: dict[str, str] = {
@@ -46,16 +47,20 @@ def _find(table: Any, path: str, at: str = "") -> Iterator[tuple[str, Any]]:
 
 def combinations(draft: Draft, kind: str) -> None:
     """Say every combination of built keys that a run of this kind cannot do yet; silent about values not there."""
+    check_method(draft, kind)
     contact, law = draft.tables.contact, draft.tables.friction
-    shear = contact.gives_way if contact is not None else ""
+    if kind == "rig" and draft.tables.structure is not None:
+        _interfaces(draft, draft.tables.structure.interface or ())
     if kind not in ("bench", "rig") or law is None or law.law is None:
         return
-    if kind == "rig" and (cause := _changing_load(draft)):
+    shear = contact.gives_way if contact is not None else ""
+    _quadrature(draft, kind, law, shear)
+    if kind == "rig" and (cause := changing_load(draft.tables)):
         _under_changing_load(draft, law, shear, cause)
     if kind == "bench" and _still(law) and draft.tables.normal is not None and draft.tables.normal.amplitude:
         draft.say("normal.amplitude", f"beside law '{law.law}': {refusal('varying-load')}")
     if kind == "rig" and has(law.law, "bonds") and law.breakaway and law.order != 1:
-        draft.say("friction.breakaway", f"beside order = {law.order:g} in a rig: use order = 1; not yet built")
+        draft.say("friction.breakaway", unbuilt(f"beside order = {law.order:g} in a rig", "order"))
     if kind == "rig":
         _yawing(draft, law, contact)
     if shear:
@@ -63,86 +68,107 @@ def combinations(draft: Draft, kind: str) -> None:
     if contact is not None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
         if contact.strips is not None and shear:
-            draft.say("contact.strips", f"beside {shear}: leave one of them out; not yet built")
+            draft.say("contact.strips", unbuilt(f"beside {shear}", "either"))
         elif contact.strips is not None and has(law.law, "averaged"):
-            draft.say("contact.strips", f"beside law '{law.law}': leave it out; not yet built")
+            draft.say("contact.strips", unbuilt(f"beside law '{law.law}'", "out"))
+
+
+def _interfaces(draft: Draft, interfaces: tuple) -> None:
+    """Interfaces between masses are points without a width; beside one another they take laws of one point each."""
+    for index, one in enumerate(interfaces):
+        at = f"structure.interface.{index}"
+        if one.spread is not None and takes(one.law, "spread"):
+            draft.say(f"{at}.spread", unbuilt("beside masses, where an interface has no width", "out"))
+        if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
+            draft.say(f"{at}.law", f"{named(one)} beside other interfaces: {refusal('joints')}")
+
+
+def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
+    """A list of bonds knows neither an elastic range nor, merged, a pressure that changes as it slides."""
+    contact, normal, accuracy = draft.tables.contact, draft.tables.normal, draft.tables.accuracy
+    engine = accuracy.quadrature if accuracy is not None else None
+    if engine in (None, "auto", "recursion") or not has(law.law, "bonds") or shear:
+        return
+    lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
+    if kind == "rig" and (lower or law.breakaway) and not listed(law):
+        beside = "the pressure on the lower piece" if lower else "friction.breakaway"
+        draft.say("accuracy.quadrature", unbuilt(f"'{engine}' beside {beside} in a rig", "use 'recursion' or 'auto'"))
+    varies = normal is not None and normal.amplitude
+    if kind == "bench" and engine == "merged" and (lower or law.breakaway or varies):
+        draft.say("accuracy.quadrature", unbuilt("'merged' where the pressure of a point changes during the slide, or "
+                                                 "beside friction.breakaway", "use 'auto', 'direct' or 'truncated'"))
+
+
+def sideways(tables: Tables) -> str:
+    """What a slide in two directions, which the file of a path shows, cannot do yet; empty where it can."""
+    law, contact, normal = tables.friction, tables.contact, tables.normal
+    lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
+    if not carries(law, "two-directions"):
+        reason = f"law '{law.law}': {refusal('two-directions').partition(';')[0]}"
+    elif law.spread is not None:
+        reason = f"friction.spread, whose width turns with the path: {MEANWHILE['either']}"
+    elif law.breakaway:
+        reason = f"friction.breakaway: {MEANWHILE['either']}"
+    elif contact is not None and contact.gives_way:
+        reason = f"{contact.gives_way}: {MEANWHILE['either']}"
+    elif lower:
+        reason = f"the pressure on the lower piece: {MEANWHILE['shapes']}"
+    elif normal is not None and normal.amplitude:
+        reason = f"normal.amplitude: {MEANWHILE['either']}"
+    else:
+        return ""
+    what, _, remedy = reason.partition(": ")
+    return unbuilt(f"a lateral column beside {what}", f"{remedy}, or leave the column out")
 
 
 def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
     """A yaw needs strips to turn, and laws that a strip can have."""
-    structure = draft.tables.structure
-    turning = [k for k, mode in enumerate(structure.mode if structure is not None else ()) if mode.yaw]
-    if not turning:
+    key = turning(draft.tables)
+    if not key:
         return
-    key = f"structure.mode.{turning[0]}.yaw"
     if contact is None or contact.strips is None:
         draft.say(key, "turns the patch about its normal: name [contact.strips], which slide each by themselves")
-        return
-    if not carries(law, "joints"):
+    elif not carries(law, "joints"):
         draft.say(key, f"beside strips with {named(law)}: {refusal('joints')}")
-    accuracy = draft.tables.accuracy
-    if accuracy is not None and accuracy.method not in ("auto", "march", "exact", None):
-        draft.say("accuracy.method", f"'{accuracy.method}' beside strips that yaw: use 'march'; not yet built")
-
-
-def _changing_load(draft: Draft) -> str:
-    """The key by which the load of a rig changes, empty where it stays."""
-    normal, structure = draft.tables.normal, draft.tables.structure
-    if normal is not None and normal.amplitude:
-        return "normal.amplitude"
-    for index, mode in enumerate(structure.mode if structure is not None else ()):
-        for key in ("normal", "pitch"):
-            if getattr(mode, key, None):
-                return f"structure.mode.{index}.{key}"
-    return ""
 
 
 def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) -> None:
     """Say what a load that changes in a run cannot stand beside."""
-    contact, structure = draft.tables.contact, draft.tables.structure
-    beside = f"beside {cause}" if cause == "normal.amplitude" else f"beside a mode's {cause.rpartition('.')[2]}"
+    contact, structure, beside = draft.tables.contact, draft.tables.structure, beside_load(cause)
     if contact is None and cause != "normal.amplitude":
         draft.say(cause, "one rigid point leaves no room for heave or pitch: name [contact] in place of [normal]")
-    accuracy = draft.tables.accuracy
-    if accuracy is not None and accuracy.method == "exact" and carries(law, "exact") and not shear:
-        draft.say("accuracy.method", f"no exact solution exists {beside}; use 'march' or leave method out")
-    if accuracy is not None and accuracy.method in ("duhamel", "newmark", "euler", "harmonic"):
-        draft.say("accuracy.method", f"'{accuracy.method}' {beside} takes the load as constant: use 'march'; not yet "
-                                     "built")  # fmt: skip
     if not has(law.law, "bonds") and not carries(law, "varying-load"):
         draft.say("friction.law", f"'{law.law}' {beside}: {refusal('varying-load')}")
     elif listed(law) or (has(law.law, "bonds") and law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
-        draft.say(f"friction.{key}", f"{beside}: use reading = \"stretch\" with order = 1 and no breakaway; not yet "
-                                     "built")  # fmt: skip
+        draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
     if shear and has(law.law, "set-valued") and carries(law, "shear"):
-        draft.say("friction.law", f"'{law.law}' {beside} and {shear}: use law 'elastic-plastic' with a short "
-                                  "bond_length, which is Coulomb behind stiff springs; not yet built")  # fmt: skip
+        draft.say("friction.law", unbuilt(f"'{law.law}' {beside} and {shear}", "stiff"))
     if structure is not None and structure.stiffening is not None:
-        draft.say("structure.stiffening", f"{beside}: leave one of them out; not yet built")
+        draft.say("structure.stiffening", unbuilt(beside, "either"))
     if structure is not None and structure.bonded is not None and structure.bonded.wavelength is not None:
-        draft.say("structure.bonded.wavelength", f"{beside}: leave one of them out; not yet built")
+        draft.say("structure.bonded.wavelength", unbuilt(beside, "either"))
     if contact is None:
         return
     if contact.strips is not None:
-        draft.say("contact.strips", f"{beside}: leave one of them out; not yet built")
+        draft.say("contact.strips", unbuilt(beside, "either"))
     if contact.asperities is not None and contact.asperities.law not in ("linear", None):
-        draft.say("contact.asperities.law", f"'{contact.asperities.law}' {beside}: use 'linear'; not yet built")
+        draft.say("contact.asperities.law", unbuilt(f"'{contact.asperities.law}' {beside}", "linear"))
     for name, shape in contact.shapes.items():
         if shape.on == "lower":
-            draft.say(f"contact.{name}.on", f"'lower' {beside}: put the shapes on the upper piece; not yet built")
+            draft.say(f"contact.{name}.on", unbuilt(f"'lower' {beside}", "shapes"))
 
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
     least = -1 if law.reading == "report" else 0
     if has(law.law, "bonds") and law.order != 1 and (law.order == 0 or _inside(law.order, least)):
-        draft.say("friction.order", f"{law.order:g} beside {shear}: use order = 1; not yet built")
+        draft.say("friction.order", unbuilt(f"{law.order:g} beside {shear}", "order"))
     if not has(law.law, "bonds") and not carries(law, "shear"):
         draft.say("friction.law", f"'{law.law}' beside {shear}: leave it out, or {refusal('shear')}")
     weakens = law.static is not None and _inside(law.kinetic, -1, law.static)
     if has(law.law, "set-valued") and carries(law, "shear") and weakens:
-        draft.say("friction.kinetic", f"{law.kinetic:g} below static = {law.static:g} beside {shear}: leave kinetic "
-                                      "out; not yet built")  # fmt: skip
+        draft.say("friction.kinetic", unbuilt(f"{law.kinetic:g} below static = {law.static:g} beside {shear}",
+                                              "kinetic"))
 
 
 def _only_on_upper(kind: str, law: Friction, shear: str) -> str:
@@ -170,9 +196,9 @@ def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
         key = next((key for key in reversed(sides) if draft.given(key)), next(iter(sides)))
         piece = "the upper piece" if only_upper else "one piece"
         names = " and ".join(key.removesuffix(".on") for key in sides)
-        draft.say(key, f"{names} lie on different pieces: put all shapes on {piece}; not yet built")
+        draft.say(key, unbuilt(f"{names} lie on different pieces", f"put all shapes on {piece}"))
     elif lower and only_upper:
-        draft.say(lower[0], f"'lower' {only_upper}: put the shapes on the upper piece; not yet built")
+        draft.say(lower[0], unbuilt(f"'lower' {only_upper}", "shapes"))
 
 
 def _inside(value: float | None, low: float, high: float = float("inf")) -> bool:

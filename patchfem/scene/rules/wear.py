@@ -1,9 +1,9 @@
 """What [wear] asks of the rest of a scene."""
 
-from ...effects import has
+from ...effects import has, unbuilt
 from .draft import Draft
 
-LATER = "leave out [wear] or {}; not yet built"
+LATER = "leave out [wear] or {}"
 
 
 def check_wear(draft: Draft, kind: str) -> None:
@@ -14,7 +14,7 @@ def check_wear(draft: Draft, kind: str) -> None:
     if kind == "patch":
         draft.say("wear", "nothing slides: wear needs [friction] with [slide], or with [structure] and [drive]")
     for key, words in _beside(tables, kind):
-        draft.say("wear", f"beside {key}: {words}")
+        draft.say("wear", unbuilt(f"beside {key}", words))
     if draft.given("wear.scheme") and tables.wear.scheme == "explicit" and not draft.given("wear.jumps"):
         draft.lacks("wear.jumps", "scheme 'explicit' needs the number of its jumps")
     if tables.normal is not None:
