@@ -1,9 +1,17 @@
-"""Made traces with known spectra, heights counted as gap like those of a file: a larger z is more open."""
+"""Made traces with known spectra, heights counted as gap like those of a file: a larger z is more open.
+
+The report's surface (`report_trace`, `report_area`) has as many hills as valleys alike: its heights may be read as gap
+or as surface.
+"""
 
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from .profile import Profile
+from .profile import Profile, say
+
+DOMINANT, SHORTEST = 80e-6, 8e-6  # [m] report, 4.D: 80 micron scale; a stylus of 12.5 um traces no shorter waves
+SIGMA = 6.3e-6  # [m] of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, Rt is 31 um then
+SWINGS = {"peak-to-valley": 2.5, "zero-to-peak": 1.25, "rms": 1.0}  # amplitude / sigma
 
 
 def sine(x: np.ndarray, amplitude: float, wavelength: float, phase: float = 0.0) -> Profile:
@@ -76,6 +84,87 @@ def self_affine(length: float, count: int, rms: float, hurst: float, longest: fl
     z = np.fft.irfft(amplitude * np.exp(1j * phase) * count / 2, count)
     x = np.linspace(-length / 2, length / 2, count + 1)
     return Profile(frozen_array(x), frozen_array(np.append(z, z[0])), f"self-affine trace (seed {seed})")
+
+
+def report_sigma(amplitude: float, amplitude_kind: str) -> float:
+    """Standard deviation [m] of the report's surface whose 80 um waves have an amplitude [m] of the kind stated.
+
+    amplitude_kind: "peak-to-valley": the upper quartile of the height from a peak to the next valley, 2.5 sigma in
+    traces less their waves below half of 80 um (2.6 where peaks must stand out by 0.3 sigma instead); "zero-to-peak":
+    half of that; "rms": sigma itself. The report's "amplitude of 13 to 18 microns" does not say which: 5.2 to 7.2 um of
+    sigma, 10.4 to 14.4 um, 13 to 18 um. Only the first fits the range of 30.6 um that Fig. 30 seems to print.
+    """
+    if amplitude_kind not in SWINGS:
+        raise PatchfemError(f"amplitude_kind '{amplitude_kind}' is not known; use {', '.join(SWINGS)}")
+    if not (np.isfinite(amplitude) and amplitude >= 0):
+        raise PatchfemError(f"the amplitude of a made surface is a length of zero or more, not {amplitude:g}")
+    return float(amplitude) / SWINGS[amplitude_kind]
+
+
+def report_density(q: np.ndarray) -> np.ndarray:
+    """Power per area of wave numbers of the report's surface before the tests, up to a factor; q (any shape) [rad/m].
+
+    0.8 exp(-(q - q0)^2 / (2 (q0 / 4)^2)), the ring of waves about q0 = 2 pi / 80 um, plus 0.2 of a self-affine part:
+    flat below q0, (q / q0)^(-2 - 2 H) above with H = 0.8, nothing beyond 2 pi / 8 um. Isotropic: q is the length of the
+    wave vector. Assumed: the report gives words and two traces only.
+    """
+    ratio = np.abs(np.asarray(q, float)) * (DOMINANT / (2 * np.pi))
+    ring = np.exp(-((ratio - 1) ** 2) * 8)
+    rest = np.where(ratio <= DOMINANT / SHORTEST * (1 + 1e-12), np.maximum(ratio, 1.0) ** -3.6, 0.0)
+    return np.where(ratio > 0, 0.8 * ring + 0.2 * rest, 0.0)
+
+
+def report_trace(length: float, count: int, seed: int, sigma: float = SIGMA) -> Profile:
+    """A periodic trace through the report's surface over [-length/2, length/2] with `count` even steps.
+
+    Its spectrum is that of a straight cut: `report_density` summed over the waves across the trace. Such a cut shows
+    oblique waves longer than they are: an octave of the trace holds most height at 85 um, not at 80 um. Phases are
+    random, the standard deviation over the period is `sigma` [m] in every trace (pieces of one long trace, and traces
+    cut from `report_area`, scatter as measured ones do). Same seed, same bytes. PatchfemError unless a wave of 8 um
+    holds two steps and the length one of 80 um.
+    """
+    _resolved("report_trace", length, length, length / max(count, 1), sigma)
+    q = 2 * np.pi / length * np.arange(count // 2 + 1)
+    across = 2 * np.pi / SHORTEST * (np.arange(1000) + 0.5) / 1000
+    power = np.array([report_density(np.hypot(one, across)).sum() for one in q])
+    power[0] = 0.0
+    phase = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, q.size)
+    z = _scaled(np.fft.irfft(np.sqrt(power) * np.exp(1j * phase), count), sigma)
+    x = np.linspace(-length / 2, length / 2, count + 1)
+    return Profile(frozen_array(x), frozen_array(np.append(z, z[0])), f"report's surface, trace (seed {seed})")
+
+
+def report_area(shape: tuple, step: float, seed: int, sigma: float = SIGMA) -> tuple:
+    """The report's surface before the tests on a periodic raster: (x (n,), y (m,), z (m, n)) [m], isotropic.
+
+    shape: (m, n), points along y and along x; the periods are m and n times the step [m]. Phases are random, every
+    realisation has the spectrum `report_density` and the standard deviation `sigma` [m] over the period. Same seed,
+    same bytes, whatever the number of threads. A megapixel: 0.2 s. PatchfemError unless a wave of 8 um holds two steps
+    and both periods one of 80 um.
+    """
+    m, n = shape
+    _resolved("report_area", m * step, n * step, step, sigma)
+    qy, qx = 2 * np.pi * np.fft.fftfreq(m, step), 2 * np.pi * np.fft.rfftfreq(n, step)
+    noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((m, n)))
+    wave = noise / np.abs(noise)  # the phases of white noise: random, and those of a real surface
+    z = _scaled(np.fft.irfft2(wave * np.sqrt(report_density(np.hypot(qy[:, None], qx))), (m, n)), sigma)
+    return frozen_array(step * np.arange(n)), frozen_array(step * np.arange(m)), frozen_array(z)
+
+
+def _resolved(name: str, one: float, other: float, step: float, sigma: float) -> None:
+    if not (np.isfinite([one, other, step, sigma]).all() and step > 0 and sigma >= 0):
+        raise PatchfemError(f"{name}: a size and a step above zero and a sigma of zero or more are wanted")
+    if 2 * step > SHORTEST * (1 + 1e-12) or min(one, other) < DOMINANT * (1 - 1e-12):
+        raise PatchfemError(f"{name}: waves of 80 um down to 8 um want a step of 4 um at most and a size of 80 um at "
+                            f"least, not {say(step)} and {say(min(one, other))}")
+
+
+def _scaled(z, sigma: float) -> np.ndarray:
+    """Heights of mean zero with this root mean square; twice, for the round-off of the first time."""
+    for _ in range(2):
+        z = z - z.mean()
+        z = z * (sigma / np.sqrt((z * z).mean()))
+    return z
 
 
 def _places(x) -> np.ndarray:

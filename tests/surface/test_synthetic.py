@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 from scipy.special import erf
 
+import patchfem
 from patchfem.core import PatchfemError
-from patchfem.surface.synthetic import peaks, self_affine, sine, waves
+from patchfem.surface.synthetic import (
+    SIGMA,
+    peaks,
+    report_area,
+    report_density,
+    report_sigma,
+    report_trace,
+    self_affine,
+    sine,
+    waves,
+)
 
 LENGTH = 12.7e-3
+STEP, POINTS = 3.2e-6, 320  # a raster of 1.02 mm
 
 
 @given(st.integers(0, 10**6), st.floats(0.1, 1.0), st.integers(200, 999))
@@ -56,7 +75,103 @@ def test_exact_area_of_peaks():
     assert profile.z.min() == pytest.approx(-4e-6, rel=1e-4)
 
 
+def areas(count):
+    return [report_area((POINTS, POINTS), STEP, seed)[2] for seed in range(count)]
+
+
+def in_band(z, axis):
+    """Sine amplitude of the waves of 60 to 110 um along an axis, from the mean square over all traces."""
+    f = np.fft.rfftfreq(POINTS, STEP)
+    power = (np.abs(np.fft.rfft(z, axis=axis) / POINTS) ** 2).mean(axis=1 - axis)
+    return np.sqrt(4 * power[(f >= 1 / 110e-6) & (f <= 1 / 60e-6)].sum())
+
+
+def test_exact_sigma_and_mean_of_the_report_surface():
+    for z, sigma in ((report_area((100, 256), 4e-6, 3, 2e-6)[2], 2e-6), (areas(1)[0], SIGMA),
+                     (report_trace(1e-3, 1001, 5).z[:-1], SIGMA)):
+        assert np.sqrt((z**2).mean()) == pytest.approx(sigma, rel=1e-12, abs=0)
+        assert z.mean() == pytest.approx(0, abs=1e-12 * sigma)
+
+
+def test_exact_spectrum_of_the_report_surface():
+    x, y, z = report_area((200, 300), STEP, 0)
+    assert (x.size, y.size, z.shape) == (300, 200, (200, 300)) and x[1] == y[1] == STEP
+    power = np.abs(np.fft.fft2(z)) ** 2
+    q = 2 * np.pi * np.hypot(np.fft.fftfreq(200, STEP)[:, None], np.fft.fftfreq(300, STEP))
+    assert power / power.sum() == pytest.approx(report_density(q) / report_density(q).sum(), rel=1e-9, abs=1e-15)
+    trace = report_trace(2e-3, 700, 1).z[:-1]
+    cut = np.abs(np.fft.rfft(trace)) ** 2
+    many = report_area((700, 700), 2e-3 / 700, 1)[2]
+    rows = (np.abs(np.fft.rfft(many, axis=1)) ** 2).mean(axis=0)
+    assert cut[1:] / cut[1:].sum() == pytest.approx(rows[1:] / rows[1:].sum(), rel=2e-3, abs=1e-5)
+    assert 2e-3 / (np.arange(351) * cut).argmax() == pytest.approx(85e-6, abs=2e-6)  # where an octave holds most
+
+
+def test_always_80_um_dominate():
+    """The strongest ring of the measured spectrum, rings being 6 % wide."""
+    k = np.hypot(np.fft.fftfreq(POINTS, STEP)[:, None], np.fft.fftfreq(POINTS, STEP))
+    edges = np.geomspace(1 / 200e-6, 1 / 30e-6, 33)
+    ring = np.digitize(k, edges).ravel()
+    found = []
+    for z in areas(20):
+        power = np.bincount(ring, (np.abs(np.fft.fft2(z)) ** 2).ravel()) / np.bincount(ring)
+        best = 1 + power[1:-1].argmax()
+        found.append(1 / k.ravel()[ring == best].mean())
+    assert np.abs(np.array(found) - 80e-6).max() < 4e-6
+
+
+def test_always_the_report_surface_is_isotropic_and_level_headed():
+    every = areas(20)
+    ratios = [in_band(z, 1) / in_band(z, 0) for z in every]
+    assert np.mean(ratios) == pytest.approx(1, abs=0.05) and np.abs(np.array(ratios) - 1).max() < 0.05
+    skew = [(z**3).mean() / SIGMA**3 for z in every]
+    assert np.mean(skew) == pytest.approx(0, abs=0.05)
+    slope = np.sqrt(np.mean([((np.roll(z, -1, 1) - np.roll(z, 1, 1)) ** 2).mean() for z in every])) / (2 * STEP)
+    assert slope * 6e-6 / SIGMA == pytest.approx(0.42, abs=0.005)  # an independent program's number
+
+
+def test_exact_scatter_of_one_trace():
+    """Band amplitudes of two independent traces of 1.02 mm, by Fisher's distribution of the freedom of the band."""
+    f, z = np.fft.rfftfreq(POINTS, STEP), np.concatenate([z[::40] for z in areas(80)])
+    power = (np.abs(np.fft.rfft(z)) ** 2)[:, (f >= 1 / 110e-6) & (f <= 1 / 60e-6)]
+    mean, amplitude = power.mean(axis=0), np.sqrt(power.sum(axis=1))
+    freedom = 2 * mean.sum() ** 2 / (mean**2).sum()
+    ratio = amplitude[:320, None] / amplitude[320:]
+    expected = np.sqrt(stats.f.ppf([0.05, 0.95], freedom, freedom))
+    assert np.quantile(ratio, [0.05, 0.95]) == pytest.approx(expected, rel=0.03)
+    assert expected == pytest.approx([0.64, 1.57], abs=0.01)
+
+
+def test_exact_the_factors_of_the_amplitude_kinds():
+    """Heights from a peak to the next valley of traces less their waves below 40 um: 2.5 sigma at the quartile."""
+    f, swings = np.fft.rfftfreq(POINTS, STEP), []
+    for row in np.concatenate([z[::8] for z in areas(10)]):
+        z = np.fft.irfft(np.where(f <= 1 / 40e-6, np.fft.rfft(row), 0), POINTS)
+        up = np.diff(z) > 0
+        swings.append(np.abs(np.diff(z[1:-1][up[1:] != up[:-1]])))
+    assert np.quantile(np.concatenate(swings), 0.75) / SIGMA == pytest.approx(2.5, abs=0.05)
+    for kind, share in (("peak-to-valley", 2.5), ("zero-to-peak", 1.25), ("rms", 1)):
+        assert report_sigma(15e-6, kind) == pytest.approx(15e-6 / share, rel=1e-15)
+
+
+def test_exact_same_seed_same_bytes_on_any_number_of_threads():
+    code = ("import hashlib; from patchfem.surface.synthetic import report_area, report_trace; "
+            "z = report_area((320, 320), 3.2e-6, 11)[2].tobytes() + report_trace(1e-3, 500, 11).z.tobytes(); "
+            "print(hashlib.sha256(z).hexdigest())")
+    root = str(Path(patchfem.__file__).parents[1])
+    seen = {subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root,
+                           env={**os.environ, "OPENBLAS_NUM_THREADS": threads}).stdout for threads in ("1", "2")}
+    z = report_area((320, 320), 3.2e-6, 11)[2].tobytes() + report_trace(1e-3, 500, 11).z.tobytes()
+    assert seen == {hashlib.sha256(z).hexdigest() + "\n"}
+    assert report_area((320, 320), 3.2e-6, 12)[2].tobytes() != z[:320 * 320 * 8]
+
+
 @pytest.mark.parametrize("make, message", [
+    (lambda x: report_sigma(1e-6, "pv"), "amplitude_kind 'pv' is not known; use peak-to-valley, zero-to-peak, rms"),
+    (lambda x: report_sigma(-1e-6, "rms"), "a length of zero or more, not -1e-06"),
+    (lambda x: report_area((320, 320), 5e-6, 0), "want a step of 4 um at most and a size of 80 um at least, not 5 um"),
+    (lambda x: report_trace(50e-6, 50, 0), "not 1 um and 50 um"),
+    (lambda x: report_trace(np.nan, 50, 0), "report_trace: a size and a step above zero"),
     (lambda x: waves(x, [1], [1, 2]), "waves: 1 amplitudes, 2 wavelengths, 1 phases"),
     (lambda x: waves(x, [1], [0]), "waves: wavelengths are above zero"),
     (lambda x: waves(x, [np.nan], [1]), "amplitudes of a made trace are a list of finite numbers"),

@@ -1,0 +1,173 @@
+"""Two rough surfaces that wear each other under a stroke, each passing over the other."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import PatchfemError, frozen_array
+
+BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
+CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
+FINEST = 1e-9  # of the largest height; less is too near the round-off of heights to be taken off at once
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rubbed:
+    """Two surfaces after wear, lower and upper (m, n) [m], and the cycles there and back that were computed."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    cycles: int
+
+
+def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: float, *, upper_share: float = 0.5,
+        bite: float | None = None) -> Rubbed:
+    """Let two periodic rough surfaces rub along x, from -stroke to +stroke and back, until they have lost `worn`.
+
+    lower, upper: heights (m, n) [m], x along the rows, each seen from outside (peaks are material), both in the
+    coordinates of the patch; (1, n) are two traces. step: of the raster [m]; stroke: amplitude of the slide [m], whole
+    steps, half a period at most; worn: mean depth that both lose together [m]; upper_share: what the upper one loses.
+
+    The upper piece moves by u, the gap is D - lower(x) - upper(x - u). Under a constant load Archard's law takes equal
+    volumes from equal paths, wherever the stroke is and however fast it passes. So D sinks at each place until the mean
+    overlap is the volume wanted, and each overlap is taken off both pieces there, and nowhere else. The ends of the
+    stroke are passed once in a cycle, all other places twice. This is the limit of rigid pieces, in which wear does not
+    depend on the law of pressure: among the points that touch, the pressure becomes such that they wear and still
+    touch. Elastic flattening is left out: the mean pressure of the rig is 4e-5 of the 18 GPa that would flatten its
+    80 um waves, and no pressure is limited to a hardness. Nor are there debris, fracture, or a tilt of the pieces.
+
+    bite: mean depth taken at once [m], a thousandth of the combined root mean square height by default. The error falls
+    like its power 1/2 to 1: a third of the default changes the band ratio of the report's surfaces by 0.001 at a stroke
+    of 6.4 um, 0.003 at 12.8 um, 0.02 at 102 um. The places u and -u are worn together, half of each overlap at a time,
+    so that mirrored surfaces give mirrored results. Volumes are exact to round-off. 320 by 320 points: 2 s for 12 um.
+
+    PatchfemError for surfaces of unlike shape, a stroke off the raster, depths below zero or below round-off.
+    """
+    low, up = _surfaces(lower, upper)
+    reach = _reach(stroke, step, low.shape[1])
+    if not (np.isfinite(worn) and worn >= 0 and 0 <= upper_share <= 1 and (bite is None or bite > 0)):
+        raise PatchfemError("worn is a depth of zero or more, upper_share lies between 0 and 1, bite is above zero")
+    if worn == 0:
+        return Rubbed(frozen_array(low), frozen_array(up), 0)
+    places = [0, *range(1, reach), reach, *range(reach - 1, 0, -1), 0] if reach else [0]
+    visits = sum(2 if place else 1 for place in places)
+    bite = bite or BITE * np.hypot(low.std(), up.std()) or worn  # two flat surfaces lose all at once
+    cycles = int(np.ceil(worn / (visits * bite)))
+    depth = worn / (cycles * visits)
+    if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
+        raise PatchfemError(f"a depth of {depth:.2g} m at a time is lost in the round-off of the heights; use a larger "
+                            "bite, or surfaces about zero")
+    pair = _Pair(low, up, upper_share)
+    for _ in range(cycles):
+        for place in places:
+            pair.wear(place, depth)
+    return Rubbed(frozen_array(pair.low), frozen_array(pair.up), cycles)
+
+
+class _Pair:
+    """Both surfaces while they wear, and the approach at each place of the stroke: the start of the next search."""
+
+    def __init__(self, low, up, upper_share: float):
+        self.low, self.up = low, up
+        self.shares = 1 - upper_share, upper_share
+        self.approach = {}
+        self.overlaps = np.empty_like(low), np.empty_like(low)
+        self.sum = np.empty_like(low)
+
+    def wear(self, place: int, depth: float) -> None:
+        """Take a mean `depth` [m] off both together with the upper piece at `place` steps, and as much at -place."""
+        there, back = self.overlaps
+        if place == 0:
+            self.overlap(0, depth, there)
+            self.take(there, there)
+            return
+        self.overlap(place, 2 * depth, there)
+        self.overlap(-place, 2 * depth, back)
+        there *= 0.5  # half of twice the depth: a point that touches in both places loses its overlap, not more
+        back *= 0.5
+        _shifted_sum(there, back, -2 * place, self.sum)  # in the frame of the upper piece at -place
+        there += back
+        self.take(there, np.roll(self.sum, place, axis=1))
+
+    def overlap(self, place: int, depth: float, out) -> None:
+        """Overlap (m, n) [m] with the upper piece at `place` into `out`; its mean is `depth`."""
+        _shifted_sum(self.up, self.low, place, self.sum)
+        self.approach[place] = overlap_of(self.sum, depth, self.approach.get(place), out)
+
+    def take(self, off_lower, off_upper) -> None:
+        self.low -= self.shares[0] * off_lower
+        self.up -= self.shares[1] * off_upper
+
+
+def overlap_of(heights: np.ndarray, depth: float, start: float | None, out: np.ndarray) -> float:
+    """Approach D [m] at which the mean of max(heights - D, 0) is `depth` > 0; these overlaps go into `out`.
+
+    heights (m, n) [m]: of both pieces together; start: a guess of D. Newton's method on a convex, falling, piecewise
+    linear function: from its first step on it comes from below, never passes D, and ends after finitely many steps.
+    """
+    approach = heights.max() - depth if start is None else start
+    wanted = heights.size * depth
+    while True:
+        np.maximum(heights, approach, out=out)
+        out -= approach
+        over, above = out.sum() - wanted, np.count_nonzero(out)
+        if abs(over) <= CLOSE * wanted:
+            out *= wanted / (over + wanted)
+            return approach
+        approach = approach + over / above if above else heights.max() - depth
+
+
+def _shifted_sum(moved, fixed, by: int, out) -> None:
+    """moved(x - by) + fixed(x), periodic along the rows, into `out`."""
+    n = moved.shape[1]
+    by %= n
+    np.add(fixed[:, by:], moved[:, :n - by], out=out[:, by:])
+    if by:
+        np.add(fixed[:, :by], moved[:, n - by:], out=out[:, :by])
+
+
+def _surfaces(lower, upper) -> tuple:
+    low, up = np.array(lower, float, order="C"), np.array(upper, float, order="C")
+    if low.ndim != 2 or low.shape != up.shape or not low.size or not np.isfinite([low, up]).all():
+        raise PatchfemError("two rough surfaces want finite heights on one and the same raster, "
+                            f"not {low.shape} and {up.shape}")
+    return low, up
+
+
+def _reach(stroke: float, step: float, points: int) -> int:
+    """The stroke in steps."""
+    if not (np.isfinite([stroke, step]).all() and step > 0 and stroke >= 0):
+        raise PatchfemError(f"a stroke of zero or more and a step above zero are wanted, not {stroke:g} and {step:g} m")
+    reach = round(stroke / step)
+    if abs(stroke - reach * step) > 1e-6 * step or 2 * reach > points:
+        raise PatchfemError(f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: it is made of "
+                            f"whole steps, the nearest {reach * step:g} m, and half a period is the most")
+    return reach
+
+
+def band_amplitude(z: np.ndarray, step: float, axis: int, low: float = 60e-6, high: float = 110e-6) -> np.ndarray:
+    """Amplitude [m] of the sine with the mean square of the waves from `low` to `high` [m] long, of every trace.
+
+    z: heights (m, n) [m], periodic; axis: 1 for the m traces along x, 0 for the n traces along y. Over whole periods no
+    window is needed. The root mean square of the result is that of the whole area.
+    """
+    count = z.shape[axis]
+    frequency = np.fft.rfftfreq(count, step)
+    power = np.abs(np.fft.rfft(z, axis=axis) / count) ** 2
+    inside = (frequency >= (1 - 1e-9) / high) & (frequency <= (1 + 1e-9) / low)
+    return np.sqrt(4 * np.compress(inside, power, axis=axis).sum(axis=axis))
+
+
+def anisotropy(z: np.ndarray, step: float) -> dict:
+    """Ratios x over y [1] of a periodic area (m, n) [m], and its skewness: "band", "rq", "slope", "ssk".
+
+    band: of the `band_amplitude`, root mean square over all traces; rq: of the mean root mean square height of a trace
+    about its own mean; slope: of the root mean square of central differences; ssk: skewness of the area.
+    """
+    def along(axis):
+        band = np.sqrt((band_amplitude(z, step, axis) ** 2).mean())
+        return band, z.std(axis=axis).mean(), np.sqrt(((np.roll(z, -1, axis) - np.roll(z, 1, axis)) ** 2).mean())
+
+    ratios = [float(x / y) for x, y in zip(along(1), along(0))]
+    level = z - z.mean()
+    return dict(zip(("band", "rq", "slope"), ratios)) | {"ssk": float((level**3).mean() / level.std() ** 3)}
