@@ -6,7 +6,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..effects import unbuilt
 from .shared import Json, NotReached, Out, Quiet, Refused, Sets, progress_bar, say, scene_of
 
 
@@ -16,19 +15,25 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
         fresh: Annotated[bool, Parameter(negative=())] = False,
         quiet: Quiet = False,
         verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
-    """Run SCENE and write its results folder, by default out/<scene name>; --fresh ignores kept operators."""
-    if resume:
-        raise Refused(unbuilt("run: --resume", "run the scene again"))
+    """Run SCENE and write its results folder, by default out/<scene name>; --resume goes on with an interrupted run
+    that has [wear]; --fresh ignores kept operators."""
     from ..export.folder import run_into
     from ..runs.plan import plan as make
 
     talk = (lambda text: None) if quiet else say
     what = make(scene_of(scene, set_))
+    if resume and (what.model.wear is None or what.model.patch is None):
+        raise Refused("run --resume: only a run with [wear] on a patch keeps its state; run the scene again")
     if verbose:
         talk(f"about {what.seconds:.1f} s, {what.steps} steps, engine {what.engine}")
     target = out if out is not None else Path("out") / what.model.source.path.stem
     with progress_bar(quiet or json_) as progress:
-        answer = run_into(what, target, talk, progress, fresh)
+        try:
+            answer = run_into(what, target, talk, progress, fresh, resume)
+        except KeyboardInterrupt:
+            if (target.with_name(target.name + ".partial") / "wear.npz").is_file():
+                talk(f"{target}: the wear so far is kept; go on with --resume")
+            raise
     if json_:
         print(json.dumps(answer, ensure_ascii=False))
     else:

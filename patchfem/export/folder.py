@@ -14,11 +14,11 @@ from ..response.events import MEANINGS
 from ..response.levels import KEPT
 from ..response.rows import TABLE
 from ..runs.results.result import Result
-from ..runs.run import run
+from ..runs.run import Kept, run
 from ..structure.drive_sizes import largest
 from . import netcdf
 from .report import picture, write_report
-from .results import Folder
+from .results import STATE, Folder
 from .summary import summary, write_json
 
 LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
@@ -64,14 +64,16 @@ def effects_of(result: Result) -> list:
     return out
 
 
-def run_into(what, target: Path, say=None, progress=None, fresh: bool = False) -> dict:
+def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False) -> dict:
     """Run a plan into the results folder `target` and return its summary.
 
     The folder is claimed first. An older folder of results is replaced only when the new one is whole, and a folder
-    with other files is refused before anything runs.
+    with other files is refused before anything runs. A run with [wear] keeps its state in the folder, from which it
+    goes on with `resume`; PatchfemError where there is none.
     """
-    with Folder(target) as folder:
-        result = run(what, say, progress, fresh=fresh)
+    with Folder(target, resume) as folder:
+        kept = Kept(folder.path / STATE, resume) if what.model.wear is not None else None
+        result = run(what, say, progress, fresh=fresh, kept=kept)
         return write(result, folder.path)
 
 

@@ -10,21 +10,23 @@ from pathlib import Path
 from ..core import Missing, PatchfemError
 
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml", "fields.pvd",
-         "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml")
+         "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz")
 LOCK = ".writer"
+STATE = "wear.npz"  # of an interrupted run, from which it goes on
 
 
 class Folder:
     """Context of a results folder, which is claimed at entry.
 
-    `path` is the partial folder to write into. Leaving without an error renames it, leaving with one removes it.
-    PatchfemError for a target that holds other files or is in use, Missing where it cannot be written.
+    `path` is the partial folder to write into. Leaving without an error renames it, leaving with one removes it but for
+    a kept STATE, which `resume` leaves in place at the next entry. PatchfemError for a target that holds other files or
+    is in use, Missing where it cannot be written.
     """
 
-    def __init__(self, target: Path):
+    def __init__(self, target: Path, resume: bool = False):
         self.target = Path(os.path.abspath(target)).resolve()
         self.path = self.target.with_name(self.target.name + ".partial")
-        self.shown = target
+        self.shown, self.resume = target, resume
 
     def __enter__(self) -> "Folder":
         if Path.cwd().is_relative_to(self.target):
@@ -32,9 +34,9 @@ class Folder:
         for place in (self.target, self.path):
             _only_ours(place, self.shown)
         try:
-            if self.path.exists():
+            if self.path.exists() and not self.resume:
                 shutil.rmtree(self.path)
-            self.path.mkdir(parents=True)
+            self.path.mkdir(parents=True, exist_ok=True)
             (self.path / LOCK).write_text(str(os.getpid()))
         except OSError as error:
             raise Missing(f"{self.shown}: the results folder cannot be made ({error.strerror})") from None
@@ -42,9 +44,10 @@ class Folder:
 
     def __exit__(self, kind, value, trace) -> None:
         if kind is not None:
-            shutil.rmtree(self.path, ignore_errors=True)
+            self._abandon()
             return
         try:
+            (self.path / STATE).unlink(missing_ok=True)
             (self.path / LOCK).unlink()
             old = self.target.with_name(f".{self.target.name}.old{os.getpid()}")
             if self.target.exists():
@@ -54,6 +57,16 @@ class Folder:
         except OSError as error:
             raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
                           f"{self.path.name} beside it") from None
+
+
+    def _abandon(self) -> None:
+        """Remove everything but a kept state; the folder too where there is none."""
+        if not (self.path / STATE).is_file():
+            shutil.rmtree(self.path, ignore_errors=True)
+            return
+        for part in self.path.iterdir():
+            if part.name != STATE:
+                shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
 
 
 def _only_ours(place: Path, shown) -> None:

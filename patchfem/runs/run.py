@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 from ..core import Measure, Outcome
 from ..model.model import Model
@@ -10,26 +12,35 @@ from ..model.source import placed
 from .plan import Plan, plan, refuse_size
 from .results.result import Result, worded
 
-__all__ = ["Plan", "Result", "plan", "run"]
+__all__ = ["Kept", "Plan", "Result", "plan", "run"]
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
          "linear": "rig.rig coupled"}  # the function that runs it, imported when it is wanted
 
 
-def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False) -> Result:
+class Kept(NamedTuple):
+    """Where the state of a long run is kept, and whether to go on from it."""
+
+    path: Path
+    resume: bool
+
+
+def run(what, say=None, progress=None, per_point: bool = False, estimate: bool = True, fresh: bool = False,
+        kept: Kept | None = None) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
     say: called with one line when compiled code has to be made; progress: called with the share of the main pass that
     is done. per_point forces the path of every interface point where one lumped point would do; estimate=False skips
-    the coarser runs and leaves the errors None; fresh condenses the pieces anew. NotConverged and Missing as named by
+    the coarser runs and leaves the errors None; fresh condenses the pieces anew; kept: where the state of a
+    run with [wear] is kept on the way. NotConverged and Missing as named by
     the stages.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
     with placed(what.model.source):
         refuse_size(what)
-        return _run(what, say, progress, per_point, estimate, fresh)
+        return _run(what, say, progress, per_point, estimate, fresh, kept)
 
 
-def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool) -> Result:
+def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: Kept | None) -> Result:
     begin, model = perf_counter(), what.model
     seconds, warnings = {}, list(model.source.remarks)
     patch, coarse = None, (None, None)
@@ -55,9 +66,9 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     else:
         evolved = None
         if model.wear is not None and patch is not None:
-            from .wear.evolve import evolve
+            from .wear.keep import evolved_with
 
-            evolved = evolve(model, patch, coarse, progress)
+            evolved = evolved_with(kept, model, patch, coarse, progress)
             patch, coarse = evolved.patch, evolved.coarse
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)

@@ -419,7 +419,7 @@ def test_refuses_keys_not_yet_built(written, tmp_path, sets):
 
 def test_refuses_resume_and_a_mesh_without_a_patch(written, tmp_path):
     scene = written(POINT + COULOMB + STRUCTURE)
-    assert "not yet built" in cli("run", scene, "--resume").err
+    assert "only a run with [wear]" in cli("run", scene, "--resume").err
     assert cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
     exact = cli("run", written(POINT + NONLOCAL + STRUCTURE), "--set", "accuracy.method=exact", "-o", tmp_path / "o")
     assert exact.code == 2 and "no exact solution" in exact.err

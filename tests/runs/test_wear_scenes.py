@@ -1,5 +1,7 @@
 """Scenes with [wear]: volumes in closed form, the patch after wear, shakedown, what is refused and what is written."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from patchfem.closed_forms import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.runs.wear import evolve, keep
 from patchfem.scene.scene import loads
 from patchfem.slip.partial_slip import Step, advance, operators_of, start
 from patchfem.wear.jumps import Wearing, after
@@ -169,3 +172,48 @@ def test_exact_a_scene_without_wear_imports_nothing_of_it(tmp_path):
     scene.write_text(TILTED + COULOMB + SINE)
     code = "import json, sys, patchfem as pf; pf.run(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
     assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear"))}
+
+
+@pytest.mark.parametrize("text, sets", [(TILTED + COULOMB + SINE + WEAR, ()),
+                                        (SOFT_RIG + WEAR, ("--set", "accuracy.tolerance=2e-2"))], ids=["bench", "rig"])
+def test_exact_an_interrupted_run_goes_on_to_the_same_bits(tmp_path, monkeypatch, text, sets):
+    scene = tmp_path / "worn.toml"
+    scene.write_text(text)
+    assert cli("run", scene, "-o", tmp_path / "whole", "-q", *sets).code == 0
+    calls = []
+
+    def interrupted(path, key, state, moments):
+        keep.save(path, key, state, moments)
+        calls.append(state.cycle)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(keep, "evolved_with", lambda kept, model, patch, coarse, progress: evolve.evolve(
+            model, patch, coarse, progress, None,
+            lambda state, moments: interrupted(kept.path, keep.key_of(model, patch), state, moments)))
+        answer = cli("run", scene, "-o", tmp_path / "out", *sets)
+    assert answer.code == 130 and "--resume" in answer.err
+    assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]
+    other = cli("run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N", *sets)
+    assert other.code == 2 and "another scene" in other.err
+    assert cli("run", scene, "-o", tmp_path / "out", "-q", "--resume", *sets).code == 0
+    one, two = (json.loads((tmp_path / name / "summary.json").read_text())["measures"] for name in ("whole", "out"))
+    assert one == two
+    with xr.open_dataset(tmp_path / "whole" / "result.nc", engine="h5netcdf") as a, \
+            xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as b:
+        assert a.worn_depth.equals(b.worn_depth) and a.wear_pressure_peak.equals(b.wear_pressure_peak)
+    assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
+
+
+def test_refuses_to_go_on_where_nothing_is_kept(tmp_path):
+    scene = tmp_path / "worn.toml"
+    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
+    assert answer.code == 2 and "no interrupted run" in answer.err
+    (tmp_path / "out.partial").mkdir(exist_ok=True)
+    (tmp_path / "out.partial" / "wear.npz").write_bytes(b"PK nothing")
+    answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
+    assert answer.code == 2 and "cannot be read" in answer.err and "Traceback" not in answer.err
+    scene.write_text(TILTED + COULOMB + SINE)
+    assert cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2

@@ -1,0 +1,66 @@
+"""The state of a wear run on disk, from which an interrupted run goes on to the same bits."""
+
+import hashlib
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ... import __version__
+from ...core import PatchfemError
+from ...wear.jumps import Worn
+from .evolve import Evolved, Moment, evolve
+
+STATE = tuple(Worn.__slots__)
+MOMENT = ("cycle", "depth", "used", "pressure", "gap")
+
+
+def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
+    """`evolve` with its state kept after every jump; kept: (path, resume), None keeps nothing."""
+    if kept is None:
+        return evolve(model, patch, coarse, progress)
+    key = key_of(model, patch)
+    begin = load(kept.path, key) if kept.resume else None
+    return evolve(model, patch, coarse, progress, begin, lambda state, moments: save(kept.path, key, state, moments))
+
+
+def key_of(model, patch) -> str:
+    """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, the version of the program."""
+    text = "\n".join((__version__, model.source.resolved)).encode()
+    return hashlib.sha256(text + patch.x.tobytes() + np.asarray(patch.gap).tobytes()).hexdigest()
+
+
+def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
+    """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
+    names = sorted(moments[-1].values)
+    arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
+    arrays |= {f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT}
+    values = np.array([[one.values[name] for name in names] for one in moments], float)
+    partial = path.with_name(path.name + ".partial")
+    with open(partial, "wb") as file:
+        np.savez(file, key=np.array(key), names=np.array(names), values=values, **arrays)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(partial, path)
+
+
+def load(path: Path, key: str) -> tuple:
+    """(state, moments) of a kept file. PatchfemError where it belongs to another scene or cannot be read."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            found = {name: file[name] for name in file.files}
+        if str(found["key"]) != key:
+            raise PatchfemError(f"{path.parent.name}: what is kept there belongs to another scene or version; run "
+                                "without --resume")
+        whole = {name: found[f"state_{name}"] for name in STATE}
+        state = Worn(**{name: float(value) if value.ndim == 0 else value for name, value in whole.items()})
+        names = [str(name) for name in found["names"]]
+        columns = [found[f"moment_{name}"] for name in MOMENT]
+        moments = tuple(Moment(float(row[0]), *row[1:], dict(zip(names, map(float, values))))
+                        for *row, values in zip(*columns, found["values"], strict=True))
+    except FileNotFoundError:
+        raise PatchfemError(f"{path.parent.name}: no interrupted run is kept there; run without --resume") from None
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        raise PatchfemError(f"{path.parent.name}: the kept state cannot be read ({error}); run without "
+                            "--resume") from None
+    return state, moments
