@@ -185,6 +185,12 @@ def report_data(result: Result) -> dict:
             "x": None if result.patch is None else result.patch.x, "versions": versions()}
     if "curve" in result.extra:
         data["curve"] = result.extra["curve"]
+    if "wear" in result.extra:
+        count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
+        data["wear"] = {"history": result.extra["wear"], "period": period,
+                        "states": {name: rows[:count + 1] for name, rows in result.fields.items()}}
+        data["fields"] = {name: rows[count:] for name, rows in result.fields.items()}
+        data["fields"]["time"] = data["fields"]["time"] - data["fields"]["time"][0]
     if "levels" in result.extra:
         data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors}
                           for one in result.extra["levels"]]

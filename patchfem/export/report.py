@@ -194,6 +194,19 @@ def _levels(data: dict) -> Picture | None:
                    "to the next; arrows show the order of the test.")
 
 
+def _wear(data: dict) -> Picture | None:
+    if "wear" not in data:
+        return None
+    from .drawing import wear
+
+    states, history = data["wear"]["states"], data["wear"]["history"]
+    profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], states["worn_depth"])
+    return Picture(wear.wear, (data["x"], *profiles, history),
+                   f"The patch as it wears over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
+                   "pieces together, and measures of patch and motion over their values on the new patch. All other "
+                   "pictures show the worn patch.")
+
+
 def _interface(data: dict) -> Picture | None:
     if not pressed(data):
         return None
@@ -271,7 +284,7 @@ def _measured(data: dict) -> Picture | None:
 
 
 # in the order of the page
-PICTURES = {"curve": _curve, "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop,
+PICTURES = {"wear": _wear, "curve": _curve, "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop,
             "history": _histories, "measured": _measured}
 
 

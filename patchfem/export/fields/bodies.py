@@ -13,7 +13,7 @@ from .vtkhdf import bodies, write_series
 def write_fields(result, path: Path) -> dict:
     """Write both bodies and the interface of one pair, frame by frame.
 
-    Returns the pressed state for the report's picture, which is drawn for tensor grids only.
+    Returns the pressed state for the report's picture, after all wear; it is drawn for tensor grids only.
     """
     patch, fields = result.patch, result.fields
     times = fields["time"]
@@ -32,9 +32,9 @@ def write_fields(result, path: Path) -> dict:
     write_series(path, points, blocks, times, point_data, cell_data, used)
     if not isinstance(patch.pair.piece, Piece):
         return {}
-    shape = (patch.x.size - 1, -1)
+    shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
     return {"depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
-            "mises": [body["mises"][0].reshape(shape) for body in (low, high)]}
+            "mises": [body["mises"][shown].reshape(shape) for body in (low, high)]}
 
 
 def _moved(interface: dict, x, nodes) -> dict:

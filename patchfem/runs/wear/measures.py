@@ -23,9 +23,12 @@ def worn(result, found, estimate: bool = True):
     warnings = [*result.warnings, *([found.stopped] if found.stopped else [])]
     if found.state is None:
         return replace(result, seconds=seconds, warnings=warnings)
-    return replace(result, measures=result.measures | of_patch(found, result.measures, estimate),
-                   fields=frames(found, result.fields, period_of(model, result)), seconds=seconds,
-                   warnings=[*warnings, *_deep(model, found)], extra=result.extra | {"wear": history(found)})
+    period = period_of(model, result)
+    fields = frames(found, result.fields, period)
+    shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
+    return replace(result, measures=result.measures | of_patch(found, result.measures, estimate), fields=fields,
+                   seconds=seconds, warnings=[*warnings, *_deep(model, found)],
+                   extra=result.extra | {"wear": history(found), "wear_shown": shown})
 
 
 def period_of(model, result) -> float:

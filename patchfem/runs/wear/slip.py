@@ -103,8 +103,17 @@ def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
     if closed:
         local, tau = (np.concatenate([part[-1:], part]) for part in (local, tau))
     steps = np.abs(np.diff(local, axis=0))
-    if not model.wear.energy:
-        return steps.sum(axis=0)
     sigma = patch.pressure.sigma_n
-    work = np.sum(steps * (np.abs(tau[1:]) + np.abs(tau[:-1])) / 2, axis=0)
-    return np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
+    path = steps.sum(axis=0)
+    if model.wear.energy:
+        work = np.sum(steps * (np.abs(tau[1:]) + np.abs(tau[:-1])) / 2, axis=0)
+        path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
+    return path[_nearest(patch.x, sigma > 0)]
+
+
+def _nearest(x, active) -> np.ndarray:
+    """Number (m,) of the nearest node in contact; one that comes into contact during a jump slides as its neighbour."""
+    touching = np.flatnonzero(active)
+    if not touching.size:
+        return np.arange(x.size)
+    return touching[np.abs(x[:, None] - x[touching]).argmin(axis=1)]
