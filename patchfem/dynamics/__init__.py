@@ -6,5 +6,6 @@ Newmark, Euler). Read `propagator` first: exact modal steps that all of them sha
 
 The friction force of a patch over a step comes from `contacts/`, called by the loops of `march/`: for rigid pieces
 `element_kernels.solve` (the sum over points stands in the law, `friction.laws.stretch_kernels.mean`), for elastic ones
-`shear_kernels`, for lists of bonds `list_kernels.pulled`; `runs/rig/interface` chooses among them.
+`shear_solve_kernels.descend`, whether the load stays or changes, for lists of bonds `list_kernels.pulled`;
+`runs/rig/interface` chooses among them.
 """
