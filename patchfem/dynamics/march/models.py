@@ -55,8 +55,8 @@ class ContactModel:
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}
-        if form == "points":
-            return {"bonds": bonds_of(contact.mem[0]).copy()}
+        if form in ("points", "places"):
+            return {"bonds": bonds_of(self.element, contact.mem[0]).copy()}
         return {"bonds": contact.points[:5].copy(), "b": contact.b.copy()} if hasattr(contact, "psi") else {}
 
     def build(self, hub=None):
