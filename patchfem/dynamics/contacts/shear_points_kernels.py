@@ -47,7 +47,7 @@ def bond_end(m, z, dq, sigma, eps):
     return z1, sigma - young * e - g * z1 / eps
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def respond(kind, ending, c):
     """Write force [N] and slope [N/m] >= 0 of every point at its slide; returns the friction force [N]."""
     points, weight, length = c.points, c.weight, c.eps[0 if ending else 1]

@@ -17,7 +17,7 @@ from ..modal_kernels import safe_point
 from .shear_points_kernels import FORCE, SLIDE, SLOPE, respond
 
 GRADIENT, STEP, TRIAL = range(3)
-TIGHT = 0.001  # share of the goal down to which a residual is brought
+SLACK = 100.0  # times the goal: a residual that round-off keeps from falling further is taken below it
 
 
 @njit(error_model="numpy", **LEAN)
@@ -26,7 +26,7 @@ def halfway(v, dt, c):
     c.eps[1] = grow(c.eps[0], v, v, abs(v) * dt / 2, dt / 2, c.growth)[0]
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def slid(q, moved, c):
     """Write the slides [m] of the points where the holder slides by q and the coordinates move by `moved` (r,)."""
     psi, points, count = c.psi, c.points, int(c.count[0])
@@ -38,7 +38,7 @@ def slid(q, moved, c):
             points[SLIDE, j] -= psi[k, j] * part
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def gradient(y, free, beta, kind, ending, c, out):
     """Residual (1 + r,) at y = (dq, db); beta = 0 or `ending`: the slide is given. Returns the friction force [N]."""
     psi, points, count, part = c.psi, c.points, int(c.count[0]), 1.0 if ending else 0.5
@@ -53,7 +53,7 @@ def gradient(y, free, beta, kind, ending, c, out):
     return force
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def hessian(beta, ending, c, hess):
     """Lower half of the Hessian (1 + r, 1 + r) at the slopes of the points, over their forces."""
     psi, points, count, given, total = c.psi, c.points, int(c.count[0]), ending or beta == 0.0, 0.0
@@ -86,7 +86,7 @@ def weighted(out, scale):
 @njit(error_model="numpy", **LEAN)
 def descend(free, beta, kind, ending, c, goal):
     """Minimum over c.y[ending] = (dq, db) in place, from the guess in it, where dq = free - beta force, dq = free for
-    beta = 0. Returns (force [N], iterations), < 0: failed.
+    beta = 0. goal [N]: of the residual. Returns (force [N], iterations), < 0: failed.
 
     The factor of a Hessian serves all solves of a step of the march, until one with it gains less than a factor of ten.
     """
@@ -97,7 +97,7 @@ def descend(free, beta, kind, ending, c, goal):
     noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
     stale, stall = True, 0
     for count in range(1, 200):
-        if size <= max(TIGHT * goal, noise + 4e-16 * abs(force)):
+        if size <= max(goal, noise + 4e-16 * abs(force)):
             return force, count
         if c.ready[which] == 0.0:
             hessian(beta, ending, c, hess)
@@ -128,7 +128,7 @@ def descend(free, beta, kind, ending, c, goal):
         least = min(least, new)
         stale = c.ready[which] == 1.0
         size = new
-        if stall >= 4 and size <= goal:
+        if stall >= 4 and size <= SLACK * goal:
             return force, count
     return force, -200
 
