@@ -5,6 +5,7 @@ rigs, `march/` steps any law, `harmonic/` finds steady motions, `comparison/` ha
 Newmark, Euler). Read `propagator` first: exact modal steps that all of them share.
 
 The friction force of a patch over a step comes from `contacts/`, called by the loops of `march/`: for rigid pieces
-`element_kernels.solve` (the sum over points stands in the law, `friction.laws.stretch_kernels.mean`), for elastic ones
-`shear_kernels`, for lists of bonds `list_kernels.pulled`; `runs/rig/interface` chooses among them.
+`element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones
+`shear_solve_kernels.descend`, whether the load stays or changes, for lists of bonds `list_kernels.pulled`;
+`runs/rig/interface` chooses among them.
 """

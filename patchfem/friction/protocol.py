@@ -41,8 +41,8 @@ class Element(NamedTuple):
     kernels: module of its compiled form in this package; numbers (k,), the first one free, and memory (l,) at the
     start; limit: largest force [N], or the size of the force where none is largest; length [m]: slide over which it
     stretches before it slips, 0 where nothing stretches; bounded: whether no force exceeds the limit. form: what the
-    memory is made of, for engines that look inside: "parallel" elements side by side, "points" of bonds, "speed" alone
-    and no memory, "flow" of one number, or "".
+    memory is made of, for engines that look inside: "parallel" elements side by side, "points" of bonds, "places" of
+    bonds under the pressure of the lower piece, "speed" alone and no memory, "flow" of one number, or "".
     """
 
     kernels: str

@@ -4,8 +4,8 @@ All of accuracy. Of the times (CPU seconds of one core, a busy machine, least of
 engine: 1.6 us for a cycle of stick-slip in a long run (wanted 3), 1400 to 1600 times less than DOP853 with events at
 1e-8 and 650 to 850 times less than the fastest CVODE run (300), 19 ms for 200 cycles in plain Python (20), 6.8 us for
 a steady point (10, 80 times less than its plain form). Of the march 195 ns per step for 100 elements on five modes
-(200; 300 with the samples and energies that a run keeps), 185 ns for 30 elements on ten modes (300), 0.74 us for 200
-points of bonds on ten modes (3) and 11 us with 16 shear modes (15). Harmonic balance of 100 elements with 15 harmonics
+(200; 300 with the samples and energies that a run keeps), 185 ns for 30 elements on ten modes (300), 0.30 us for 200
+points of bonds on ten modes (3) and 10 us with 16 shear modes (15). Harmonic balance of 100 elements with 15 harmonics
 takes 1.2 ms a point (5), 12 to 25 times less than 200 cycles of the march.
 
 Run: python studies/targets/dynamics.py [--alone]      (--alone: without the peers that are not Python's own)

@@ -9,9 +9,9 @@ from mpmath import mp
 from patchfem.friction.bonds import list_sum_kernels, point_kernels, recursion
 from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
 from patchfem.friction.bonds.recursion import advance, shape_functions
-from patchfem.friction.laws import elastic_plastic_kernels
+from patchfem.friction.laws import elastic_plastic_kernels, stretch_kernels
 from patchfem.friction.laws.elastic_plastic import parallel
-from patchfem.friction.laws.stretch import growth_numbers
+from patchfem.friction.laws.stretch import bonds_of, growth_numbers, points_element
 
 # ---- bond points
 
@@ -110,15 +110,21 @@ def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
 @pytest.mark.parametrize("eps", [1.0, 0.02])
 def test_exact_rigid_points_are_single_points_together(eps):
     rng = np.random.default_rng(5)
-    weight, sigma = rng.uniform(0.1, 2, 7), rng.uniform(0, 3, 7)
-    bonds = np.concatenate([np.stack([0.6 * sigma, 0.2 * sigma, 0.3 * sigma]), np.zeros((1, 7))])
+    area, sigma, q = rng.uniform(0.1, 2, 7), rng.uniform(0, 3, 7), 0.0
+    element = points_element(Bonds(0.3, eps, initial=0.6), area, sigma)
+    num, mem = element.numbers[None], element.memory[None].copy()
+    weight, bonds = 0.3 * area / eps, np.stack([0.6 * sigma, 0 * sigma, 0 * sigma]).T
     for dq in (0.3, -0.01, -2.0, 0.0):
-        moved = np.array([point_kernels.bond_step(*bonds[:3, j], dq, sigma[j], eps) for j in range(7)])
-        slide = bonds[3] + dq
-        assert point_kernels.rigid_step(dq, weight, bonds, sigma, eps) == pytest.approx(weight @ moved[:, 3] / 2,
-                                                                                        abs=1e-14)
-        assert bonds[:3].T == pytest.approx(moved[:, :3], rel=1e-13, abs=1e-15)
-        assert bonds[3] == pytest.approx(slide)
+        mean = weight @ [point_kernels.bond_mean(*bonds[j, :2], dq, sigma[j], eps)[0] for j in range(7)]
+        moved = np.array([point_kernels.bond_step(*bonds[j], dq, sigma[j], eps) for j in range(7)])
+        q, bonds = q + dq, moved[:, :3]
+        assert stretch_kernels.mean(num, mem, 0, 0.0, dq, eps, 1.0)[0] == pytest.approx(mean, abs=1e-13)
+        assert stretch_kernels.commit(num, mem, 0, dq, mean, 0.0, 0.0, 1.0, eps) == pytest.approx(
+            weight @ moved[:, 3] / 2, abs=1e-14)
+        assert bonds_of(element, mem[0])[:3].T == pytest.approx(bonds, rel=1e-13, abs=1e-15)
+        assert bonds_of(element, mem[0])[3] == pytest.approx(np.full(7, q), abs=1e-15)
+        assert stretch_kernels.state(num, mem, 0, q, 0.0) == pytest.approx(
+            (weight @ bonds[:, 1], weight @ bonds[:, 2] / 2, q - bonds[0, 1] / bonds[0, 0]), abs=1e-13)
 
 
 def test_exact_gauss_nodes_of_the_kernels():

@@ -17,30 +17,41 @@ class Element(NamedTuple):
 
 
 class Sheared(NamedTuple):
-    """Bond points (m,) of the stretch reading with p = 1 behind r shear modes.
+    """Points (m,) of a law with memory behind r shear modes of the pieces.
 
-    weight = mu_s area/eps_0, bonds (4, m) = m, z, s2, local slide, and play (5, m) where bonds stretch freely over the
-    share growth[5] of their length; source (m,) [Pa]; growth (6,) of eq. 2.10; eps (2,): bond length [m] at the start
-    and in the middle of the step; modes psi (r, m), kappa (r,) [N/m], coordinates b (r,) [m]. Scratch of the solve: y =
-    (dq, db), out, trial, other, scale (1 + r,), hess (1 + r, 1 + r), points (3, m); last (2, 1 + r) two steps.
+    weight (m,) makes a traction of the law a force [N]: mu_s area/eps_0 of bonds under a load in Pa; eps (2,): bond
+    length [m] at the start and in the middle of the step; growth (6,) of eq. 2.10 and of the breakaway share; modes
+    psi (r, m), kappa (r,) [N/m], coordinates b (r,) [m]. points (9, m), rows named in `shear_points_kernels`: m, z, s2,
+    local slide and play of bonds, their load, and slide, force and slope in the step. count (1,):
+    how many of its columns, and of those of psi, are points under load. Of the solve: y (2, 1 + r) = (dq, db) of the
+    step and of what springs back, last (1 + r,) of the step before, scale (1 + r,), room (3, 1 + r), hess (2, 1 + r,
+    1 + r) with ready (2,): 1 where it is a factor.
     """
 
     weight: np.ndarray
-    bonds: np.ndarray
-    source: np.ndarray
-    growth: np.ndarray
     eps: np.ndarray
+    growth: np.ndarray
     psi: np.ndarray
     kappa: np.ndarray
     b: np.ndarray
-    y: np.ndarray
-    out: np.ndarray
-    trial: np.ndarray
-    other: np.ndarray
-    scale: np.ndarray
-    hess: np.ndarray
     points: np.ndarray
+    count: np.ndarray
+    y: np.ndarray
     last: np.ndarray
+    scale: np.ndarray
+    room: np.ndarray
+    hess: np.ndarray
+    ready: np.ndarray
+
+
+def sheared(weight, length: float, growth, psi, kappa) -> dict:
+    """The fields of `Sheared` at rest; psi (m, r), no modes of pieces that are rigid in shear."""
+    (m, r), size = psi.shape, 1 + len(kappa)
+    return {"weight": np.array(weight, float), "eps": np.full(2, length), "growth": np.array(growth, float),
+            "psi": np.array(psi.T, order="C"), "kappa": np.array(kappa, float), "b": np.zeros(r),
+            "points": np.zeros((9, m)), "count": np.full(1, m), "y": np.zeros((2, size)), "last": np.zeros(size),
+            "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))), "room": np.zeros((3, size)),
+            "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
 
 
 class Joints(NamedTuple):

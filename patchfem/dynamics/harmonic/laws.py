@@ -298,7 +298,7 @@ def law_of_model(model):
     if model.set_valued:
         raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
                             "law = \"elastic-plastic\" with a short bond_length")
-    if form == "points" and one.numbers[2] < 0 and not one.numbers[7] and not one.kernels.endswith("lower_kernels"):
+    if form == "points" and one.numbers[2] < 0 and not one.numbers[7]:
         return Stretch(model.limit, model.length)
     raise PatchfemError("accuracy.method: \"harmonic\" takes the stretch reading with order = 1, a constant bond "
                         "length, friction.breakaway = 0 and a rigid slide; use method = \"march\"")

@@ -11,7 +11,7 @@ from numba import njit
 
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
-from ..contacts.shear_kernels import cholesky_solve
+from ..dense_kernels import eliminate, factor, solve
 
 HOLDS = 0  # of num: the law that holds without a stretch
 
@@ -79,8 +79,9 @@ def solve_smooth(j, dt):
         worst = slope_at(y, step, j, dt, hess)
         if turn > 1 and worst <= 0.1:
             return turn
-        if not cholesky_solve(hess, step):
+        if not factor(hess):
             return -turn
+        solve(hess, step)
         begin = along(0.0, y, step, trial, j, dt)
         low, high, t = 0.0, np.inf, 1.0
         for _ in range(40):
@@ -128,20 +129,10 @@ def equations(j, dt):
 @njit(error_model="numpy", **LEAN)
 def newton_turn(j, dt):
     """One Newton step on the forces of all elements at once, without a patch; False where it fails."""
-    count, system, miss = j.forces.size, j.system, j.miss
+    count, miss = j.forces.size, j.miss
     equations(j, dt)
-    for i in range(count):  # elimination with the pivots in place: 1 + slope beta leads its row for laws that resist
-        if abs(system[i, i]) < 1e-12:
-            return False
-        for k in range(i + 1, count):
-            part = system[k, i] / system[i, i]
-            for l in range(i + 1, count):
-                system[k, l] -= part * system[i, l]
-            miss[k] -= part * miss[i]
-    for i in range(count - 1, -1, -1):
-        for k in range(i + 1, count):
-            miss[i] -= system[i, k] * miss[k]
-        miss[i] /= system[i, i]
+    if not eliminate(j.system, miss):  # pivots in place: 1 + slope beta leads its row for laws that resist
+        return False
     for e in range(count):
         if not np.isfinite(miss[e]):
             return False

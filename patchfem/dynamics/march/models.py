@@ -55,9 +55,9 @@ class ContactModel:
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}
-        if form == "points":
-            return {"bonds": bonds_of(contact.mem[0]).copy()}
-        return {"bonds": contact.bonds.copy(), "b": contact.b.copy()} if hasattr(contact, "psi") else {}
+        if form in ("points", "places"):
+            return {"bonds": bonds_of(self.element, contact.mem[0]).copy()}
+        return {"bonds": contact.points[:5].copy(), "b": contact.b.copy()} if hasattr(contact, "psi") else {}
 
     def build(self, hub=None):
         """(contact, None) with arrays of their own."""
@@ -100,17 +100,10 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     if shear is None:
         return element_model(points_element(law, area, sigma, pattern))
     area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]
-    bonds, psi = np.zeros((5 if law.breakaway else 4, area.size)), np.asarray(shear.shape).T
-    bonds[0] = law.initial * sigma
-    limit, size = law.static * float(area @ sigma), 1 + shear.stiffness.size
-    weight = law.static * area / law.length
-    scale = np.append(1.0, limit / np.maximum(psi @ (weight * sigma), 1e-300))
-    scale[1:] = np.minimum(np.abs(scale[1:]), 1 / np.sqrt((psi**2).mean(axis=1)))
-    fields = {"weight": weight, "bonds": bonds, "source": sigma, "growth": growth_numbers(law),
-              "eps": np.full(2, law.length), "psi": psi, "kappa": shear.stiffness, "b": np.zeros(size - 1),
-              "y": np.zeros(size), "out": np.zeros(size), "trial": np.zeros(size), "other": np.zeros(size),
-              "scale": scale, "hess": np.zeros((size, size)), "points": np.zeros((3, area.size)),
-              "last": np.zeros((2, size))}
+    fields = arrays.sheared(law.static * area / law.length, law.length, growth_numbers(law), np.asarray(shear.shape),
+                            shear.stiffness)
+    fields["points"][[0, 5]] = law.initial * sigma, sigma  # m and load of every point
+    limit = law.static * float(area @ sigma)
     return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 
 

@@ -3,6 +3,8 @@
 Kinds: 0 Coulomb, 4 a force that follows the speed, on the resultant load; 1 elastic-plastic and 2 bonds of the stretch
 reading with p = 1, point by point under the nodal force. As on a bench: half of the change of load, the slide under
 the mean load, the other half. A changing load alone never gives energy, and no point keeps more than mu times its load.
+It leaves the points out of balance with pieces that give way in shear, which a mean alone would keep and turn about in
+every step; so a step ends with the pieces springing back while the holder stands.
 """
 
 from typing import NamedTuple
@@ -10,48 +12,43 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ...friction.bonds.point_kernels import bond_mean, bond_step, grow
+from ...friction.bonds.point_kernels import bond_step, grow
 from ...friction.flags_kernels import LEAN
+from ..contacts.shear_points_kernels import DENSITY, LOAD, PLASTIC, POINTS, SLIDE, SLOPE, SQUARE, STRETCH, respond
+from ..contacts.shear_solve_kernels import descend, halfway, slid, went_on
 from ..modal_kernels import safe_point
 
-COULOMB, PLASTIC, POINTS, RATE = 0, 1, 2, 4
+COULOMB, RATE = 0, 4
+TIGHT = 0.01  # share of the goal down to which pieces that give way are solved: their loss is a small difference
 
 
 class Rub(NamedTuple):
     """force (4,): mu_s, mu_k (v_0 of a rate law), bond length [m], initial density m_0; memory (3, m): elastic-plastic
-    traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; half (3, m): the same after half of the change of load;
-    before, now (m,): nodal forces at the ends of the step [N]; middle, eps (1,): bond length in the step and at its
-    start; growth (6,) of eq. 2.10. Pieces that give way in shear: psi (m, r), kappa (r,) [N/m], b (r,) their
-    coordinates, none of rigid ones; y (1 + r,) increments of slide and coordinates, the scratch of their solve."""
+    traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; before, now (m,): nodal forces at the ends of the step
+    [N]; modes (r, m): shear modes at all points, none of pieces that are rigid in shear; under (m,): numbers of the
+    points under load, in the order in which they come in the rest, which is as of `contacts.arrays.Sheared`; there they
+    have the memory after half of the change of load, and the mean load."""
 
     force: np.ndarray
     memory: np.ndarray
-    half: np.ndarray
     before: np.ndarray
     now: np.ndarray
-    middle: np.ndarray
+    modes: np.ndarray
+    under: np.ndarray
+    weight: np.ndarray
     eps: np.ndarray
     growth: np.ndarray
     psi: np.ndarray
     kappa: np.ndarray
     b: np.ndarray
+    points: np.ndarray
+    count: np.ndarray
     y: np.ndarray
     last: np.ndarray
-    rest: np.ndarray
+    scale: np.ndarray
     room: np.ndarray
     hess: np.ndarray
     ready: np.ndarray
-    slope: np.ndarray
-    under: np.ndarray
-    scale: np.ndarray
-
-
-@njit(error_model="numpy", **LEAN)
-def local_slide(j, dq, psi, y):
-    """Slide [m] of point j where the holder slides by dq and the pieces give way by y[1:]."""
-    for k in range(psi.shape[1]):
-        dq -= psi[j, k] * y[k + 1]
-    return dq
 
 
 @njit(error_model="numpy", **LEAN)
@@ -75,18 +72,6 @@ def press_springs(y, springs, sigma):
 
 
 @njit(error_model="numpy", **LEAN)
-def spring_mean(y, springs, sigma, dq, length):
-    """(path-mean traction/mu [N], its slope [N/m]) of one point."""
-    rate = springs / length
-    y1 = y + rate * dq
-    bound = min(max(y1, -sigma), sigma)
-    if bound == y1:
-        return 0.5 * (y + y1), 0.5 * rate
-    part = (bound - y) / (rate * dq)
-    return part * 0.5 * (y + bound) + (1 - part) * bound, 0.5 * rate * part * part
-
-
-@njit(error_model="numpy", **LEAN)
 def spring_step(y, springs, sigma, dq, length):
     """(traction/mu, springs) of one point after the slide dq under `sigma`."""
     move = springs * dq / length
@@ -98,41 +83,49 @@ def spring_step(y, springs, sigma, dq, length):
 
 
 @njit(error_model="numpy", **LEAN)
+def load_points(part, rub):
+    """Gather the points under load that share of the way through the step, their loads and the modes there."""
+    count, under, same = 0, rub.under, True
+    for j in range(rub.now.size):
+        load = (1 - part) * rub.before[j] + part * rub.now[j]
+        if load > 0.0:
+            same = same and under[count] == j
+            under[count] = j
+            rub.points[LOAD, count] = load
+            count += 1
+    if not same or rub.count[0] < count:
+        for k in range(rub.kappa.size):
+            for i in range(count):
+                rub.psi[k, i] = rub.modes[k, under[i]]
+    rub.count[0] = count
+
+
+@njit(error_model="numpy", **LEAN)
 def press_all(kind, rub):
-    """The memory after half of the change of load, in `half`."""
-    if kind == PLASTIC:
-        for j in range(rub.now.size):
-            rub.half[0, j], rub.half[1, j] = press_springs(rub.memory[0, j], rub.memory[1, j],
-                                                           0.5 * (rub.before[j] + rub.now[j]))
-    elif kind == POINTS:
-        for j in range(rub.now.size):
-            rub.half[0, j], rub.half[1, j], rub.half[2, j] = press_point(
-                rub.memory[0, j], rub.memory[1, j], rub.memory[2, j], rub.before[j],
-                0.5 * (rub.before[j] + rub.now[j]), rub.force[3], rub.force[2])
+    """The memory after half of the change of load, and the mean load, in the points."""
+    if kind == COULOMB or kind == RATE:
+        return
+    load_points(0.5, rub)
+    memory, points = rub.memory, rub.points
+    for i in range(rub.count[0]):
+        j = rub.under[i]
+        if kind == PLASTIC:
+            points[DENSITY, i], points[STRETCH, i] = press_springs(memory[0, j], memory[1, j], points[LOAD, i])
+        else:
+            points[DENSITY, i], points[STRETCH, i], points[SQUARE, i] = press_point(
+                memory[0, j], memory[1, j], memory[2, j], rub.before[j], points[LOAD, i], rub.force[3], rub.force[2])
 
 
 @njit(error_model="numpy", **LEAN)
 def rub_force(dq, kind, rub, mean, dt):
     """Path-mean friction force [N] and slope [N/m] of a rigid slide increment."""
-    mu, length = rub.force[0], rub.force[2]
     if kind == RATE:
-        part = np.tanh(dq / (dt * rub.force[1]))
+        mu, part = rub.force[0], np.tanh(dq / (dt * rub.force[1]))
         return mu * mean * part, mu * mean * (1 - part * part) / (dt * rub.force[1])
-    force, slope = 0.0, 0.0
-    if kind == PLASTIC:
-        for j in range(rub.now.size):
-            load = 0.5 * (rub.before[j] + rub.now[j])
-            if load > 0:
-                f, s = spring_mean(rub.half[0, j], rub.half[1, j], load, dq, length)
-                force += mu * f
-                slope += mu * s
-        return force, slope
-    for j in range(rub.now.size):
-        load = 0.5 * (rub.before[j] + rub.now[j])
-        if load > 0:
-            f, s = bond_mean(rub.half[0, j], rub.half[1, j], dq, load, rub.middle[0])
-            force += mu / length * f
-            slope += mu / length * s
+    slid(dq, rub.b, rub)
+    force, slope = respond(kind, False, rub), 0.0
+    for i in range(rub.count[0]):
+        slope += rub.points[SLOPE, i]
     return force, slope
 
 
@@ -140,7 +133,12 @@ def rub_force(dq, kind, rub, mean, dt):
 def rub_solve(free, beta, v0, dt, kind, rub, mean, goal, guess):
     """Slide increment with dq = free - beta F(dq) under the mean load. Returns (dq, F, iterations), < 0: failed."""
     if kind == POINTS:
-        rub.middle[0] = grow(rub.eps[0], v0, v0, abs(v0) * dt / 2, dt / 2, rub.growth)[0]
+        halfway(v0, dt, rub)
+    if rub.b.size:
+        if beta == 0.0:
+            rub.y[0, 0] = free
+        force, count = descend(free, beta, kind, False, rub, TIGHT * goal)
+        return rub.y[0, 0], (free - rub.y[0, 0]) / beta if beta > 0.0 else force, count
     if beta == 0.0:
         return free, rub_force(free, kind, rub, mean, dt)[0] if kind != COULOMB else 0.0, 1
     if kind == COULOMB:
@@ -172,55 +170,61 @@ def rub_solve(free, beta, v0, dt, kind, rub, mean, goal, guess):
 
 
 @njit(error_model="numpy", **LEAN)
-def give_way(rub):
-    """Move the coordinates of the pieces by the solved step and leave the next guess in y."""
-    y, last = rub.y, rub.last
-    for k in range(rub.b.size):
-        rub.b[k] += y[k + 1]
-    for k in range(y.size):
-        here = y[k]
-        y[k] = 2 * here - last[k]
-        last[k] = here
-    rub.ready[:] = 0.0
-
-
-@njit(error_model="numpy", **LEAN)
 def rub_commit(dq, used, v0, v1, dt, kind, rub):
     """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
     if kind == COULOMB or kind == RATE:
         return used * dq
-    mu, length, memory, half = rub.force[0], rub.force[2], rub.memory, rub.half
-    before = held_energy(kind, rub, memory)
-    if kind == PLASTIC:
-        for j in range(rub.now.size):
-            load = 0.5 * (rub.before[j] + rub.now[j])
-            y, springs = half[0, j], half[1, j]
-            if load > 0:
-                y, springs = spring_step(y, springs, load, local_slide(j, dq, rub.psi, rub.y), length)
+    length, memory, points = rub.force[2], rub.memory, rub.points
+    lost = used * dq + held_energy(kind, rub) if kind == PLASTIC else 0.0
+    for i in range(rub.count[0]):
+        j, load, xi = rub.under[i], points[LOAD, i], points[SLIDE, i]
+        if kind == PLASTIC:
+            y, springs = spring_step(points[DENSITY, i], points[STRETCH, i], load, xi, length)
             memory[0, j], memory[1, j] = press_springs(y, springs, rub.now[j])
-        give_way(rub)
-        return used * dq + before - held_energy(kind, rub, memory)
-    dissipated = before - held_energy(kind, rub, half)
-    for j in range(rub.now.size):
-        load = 0.5 * (rub.before[j] + rub.now[j])
-        m, z, s2 = half[0, j], half[1, j], half[2, j]
-        if load > 0:
-            m, z, s2, part = bond_step(m, z, s2, local_slide(j, dq, rub.psi, rub.y), load, rub.middle[0])
-            dissipated += 0.5 * mu / length * part
-        memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[3], length)
-        dissipated += 0.5 * mu / length * (s2 - memory[2, j])
-    give_way(rub)
+        else:
+            lost += 0.5 * rub.weight[i] * (memory[2, j] - points[SQUARE, i])
+            m, z, s2, part = bond_step(points[DENSITY, i], points[STRETCH, i], points[SQUARE, i], xi, load, rub.eps[1])
+            memory[0, j], memory[1, j], memory[2, j] = press_point(m, z, s2, load, rub.now[j], rub.force[3], length)
+            lost += 0.5 * rub.weight[i] * (part + s2 - memory[2, j])
+    went_on(rub)
+    if kind == PLASTIC:
+        return lost - held_energy(kind, rub)
     rub.eps[0] = grow(rub.eps[0], v0, v1, abs(dq), dt, rub.growth)[0]
-    return dissipated
+    return lost
 
 
 @njit(error_model="numpy", **LEAN)
-def held_energy(kind, rub, memory):
-    """Elastic energy of a memory and of the pieces [J]."""
-    out, mu, length = 0.0, rub.force[0], rub.force[2]
+def spring_back(kind, rub, goal):
+    """Bring pieces and points to balance while the holder stands, after the load of the step. Returns (energy lost [J],
+    iterations), < 0: failed."""
+    memory, points, y = rub.memory, rub.points, rub.y[1]
+    load_points(1.0, rub)
+    before = held_energy(kind, rub)
+    for i in range(rub.count[0]):
+        points[DENSITY, i], points[STRETCH, i] = memory[0, rub.under[i]], memory[1, rub.under[i]]
+    y[:] = 0.0
+    count = descend(0.0, 0.0, kind, True, rub, TIGHT * goal)[1]
+    for i in range(rub.count[0]):
+        j, load, xi = rub.under[i], points[LOAD, i], points[SLIDE, i]
+        if kind == PLASTIC:
+            a, b = spring_step(memory[0, j], memory[1, j], load, xi, rub.force[2])
+            memory[0, j], memory[1, j] = press_springs(a, b, load)
+        else:
+            memory[0, j], memory[1, j], memory[2, j], _ = bond_step(memory[0, j], memory[1, j], memory[2, j], xi, load,
+                                                                    rub.eps[0])
+    for k in range(rub.b.size):
+        rub.b[k] += y[k + 1]
+    return before - held_energy(kind, rub), count
+
+
+@njit(error_model="numpy", **LEAN)
+def held_energy(kind, rub):
+    """Elastic energy of the memory and of the pieces [J]."""
+    out, mu, length, memory = 0.0, rub.force[0], rub.force[2], rub.memory
     for k in range(rub.b.size):
         out += 0.5 * rub.kappa[k] * rub.b[k] * rub.b[k]
-    for j in range(memory.shape[1]):
+    for i in range(rub.count[0]):
+        j = rub.under[i]
         if kind == PLASTIC:
             if memory[1, j] > 0:
                 out += 0.5 * mu * length * memory[0, j] * memory[0, j] / memory[1, j]
@@ -230,29 +234,22 @@ def held_energy(kind, rub, memory):
 
 
 @njit(error_model="numpy", **LEAN)
-def bend(j, rub):
-    """Slide [m] of point j that the pieces take."""
-    out = 0.0
-    for k in range(rub.b.size):
-        out += rub.psi[j, k] * rub.b[k]
-    return out
-
-
-@njit(error_model="numpy", **LEAN)
 def rub_state(kind, rub, q, held):
     """(friction force [N], stored energy [J], irreversible slip [m]) as they stand."""
     if kind == COULOMB or kind == RATE:
         return held, 0.0, q
-    mu, length, memory = rub.force[0], rub.force[2], rub.memory
+    mu, length, memory, points = rub.force[0], rub.force[2], rub.memory, rub.points
     force, slip, total = 0.0, 0.0, 0.0
-    for j in range(memory.shape[1]):
+    load_points(1.0, rub)
+    slid(q, rub.b, rub)
+    for i in range(rub.count[0]):
+        j = rub.under[i]
         if kind == PLASTIC:
             force += mu * memory[0, j]
             stretch = length * memory[0, j] / memory[1, j] if memory[1, j] > 0 else 0.0
         else:
             force += mu / length * memory[1, j]
             stretch = memory[1, j] / memory[0, j] if memory[0, j] > 0 else 0.0
-        if rub.now[j] > 0:
-            slip += rub.now[j] * (q - stretch - bend(j, rub))
-            total += rub.now[j]
-    return force, held_energy(kind, rub, memory), slip / total if total > 0 else q
+        slip += points[LOAD, i] * (points[SLIDE, i] - stretch)
+        total += points[LOAD, i]
+    return force, held_energy(kind, rub), slip / total if total > 0 else q

@@ -16,6 +16,7 @@ from ...core import ModalBasis, Outcome, PatchfemError, Response
 from ...effects import unbuilt
 from ...friction.laws.stretch import growth_numbers
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
+from ..contacts.arrays import sheared
 from .march import GOAL, Run
 from .march import march as run
 from .models import coulomb_model
@@ -194,9 +195,11 @@ class VaryingLoadRun(Run):
             self.press.press_state(self.sets, slot, -heave, turn, now)
         self.slot, memory = np.array([slot]), np.zeros((3, x.size))
         memory[1 if law.kind == PLASTIC else 0] = now * (1.0 if law.kind == PLASTIC else law.force[3])
+        psi, kappa = (np.zeros((x.size, 0)), ()) if model.shear is None else (model.shear.shape, model.shear.stiffness)
+        weight = np.full(x.size, law.static / (law.length if law.kind == POINTS else 1.0))
         self.rub = compiled("dynamics.march.varying_friction_kernels").Rub(
-            np.array(law.force, float), memory, memory.copy(), now.copy(), now, *np.full((2, 1), law.length),
-            np.array(law.growth, float), *_shear_arrays(model.shear, x.size, law.static * model.preload))
+            np.array(law.force, float), memory, now.copy(), now, np.array(psi.T, order="C"), np.arange(x.size),
+            **sheared(weight, law.length, law.growth, psi, kappa))
         self.held = np.zeros(2)
         self.width += 5
         self.ledger[0] += self.strained()
@@ -241,7 +244,7 @@ class VaryingLoadRun(Run):
     def _snapshot(self, row) -> dict:
         rub = self.rub
         return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": rub.now.copy(), "b": rub.b.copy(),
-                                         "memory": rub.memory.copy(), "bend": rub.psi @ rub.b}
+                                         "memory": rub.memory.copy(), "bend": rub.b @ rub.modes}
 
     def strained(self) -> float:
         """Energy of the preloaded contact and of what stretches in it [J]."""
@@ -270,16 +273,6 @@ class VaryingLoadRun(Run):
         pull = np.stack([rows[:, -5] - model.sets.load, rows[:, -4] - model.sets.moment], axis=1)
         return replace(out, acceleration=out.acceleration + pull @ model.rows[1:] @ modes.output / modes.mass,
                        extra=extra)
-
-
-def _shear_arrays(shear, size: int, limit: float) -> tuple:
-    """psi, kappa, b, y, last, rest, room, hess, ready, slope, under and scale of a Rub."""
-    psi = np.zeros((size, 0)) if shear is None else np.array(shear.shape, order="C")
-    kappa = np.zeros(0) if shear is None else np.array(shear.stiffness)
-    r = kappa.size
-    scale = np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0)))
-    return (psi, kappa, np.zeros(r), *np.zeros((3, 1 + r)), np.zeros((3, 1 + r)), np.zeros((2, 1 + r, 1 + r)),
-            np.zeros(2), np.zeros(size), np.zeros(size, np.int64), scale)
 
 
 def _one_point(load: float) -> dict:

@@ -16,8 +16,7 @@ from ...contact.press_kernels import locate, press_state, pull
 from ...contact.press_path_kernels import path_mean
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import accelerations, free_slide, move, note, sample, stored
-from .varying_friction_kernels import COULOMB, RATE, press_all, rub_commit, rub_solve, rub_state
-from .varying_shear_kernels import shear_solve, spring_back
+from .varying_friction_kernels import COULOMB, RATE, press_all, rub_commit, rub_solve, rub_state, spring_back
 
 
 class Ports(NamedTuple):
@@ -126,10 +125,7 @@ def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub,
                 press_state(sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
         slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
         press_all(kind, rub)
-        if rub.b.size:
-            dq, used, its = shear_solve(slides, beta[0, 0], v, dt, kind, rub, goal)
-        else:
-            dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
+        dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
         count += abs(its)
         bad = its < 0 or wrong > goal
         miss = used - guess

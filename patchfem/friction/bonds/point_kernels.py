@@ -148,28 +148,3 @@ def _primitive(v, floor):
     if abs(v) < floor:
         return v / floor
     return (1 + log(abs(v) / floor)) * (1.0 if v > 0 else -1.0)
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def rigid_step(dq, weight, bonds, source, eps):
-    """`bond_step` of points (m,) that all slide by dq [m], in place; returns the energy that they dissipate [J].
-
-    weight: mu_s area/eps_0 (m,) [m]; bonds (5, m): m, z, s2, local slide, play; source (m,) [Pa] forms the new bonds;
-    eps [m].
-    """
-    path = abs(dq)
-    g = 1.0 if dq > 0 else -1.0
-    x = path / eps
-    f1, _, e = shape(x)
-    a1 = x * f1
-    a2, a3, a4 = moments(x, e)
-    dissipated, far, left, two = 0.0, eps * eps, x * e, 2 * g * eps * a2
-    for j in range(weight.size):
-        m, z, s2, sigma = bonds[0, j], bonds[1, j], bonds[2, j], source[j]
-        young = sigma - m
-        dissipated += weight[j] * (s2 * a1 + two * z + far * (m * a3 + sigma * a4))
-        bonds[0, j] = sigma - young * e
-        bonds[1, j] = z * e + g * eps * (sigma * a1 - young * left)
-        bonds[2, j] = e * (s2 + 2 * g * z * path + m * path * path) + sigma * far * a3
-        bonds[3, j] += dq
-    return dissipated / 2

@@ -25,17 +25,23 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
     the upper one, which stand at x at first.
     """
     area, sigma = np.asarray(area, float), np.asarray(sigma, float)
-    numbers = np.concatenate([[0.0, area.size], growth_numbers(law), law.static * area / law.length, sigma])
+    weight, limit = law.static * area / law.length, law.static * float(area @ sigma)
+    if pattern is None:
+        numbers = np.concatenate([[0.0, 1.0], growth_numbers(law), [weight @ sigma], sigma])
+        memory = np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0])
+        return Element("friction.laws.stretch_kernels", numbers, memory, limit, law.length, False, "points")
+    x, on_lower = (np.asarray(part, float) for part in pattern)
+    numbers = np.concatenate([[0.0, area.size], growth_numbers(law), weight, sigma, [x.size], x, np.zeros(area.size), x,
+                              on_lower])
     memory = np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)])
-    kernels = "friction.laws.stretch_kernels"
-    if pattern is not None:
-        x, on_lower = (np.asarray(part, float) for part in pattern)
-        numbers = np.concatenate([numbers, [x.size], x, np.zeros(area.size), x, on_lower])
-        kernels = "friction.laws.stretch_lower_kernels"
-    return Element(kernels, numbers, memory, law.static * float(area @ sigma), law.length, False, "points")
+    return Element("friction.laws.stretch_lower_kernels", numbers, memory, limit, law.length, False, "places")
 
 
-def bonds_of(memory) -> np.ndarray:
+def bonds_of(element: Element, memory) -> np.ndarray:
     """Bonds (5, m) in the memory of a `points_element`: m [Pa], z [Pa m], s2 [Pa m2], local slide [m] and play [1] per
     point."""
-    return np.asarray(memory)[1:].reshape(5, -1)
+    bonds = np.asarray(memory)[1:].reshape(5, -1)
+    if element.form == "places":
+        return bonds
+    sigma = element.numbers[9:]
+    return bonds * np.stack([sigma, sigma, sigma, np.ones_like(sigma), np.ones_like(sigma)])

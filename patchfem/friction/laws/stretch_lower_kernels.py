@@ -1,18 +1,26 @@
 """Compiled bonds as in `stretch_kernels` under a pressure that stays on the lower piece.
 
-num: as there, with room for the pressures of the points, then the size p of the pattern, the places of the points (m,)
-[m], room (m,), places (p,) [m] and pressures (p,) [Pa] of the pattern. What forms under a point in a step has the mean
-of the pressures at the ends of its way; where none is left the bonds are lost.
+num: number m of points, the growth (6,), mu_s area/eps_0 of every point [m], room for their pressures, the size p of
+the pattern, the places of the points (m,) [m], room (m,), places (p,) [m] and pressures (p,) [Pa] of the pattern; mem:
+bond length [m], then m, z, s2, local slide and play of every point, (5, m). What forms under a point in a step has the
+mean of the pressures at the ends of its way; where none is left the bonds are lost.
 """
 
 import numpy as np
 from numba import njit
 
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import LEAN
-from .stretch_kernels import FREE, GROWTH, WEIGHT, middle, points, state
+from ..flags_kernels import FAST, LEAN
+from .stretch_kernels import FREE, GROWTH, WEIGHT, middle
 
 __all__ = ["commit", "mean", "middle", "state"]
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def points(num, mem, e):
+    """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds (5, m)) of element e, as views of its numbers."""
+    m = int(num[e, 1])
+    return num[e, WEIGHT:WEIGHT + m], num[e, WEIGHT + m:WEIGHT + 2 * m], mem[e, 1:1 + 5 * m].reshape((5, m))
 
 
 @njit(error_model="numpy", **LEAN)
@@ -81,3 +89,21 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
         bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j] = m, z, s2, play
     mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
     return lost
+
+
+@njit(error_model="numpy", **LEAN)
+def state(num, mem, e, q, v):
+    """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q [m].
+
+    The irreversible part is local slide less mean stretch of the bonds, averaged with mu_s sigma area of the points.
+    """
+    weight, source, bonds = points(num, mem, e)
+    force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
+    for j in range(weight.size):
+        force += weight[j] * bonds[1, j]
+        energy += 0.5 * weight[j] * bonds[2, j]
+        share = weight[j] * source[j]
+        if bonds[0, j] > 0:
+            slip += share * (bonds[3, j] - bonds[1, j] / bonds[0, j])
+            total += share
+    return force, energy, slip / total if total > 0 else q

@@ -260,9 +260,9 @@ def release(basis, model, start, steps_per_cycle, count):
         memory = model.shown(contact)
         if "stretch" in memory:
             return out + 0.5 * model.element.numbers[2:2 + memory["stretch"].size] @ memory["stretch"]**2
-        weight = contact.weight if "b" in memory else model.element.numbers[8:8 + memory["bonds"].shape[1]]
-        pieces = 0.5 * contact.kappa @ contact.b**2 if "b" in memory else 0.0
-        return out + 0.5 * weight @ memory["bonds"][2] + pieces
+        if "b" not in memory:
+            return out + 0.5 * model.element.numbers[8] * contact.mem[0, 3]
+        return out + 0.5 * contact.weight @ memory["bonds"][2] + 0.5 * contact.kappa @ contact.b**2
 
     history = [energy()]
     for _ in range(count):

@@ -163,6 +163,7 @@ def test_always_nothing_creates_energy(name, seed, steps):
 def test_exact_twins_of_the_points():
     """Compiled points under a changing load against the laws of a bench."""
     kernels, rng = load("dynamics.march.varying_friction_kernels"), np.random.default_rng(3)
+    points = load("dynamics.contacts.shear_points_kernels")
     law, other = Bonds(0.3, 1e-6, initial=0.4), ElasticPlastic(0.3, 1e-6)
     bonds, springs = Recursion(law), other.start(np.array([2.0]))
     state = bonds.start(np.array([2.0]))
@@ -178,12 +179,14 @@ def test_exact_twins_of_the_points():
         springs = other.press(springs, np.array([at]), np.array([after])).state
         assert two == pytest.approx(springs[:, 0], rel=1e-13)
         if after > 0:
-            mean = kernels.spring_mean(*two, after, dq, 1e-6)
-            near = kernels.spring_mean(*two, after, dq * (1 + 1e-6), 1e-6)
+            mean = points.spring_mean(*two, after, dq, 1e-6)
+            near = points.spring_mean(*two, after, dq * (1 + 1e-6), 1e-6)
             moved = other.step(springs, dq, np.array([after]), np.array([after]), 0.0)
             assert 0.3 * mean[0] == pytest.approx(moved.mean[0], rel=1e-12, abs=1e-15)
             assert mean[1] == pytest.approx((near[0] - mean[0]) / (dq * 1e-6), rel=1e-3, abs=1e-3)
+            end = points.spring_end(*two, after, dq, 1e-6)[0]
             two = kernels.spring_step(*two, after, dq, 1e-6)
+            assert end == pytest.approx(two[0], rel=1e-14)
             springs = moved.state
             assert two == pytest.approx(springs[:, 0], rel=1e-12)
             moved = bonds.step(state, dq, np.array([after]), np.array([after]), 0.0)

@@ -1,0 +1,60 @@
+"""Small dense systems of the step solves, compiled: Cholesky factors of symmetric ones, elimination of others."""
+
+import numpy as np
+from numba import njit
+
+from ..friction.flags_kernels import FAST, LEAN
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def factor(a):
+    """Cholesky factor of a (n, n) in its lower half, in place; False where a is not positive definite."""
+    n = a.shape[0]
+    for j in range(n):
+        pivot = a[j, j]
+        for k in range(j):
+            pivot -= a[j, k] * a[j, k]
+        if not pivot > 0:
+            return False
+        a[j, j] = np.sqrt(pivot)
+        for i in range(j + 1, n):
+            rest = a[i, j]
+            for k in range(j):
+                rest -= a[i, k] * a[j, k]
+            a[i, j] = rest / a[j, j]
+    return True
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def solve(a, b):
+    """Put the solution x of (a a^T) x = b in place of b (n,), a a factor; returns b . x >= 0."""
+    n, product = b.size, 0.0
+    for i in range(n):
+        for k in range(i):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+        product += b[i] * b[i]
+    for i in range(n - 1, -1, -1):
+        b[i] /= a[i, i]
+        for k in range(i):
+            b[k] -= a[i, k] * b[i]
+    return product
+
+
+@njit(error_model="numpy", **LEAN)
+def eliminate(a, b):
+    """Put the solution x of a x = b in place of b (n,), pivots in place; False where one is below 1e-12."""
+    n = b.size
+    for i in range(n):
+        if abs(a[i, i]) < 1e-12:
+            return False
+        for k in range(i + 1, n):
+            part = a[k, i] / a[i, i]
+            for l in range(i + 1, n):
+                a[k, l] -= part * a[i, l]
+            b[k] -= part * b[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+    return True
