@@ -7,10 +7,10 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..scene.quantities import KINDS
+from ..surface.files.text import read_trace
 from ..surface.fine import too_fine
 from ..surface.nodes import on_nodes, placed
 from ..surface.profile import cleaned, level
-from ..surface.trace import read_trace
 
 NOISE = 1e-10  # m: heights below it are digits
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
+from patchfem.surface.files.text import read_trace
 from patchfem.surface.fine import spectrum, too_fine
 from patchfem.surface.nodes import on_nodes, placed
 from patchfem.surface.profile import Profile, cleaned, level, spikes
-from patchfem.surface.trace import read_trace
 
 pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
 

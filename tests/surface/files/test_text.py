@@ -17,8 +17,8 @@ from traces import UM, bumpy, text
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.scene.quantities import KINDS
-from patchfem.surface import trace
-from patchfem.surface.trace import UNITS, read_trace
+from patchfem.surface.files import text as trace
+from patchfem.surface.files.text import UNITS, read_trace
 
 QUIET = settings(deadline=None, suppress_health_check=list(HealthCheck))
 

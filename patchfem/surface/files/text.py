@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import Missing, PatchfemError
-from .profile import Profile
-from .samples import checked
+from ...core import Missing, PatchfemError
+from ..profile import Profile
+from ..samples import checked
 
 UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
          "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
