@@ -1,91 +1,85 @@
-"""A trace from a two-column text file whose header names the units: `x [um],z [um]`.
+"""Columns of a text file whose header names the units: `x [um],z [um]` is a trace, `x [um],y [um],z [um]` a raster.
 
-Columns stand apart by commas, semicolons, tabs or blanks; the decimal sign is a point. Lines that start with #, % or //
-are comments, and the header itself may be one. A height that is empty, `nan` or `***` is missing. UTF-8 with or
-without its mark, UTF-16 with it, else Latin-1; gzip is known by its first bytes.
+The columns stand in any order; `x (um)`, `x_um` and `x/um` mean the same. They stand apart by commas, semicolons, tabs,
+bars or blanks. The decimal sign is a point, or a comma where columns do not stand apart by commas or cells are quoted.
+Lines that start with #, % or // are comments, and the header itself may be one. A height that is empty, `nan` or `***`
+is missing. UTF-8 with or without its mark, UTF-16 with it, else Latin-1.
 """
 
-import gzip
 import io
 import re
-import zlib
 from array import array
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
-from ...core import Missing, PatchfemError
+from ...core import PatchfemError
+from ..areal import Areal
 from ..profile import Profile
 from ..samples import checked
+from .raster import raster
+from .raw import Raw, fetch, shown
 
 UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
          "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
-LARGEST = 64 * 2**20  # bytes of text, unpacked: four million samples
 WIDEST = 1000  # characters of a line
 EXAMPLE = "write the header as `x [um],z [um]`"
+_SIGNS = (";", ",", "\t", "|")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _LOST = re.compile(r"(?:[+-]?nan|\*+)?", re.IGNORECASE)
-_COLUMN = re.compile(r"(\w+)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
+_COLUMN = re.compile(r"(\w+?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|[_/]\s*(\w+))")
 _CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|\S+")
+_QUOTED = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
+_WIDE = re.compile(rf"\n[^\n]{{{WIDEST + 1}}}")
 _COMMENT = ("#", "%", "//")
 
 
 def read_trace(path, units: Mapping = UNITS) -> Profile:
-    """The trace of a file in the order of growing x; units: name of a length -> factor to metres.
+    """The trace of a two-column text file in the order of growing x; units: name of a length -> factor to metres.
 
     Samples at one x become their mean, x that only its printed digits keep from even spacing is evened, both with a
-    note; an x that turns back is refused. A million samples: 0.5 s. PatchfemError, Missing where there is no file.
+    note; an x that turns back is refused. A million samples: 0.3 s. PatchfemError, Missing where there is no file.
     """
-    lines = _lines(path)
-    header, number = _header(path, lines)
-    order, delimiter, factors = _columns(path, number, header, units)
-    x, z, at = _samples(path, lines, number, order, delimiter)
-    return checked(path, x, z, at, factors)
+    return columns(fetch(path), None, units, 2)
 
 
-def _lines(path):
-    """An iterator over the text lines of a file."""
-    data = _unpacked(path, _bytes(path))
+def columns(raw: Raw, given: tuple | None = None, units: Mapping = UNITS, most: int = 3) -> Profile | Areal:
+    """The trace or areal scan in a text file of two or three columns.
+
+    given: units of x (and y) and of z where the file names none; most: columns that are allowed. PatchfemError names
+    the line.
+    """
+    path, text = raw.path, text_of(raw)
+    header, number, body = _header(path, text)
+    names, cells, delimiter = _names(header, False)
+    if all(_is_number(cell, delimiter) for cell in cells):
+        if given is None:
+            raise PatchfemError(f"{path}:{number}: no header, and units are never guessed; {EXAMPLE} above the first "
+                                "sample")
+        names = {2: ["x", "z"], 3: ["x", "y", "z"]}.get(len(cells), cells)
+        cells, body, number = names, f"{header}\n{body}", number - 1
+    order, factors = _columns(f"{path}:{max(number, 1)}", cells, (given, units), header, most)
+    found, at = values(path, body, number, order, delimiter)
+    if len(order) == 2:
+        return checked(path, *found, at, factors)
+    return raster(path, *found, at, factors)
+
+
+def text_of(raw: Raw) -> str:
+    """The text of a file with lines that end in \\n, without quotes."""
+    path, data = raw.path, raw.data
     if not data.strip(b"\xef\xbb\xbf \t\r\n"):
         raise PatchfemError(f"{path}: the profile is empty")
-    encoding = _encoding(path, data)
-    return iter(io.TextIOWrapper(io.BytesIO(data), encoding=encoding, errors="replace"))
+    text = data.decode(_encoding(raw), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    return _QUOTED.sub(r"\1.\2", text).replace('"', "") if '"' in text else text
 
 
-def _bytes(path) -> bytes:
-    try:
-        if Path(path).exists() and not Path(path).is_file():
-            raise PatchfemError(f"{path}: not a file; a profile is a text file with two columns")
-        with open(path, "rb") as file:
-            data = file.read(LARGEST + 1)
-    except FileNotFoundError:
-        raise Missing(f"{path}: no such profile; contact.profile.file is relative to the scene") from None
-    except (OSError, ValueError) as error:
-        raise PatchfemError(f"{path}: the profile cannot be read ({error})") from None
-    return _limited(path, data)
-
-
-def _unpacked(path, data: bytes) -> bytes:
-    if not data.startswith(b"\x1f\x8b"):
-        return data
-    try:
-        with gzip.open(io.BytesIO(data)) as file:
-            return _limited(path, file.read(LARGEST + 1))
-    except (OSError, EOFError, zlib.error) as error:
-        raise PatchfemError(f"{path}: the gzip file is damaged ({error}); pack it again") from None
-
-
-def _limited(path, data: bytes) -> bytes:
-    if len(data) > LARGEST:
-        raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; keep every few samples of the profile")
-    return data
-
-
-def _encoding(path, data: bytes) -> str:
+def _encoding(raw: Raw) -> str:
+    path, data = raw.path, raw.data
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    if re.search(rb"[\x00-\x08\x0e-\x1f\x7f]", data):
+    if raw.kind != "text" or re.search(rb"[\x00-\x08\x0e-\x1f\x7f]", data):
         raise PatchfemError(f"{path}: not a text file; export the profile as text with two columns and {EXAMPLE}")
     try:
         data.decode("utf-8")
@@ -94,114 +88,190 @@ def _encoding(path, data: bytes) -> str:
     return "utf-8-sig"
 
 
-def _header(path, lines) -> tuple:
-    """First line that is no comment, or a comment that is two columns with units, and its line number."""
-    for number, line in enumerate(lines, 1):
-        text = line.strip()
-        if len(text) > WIDEST and not text.startswith(_COMMENT):
-            raise PatchfemError(f"{path}:{number}: a line of {len(text)} characters; two columns are wanted, {EXAMPLE}")
-        if text.startswith(_COMMENT):
-            text = text[:WIDEST].lstrip("#%/").strip()
-            if _is_header(text):
-                return text, number
-        elif text:
-            return text, number
+def _header(path, text: str) -> tuple:
+    """First line that is no comment, or a comment that is columns with units; its line number; the text after it."""
+    start = number = 0
+    while start < len(text):
+        stop = text.find("\n", start)
+        stop = len(text) if stop < 0 else stop
+        line, number = text[start:stop].strip(), number + 1
+        start = stop + 1
+        comment = line.startswith(_COMMENT)
+        if len(line) > WIDEST and not comment:
+            raise PatchfemError(f"{path}:{number}: a line of {len(line)} characters; two columns are wanted, {EXAMPLE}")
+        if comment:
+            line = line[:WIDEST].lstrip("#%/").strip()
+            names, cells, delimiter = _names(line, True)
+            if names:
+                return (delimiter or " ").join(cells), number, text[start:]
+        elif line:
+            return line, number, text[start:]
     raise PatchfemError(f"{path}: no data, only comments")
 
 
-def _is_header(text: str) -> bool:
-    cells, _ = _split(text)
-    return len(cells) == 2 and all(_COLUMN.fullmatch(cell) for cell in cells)
+def _names(line: str, comment: bool) -> tuple:
+    """Names of the columns where every cell is one with a unit, else []; the cells of a line; the delimiter.
+
+    The last column of a comment may go on with other words, which are left out.
+    """
+    cells, delimiter = _split(line)
+    found = [_COLUMN.fullmatch(cell) for cell in cells]
+    if comment and len(cells) > 1 and None in found:
+        last = found.index(None)
+        more = _COLUMN.match(cells[last])
+        if more and cells[last][more.end():][:1].isspace():
+            found, cells = [*found[:last], more], [*cells[:last], more[0]]
+    good = 1 < len(found) < 4 and None not in found
+    return ([one[1] for one in found] if good else []), cells, delimiter
 
 
 def _split(text: str) -> tuple:
     """Cells of a line without the empty ones at the end, and the delimiter between them, None for blanks."""
-    delimiter = next((sign for sign in ";,\t" if sign in text), None)
-    cells = [cell.strip().strip('"').strip() for cell in (text.split(delimiter) if delimiter else _CELL.findall(text))]
+    for delimiter in (*_SIGNS, None):  # numbers with a decimal comma stand apart by something else
+        cells = _cells(text, delimiter)
+        if 1 < len(cells) < 4 and all(_is_number(cell, delimiter) for cell in cells):
+            return cells, delimiter
+    delimiter = next((sign for sign in _SIGNS if sign in text), None)
+    return _trimmed(text.split(delimiter) if delimiter else _CELL.findall(text)), delimiter
+
+
+def _cells(text: str, delimiter) -> list:
+    return _trimmed(text.split(delimiter))
+
+
+def _trimmed(cells: list) -> list:
+    cells = [cell.strip() for cell in cells]
     while cells and not cells[-1]:
         cells.pop()
-    return cells, delimiter
+    return cells
 
 
-def _columns(path, number: int, header: str, units: Mapping) -> tuple:
-    """Meaning of the header: (place of x, of z), delimiter, (factor of x, of z)."""
-    cells, delimiter = _split(header)
-    at = f"{path}:{number}"
-    if all(_NUMBER.fullmatch(cell) or _LOST.fullmatch(cell) for cell in cells):
-        raise PatchfemError(f"{at}: no header, and units are never guessed; {EXAMPLE} above the first sample")
+def _is_number(cell: str, delimiter) -> bool:
+    number = _NUMBER.fullmatch(cell) or _LOST.fullmatch(cell)
+    return bool(number or (delimiter != "," and _COMMA.fullmatch(cell)))
+
+
+def _columns(at: str, cells: list, units: tuple, header: str, most: int) -> tuple:
+    """Meaning of the header: places of x, (y,) z; factors of x, (y,) z."""
     if len(cells) < 2:
-        raise PatchfemError(f"{at}: one column, '{_shown(header)}', where x and z are wanted; {EXAMPLE}")
-    if len(cells) > 2:
-        raise PatchfemError(f"{at}: {len(cells)} columns where x and z are wanted; keep one trace of two columns and "
-                            f"{EXAMPLE}")
-    found = {}
+        raise PatchfemError(f"{at}: one column, '{shown(header)}', where x and z are wanted; {EXAMPLE}")
+    if len(cells) > most:
+        wanted = "x and z are wanted" if most == 2 else "x and z, or x, y and z, are wanted"
+        raise PatchfemError(f"{at}: {len(cells)} columns where {wanted}; keep one trace of two columns and {EXAMPLE}")
+    found, known = {}, ("x", "z") if len(cells) == 2 else ("x", "y", "z")
     for place, cell in enumerate(cells):
-        name, factor = _column(at, cell, units)
+        name, factor = _column(at, cell, known, units)
         if name in found:
             raise PatchfemError(f"{at}: two columns are named {name}; {EXAMPLE}")
         found[name] = place, factor
-    return (found["x"][0], found["z"][0]), delimiter, (found["x"][1], found["z"][1])
+    return tuple(zip(*(found[name] for name in known)))
 
 
-def _column(at: str, cell: str, units: Mapping) -> tuple:
+def _column(at: str, cell: str, known: tuple, units: tuple) -> tuple:
+    """(name, factor) of a column; its own unit counts, and one given for it must be the same."""
+    given, lengths = units
     match = _COLUMN.fullmatch(cell)
-    if match is None:
-        raise PatchfemError(f"{at}: column '{_shown(cell)}' has no unit, and units are never guessed; {EXAMPLE}")
-    name, unit = match[1].lower(), (match[2] if match[2] is not None else match[3]).strip()
-    if name not in ("x", "z"):
-        raise PatchfemError(f"{at}: column '{_shown(match[1])}' is not known, x and z are wanted; {EXAMPLE}")
-    factor = units.get(unit.replace("µ", "u").replace("μ", "u"))
+    if match is None and (given is None or cell.lower() not in known):
+        raise PatchfemError(f"{at}: column '{shown(cell)}' has no unit, and units are never guessed; {EXAMPLE}")
+    name = (match[1] if match else cell).lower()
+    if name not in known:
+        listed = " and ".join(filter(None, (", ".join(known[:-1]), known[-1])))
+        raise PatchfemError(f"{at}: column '{shown(match[1])}' is not known, {listed} are wanted; {EXAMPLE}")
+    asked = None if given is None else given[name == "z"]
+    unit = next((part for part in match.groups()[1:] if part is not None), "").strip() if match else asked
+    factor = lengths.get(unit.replace("µ", "u").replace("μ", "u"))
     if factor is None:
-        raise PatchfemError(f"{at}: unknown unit '{_shown(unit)}' of {name}; use one of {', '.join(units)}")
+        raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {', '.join(lengths)}")
+    if asked is not None and lengths.get(asked) != factor:
+        raise PatchfemError(f"{at}: the header gives {name} in {shown(unit)}, but {shown(asked)} was given for it; "
+                            "leave the units out, the header names them")
     return name, factor
 
 
-def _samples(path, lines, number: int, order: tuple, delimiter) -> tuple:
-    """Samples x and z in the file's units, z NaN where missing, and the line of each."""
-    x, z, at = array("d"), array("d"), array("q")
-    first, second = order
-    for count, line in enumerate(lines, number + 1):
-        try:
-            if len(line) > WIDEST or "_" in line or not line.isascii():
-                raise ValueError  # float() would take 1_000 and foreign digits
-            cells = line.split(delimiter)
-            if len(cells) != 2:
-                raise ValueError
-            here, height = float(cells[first]), float(cells[second])
-        except ValueError:
-            row = _row(f"{path}:{count}", line.strip("\r\n"), order, delimiter)
-            if row is None:
-                continue
-            here, height = row
-        x.append(here)
-        z.append(height)
-        at.append(count)
-    return np.array(x), np.array(z), np.array(at)
+def values(path, body: str, number: int, order: tuple, delimiter) -> tuple:
+    """Columns x, (y,) z in the file's units, z NaN where missing, and the line of each row."""
+    first = next((line for line in _lines(body) if line.strip() and not line.lstrip().startswith(_COMMENT)), "")
+    delimiter = _delimiter(first, delimiter, len(order))
+    comma = delimiter != "," and "," in body
+    if comma:
+        comma = any("," in line for line in _lines(body) if not line.lstrip().startswith(_COMMENT))
+    table, at = (None, None) if comma and "." in body else _quick(body.replace(",", ".") if comma else body, delimiter)
+    if table is not None and table.shape[1] == len(order):
+        return [table[:, place] for place in order], at + number + 1
+    rows, at = array("d"), array("q")
+    for count, line in enumerate(_lines(body), number + 1):
+        row = _row(f"{path}:{count}", line, order, delimiter, comma)
+        if row is not None:
+            rows.extend(row)
+            at.append(count)
+    return list(np.array(rows).reshape(-1, len(order)).T), np.array(at)
 
 
-def _row(at: str, line: str, order: tuple, delimiter) -> tuple | None:
-    """Numbers (x, z) of a line that is not simply two numbers; None for a comment or a blank line."""
-    if not line.strip(" \t,;") or line.lstrip().startswith(_COMMENT):
+def _lines(body: str):
+    start = 0
+    while start < len(body):
+        stop = body.find("\n", start)
+        stop = len(body) if stop < 0 else stop
+        yield body[start:stop]
+        start = stop + 1
+
+
+def _delimiter(line: str, ours, count: int):
+    """The delimiter that makes `count` numbers of a line; that of the header, `ours`, is tried first."""
+    for sign in (ours, *_SIGNS, None) if len(line) <= WIDEST else ():
+        cells = [cell.strip() for cell in line.split(sign)]
+        trimmed = _trimmed(cells)
+        if len(trimmed) <= count <= len(cells) and all(_is_number(cell, sign) for cell in trimmed):
+            return sign
+    return ours
+
+
+def _quick(body: str, delimiter) -> tuple:
+    """The table (k, columns) of a text of numbers and blank lines and nothing else, and the line of each row from 0;
+    None twice for any other text."""
+    plain = body.strip() and body.isascii() and "_" not in body  # loadtxt may take what no number is
+    if not plain or _WIDE.search(f"\n{body[:WIDEST + 1]}") or _WIDE.search(body):
+        return None, None
+    body = body.rstrip("\n")
+    at = np.arange(body.count("\n") + 1)
+    if "\n\n" in f"\n{body}":
+        at = np.array([k for k, line in enumerate(body.split("\n")) if line])
+    try:
+        table = np.loadtxt(io.BytesIO(body.encode()), delimiter=delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None, None
+    good = len(table) == at.size and np.isfinite(table).all()
+    return (table, at) if good else (None, None)
+
+
+def _row(at: str, line: str, order: tuple, delimiter, comma: bool) -> list | None:
+    """Numbers x, (y,) z of a line; None for a comment or a blank line."""
+    if not line.strip(" \t,;|") or line.lstrip().startswith(_COMMENT):
         return None
+    words = {2: "two", 3: "three"}[len(order)]
     if len(line) > WIDEST:
-        raise PatchfemError(f"{at}: a line of {len(line)} characters; two numbers are wanted")
-    cells = [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
-    while len(cells) > 2 and not cells[-1]:
+        raise PatchfemError(f"{at}: a line of {len(line)} characters; {words} numbers are wanted")
+    cells = [cell.strip() for cell in line.split(delimiter)]
+    while len(cells) > len(order) and not cells[-1]:
         cells.pop()
-    if any(re.fullmatch(r"[+-]?[0-9]+,[0-9]+", cell) for cell in cells) or (delimiter == "," and len(cells) == 4):
-        raise PatchfemError(f"{at}: '{_shown(line)}': two numbers are wanted; the decimal sign is a point, no comma")
-    if len(cells) != 2:
-        raise PatchfemError(f"{at}: '{_shown(line)}': two numbers are wanted; write nan for a missing height")
-    here, height = cells[order[0]], cells[order[1]]
-    if not _NUMBER.fullmatch(here):
-        raise PatchfemError(f"{at}: '{_shown(here)}' is not a number for x; correct the line or leave it out")
-    if _LOST.fullmatch(height):
-        return float(here), np.nan
-    if not _NUMBER.fullmatch(height):
-        raise PatchfemError(f"{at}: '{_shown(height)}' is not a height; a missing one is empty, nan or ***")
-    return float(here), float(height)
+    if delimiter == "," and len(cells) == 2 * len(order):
+        raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are wanted; with a decimal comma the columns "
+                            "stand apart by semicolons or tabs")
+    if len(cells) != len(order):
+        raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are wanted; write nan for a missing height")
+    if comma and "." in line:
+        raise PatchfemError(f"{at}: '{shown(line)}': the decimal sign is a comma elsewhere in the file and a point "
+                            "here; write it in one way")
+    if comma:
+        cells = [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in cells]
+    return [_value(at, name, cells[place]) for name, place in zip("xz" if len(order) == 2 else "xyz", order)]
 
 
-def _shown(text: str) -> str:
-    text = text.encode("unicode_escape").decode() if not text.isprintable() else text
-    return text if len(text) <= 40 else text[:37] + "..."
+def _value(at: str, name: str, cell: str) -> float:
+    if name == "z" and _LOST.fullmatch(cell):
+        return np.nan
+    if _NUMBER.fullmatch(cell) or re.fullmatch(r"[+-]?(?:nan|inf)", cell, re.IGNORECASE):
+        return float(cell)
+    if name == "z":
+        raise PatchfemError(f"{at}: '{shown(cell)}' is not a height; a missing one is empty, nan or ***")
+    raise PatchfemError(f"{at}: '{shown(cell)}' is not a number for {name}; correct the line or leave it out")
