@@ -9,11 +9,11 @@ LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
 
 
-def checked(path, x, z, at, factors: tuple) -> Profile:
+def checked(path, x, z, at, factors: tuple, stated: bool = False) -> Profile:
     """Turn samples of a file into a trace in order of growing x, one height per place; the notes tell what that took.
 
     x, z: (n,) in the units of the file, with their factors to metres; at: (n,) their lines, None where the file has
-    none. PatchfemError names line and value.
+    none; stated: the format itself says metres. PatchfemError names line and value.
     """
     bounded(path, (x, z), ("x", "z"), at, factors)
     if x[-1] < x[0]:
@@ -21,7 +21,7 @@ def checked(path, x, z, at, factors: tuple) -> Profile:
     x, notes = evened(path, x, factors[0])
     x, z, more = _single(path, x, z, at, factors[0])
     x, z = x * factors[0], z * factors[1]
-    _plausible(path, x, z)
+    more += plausible(path, x, z, stated)
     return Profile(frozen_array(x), frozen_array(z), str(path), notes + more)
 
 
@@ -95,12 +95,19 @@ def _single(path, x, z, at, factor: float) -> tuple:
     return np.bincount(group, x) / np.bincount(group), mean, (note,)
 
 
-def _plausible(path, x, z) -> None:
+def plausible(path, x, z, stated: bool = False) -> tuple:
+    """Refuse heights z [m] without two numbers and, where no unit is `stated`, too high for their length x [m].
+
+    Where metres are stated, a note tells of heights that are too high.
+    """
     if np.isfinite(z).sum() < 2:
         raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
     length, span = float(x[-1] - x[0]), float(np.nanmax(z) - np.nanmin(z))
     if length < SHORTEST:
         raise PatchfemError(f"{path}: the profile is {length:.3g} m long; is the unit of x right?")
-    if span > length:
-        raise PatchfemError(f"{path}: heights span {say(span)} over a length of {say(length)}; is the unit of z right? "
-                            "a missing height is written nan")
+    if span <= length:
+        return ()
+    steep = f"{path}: heights span {say(span)} over a length of {say(length)}"
+    if not stated:
+        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan")
+    return (f"{steep}: the file gives both in metres",)

@@ -40,8 +40,8 @@ def instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
         arrays = [*(one * along for one in arrays[:-1]), arrays[-1] * up]
     note = f"{raw.path}: read as {shown(found['format'])} by SurfaceTopography {shown(found['version'])}"
     if len(arrays) == 3:
-        return areal(raw.path, *arrays, None, (note,))
-    trace = checked(raw.path, *arrays, None, (1.0, 1.0))
+        return areal(raw.path, *arrays, found["unit"], (note,))
+    trace = checked(raw.path, *arrays, None, (1.0, 1.0), found["unit"])
     return replace(trace, notes=(note, *trace.notes))
 
 

@@ -5,22 +5,24 @@ import numpy as np
 from ...core import PatchfemError, frozen_array
 from ..areal import Areal
 from ..profile import Profile, say
-from ..samples import SHORTEST, bounded, checked, evened
+from ..samples import bounded, checked, evened, plausible
 from .raw import POINTS
 
 SPARSE = 4  # cells of the raster for each point: what is emptier is a cloud of points
 
 
-def raster(path, x, y, z, at, factors: tuple) -> Profile | Areal:
+def raster(path, x, y, z, at, factors: tuple | None) -> Profile | Areal:
     """Points of a scan along rows or columns as an areal scan; those of one row or column as a trace.
 
-    x, y, z: (k,) in the units of the file, with their factors to metres; at: (k,) their lines, None where there are
-    none. Cells without a point are missing. PatchfemError for points that lie on no raster or twice at one place.
+    x, y, z: (k,) in the units of the file, with their factors to metres, None where the format itself says metres; at:
+    (k,) their lines, None where there are none. Cells without a point are missing. PatchfemError for points that lie on
+    no raster or twice at one place.
     """
+    stated, factors = factors is None, factors or (1.0, 1.0, 1.0)
     bounded(path, (x, y, z), ("x", "y", "z"), at, factors)
     (xs, column), (ys, row) = _axis(x), _axis(y)
     if ys.size == 1 or xs.size == 1:
-        return checked(path, y if xs.size == 1 else x, z, at, (factors[xs.size == 1], factors[2]))
+        return checked(path, y if xs.size == 1 else x, z, at, (factors[xs.size == 1], factors[2]), stated)
     cells = xs.size * ys.size
     if cells > max(SPARSE * z.size, 16) or cells > POINTS:
         raise PatchfemError(f"{path}: {z.size} points with {xs.size} x and {ys.size} y lie on no raster; export the "
@@ -33,17 +35,18 @@ def raster(path, x, y, z, at, factors: tuple) -> Profile | Areal:
                             f"y = {say(y[first] * factors[1])}; keep one scan per file")
     heights = np.full(cells, np.nan)
     heights[place] = z
-    return areal(path, xs * factors[0], ys * factors[1], heights.reshape(ys.size, xs.size) * factors[2])
+    return areal(path, xs * factors[0], ys * factors[1], heights.reshape(ys.size, xs.size) * factors[2], stated)
 
 
-def areal(path, x, y, z, tip_radius: float | None = None, notes: tuple = ()) -> Profile | Areal:
+def areal(path, x, y, z, stated: bool = False, notes: tuple = ()) -> Profile | Areal:
     """Heights z (m, n) [m] at x (n,) [m] and y (m,) [m], rising or falling, as an areal scan; a trace where m is 1.
 
-    PatchfemError for axes that turn back and values that no unit explains.
+    stated: the format itself says metres, so that steep heights are told and not refused. PatchfemError for axes that
+    turn back and, where not stated, heights that only a wrong unit explains.
     """
     if len(y) == 1:
-        found = checked(path, x, z[0], None, (1.0, 1.0))
-        return Profile(found.x, found.z, found.source, notes + found.notes, tip_radius)
+        found = checked(path, x, z[0], None, (1.0, 1.0), stated)
+        return Profile(found.x, found.z, found.source, notes + found.notes)
     axes = []
     for axis, (name, values) in enumerate((("y", y), ("x", x))):
         if len(values) < 2:
@@ -60,14 +63,8 @@ def areal(path, x, y, z, tip_radius: float | None = None, notes: tuple = ()) -> 
     there = np.isfinite(z)
     if there.sum() < 3:
         raise PatchfemError(f"{path}: {there.sum()} heights; a scan wants three at least")
-    size = max(axes[1][-1] - axes[1][0], axes[0][-1] - axes[0][0])
-    span = float(z[there].max() - z[there].min())
-    if size < SHORTEST:
-        raise PatchfemError(f"{path}: the scan is {size:.3g} m long; is the unit of x right?")
-    if span > size:
-        raise PatchfemError(f"{path}: heights span {say(span)} over {say(size)}; is the unit of z right? a missing "
-                            "height is written nan")
-    return Areal(frozen_array(axes[1]), frozen_array(axes[0]), frozen_array(z), str(path), tuple(notes), tip_radius)
+    notes += plausible(path, max(axes, key=np.ptp), z[there], stated)
+    return Areal(frozen_array(axes[1]), frozen_array(axes[0]), frozen_array(z), str(path), tuple(notes))
 
 
 def _axis(values) -> tuple:

@@ -32,7 +32,7 @@ def sdf(raw: Raw) -> Profile | Areal:
     notes = ()
     if header.get("CheckType"):
         notes = (f"{raw.path}: its checksum of kind {header['CheckType']:g} is not verified",)
-    return areal(raw.path, np.arange(count) * header["Xscale"], np.arange(rows) * header["Yscale"], z, None, notes)
+    return areal(raw.path, np.arange(count) * header["Xscale"], np.arange(rows) * header["Yscale"], z, True, notes)
 
 
 def _checked(raw: Raw, header: dict) -> dict:
@@ -93,7 +93,6 @@ def _ascii(raw: Raw) -> tuple:
     header = _checked(raw, header)
     count = header["NumPoints"] * header["NumProfiles"]
     words = rest.partition(b"*")[0].replace(b",", b" ").split(None, count)
-    words = [word for word in words[:count + 1] if word]
     if len(words) != count:
         raise PatchfemError(f"{raw.path}: {'more' if len(words) > count else len(words)} heights "
                             f"{'than' if len(words) > count else 'where'} {count} are wanted; export the scan anew")

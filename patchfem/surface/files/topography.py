@@ -5,6 +5,7 @@ In: path, most points. Out: one line of JSON, then the arrays as .npy: x and z o
 in metres, or in the file's own numbers where it names no unit. Exit code 3: SurfaceTopography is not installed.
 """
 
+import io
 import json
 import os
 import sys
@@ -36,7 +37,9 @@ def main(path: str, most: int) -> int:
 
     out.write(json.dumps(found).encode() + b"\n")
     for array in arrays:
-        np.save(out, np.ascontiguousarray(array, float), allow_pickle=False)
+        one = io.BytesIO()  # a pipe knows no position, which np.save wants
+        np.save(one, np.ascontiguousarray(array, float), allow_pickle=False)
+        out.write(one.getbuffer())
     out.close()
     return 0
 
