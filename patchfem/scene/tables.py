@@ -1,7 +1,6 @@
 """The tables of a scene as frozen pydantic models: one model per table, one attribute per key, floats in SI.
 
-What a key means stands in `scene.meanings`; here stand its kind, its limits and its default. Whether keys fit together
-is the business of `scene.rules.check`, reading a file that of `scene`.
+Here stand kind, limits and default of each key; its meaning in `scene.meanings`, what goes together in `scene.rules`.
 """
 
 from __future__ import annotations
@@ -109,6 +108,7 @@ class ProfileFile(Table):
     """Measured heights, added to the gap."""
 
     file: Text
+    heights: Literal["gap", "surface"] = "gap"
     on: Piece = "upper"
 
 
