@@ -162,6 +162,29 @@ def test_exact_a_crown_read_from_a_profile_is_the_crown(tmp_path):
         assert read[name] == pytest.approx(crown[name], rel=1e-5 if name != "approach" else 5e-3), name
 
 
+@pytest.mark.parametrize("on", ["upper", "lower"])
+def test_exact_a_stylus_trace_of_a_surface_is_its_gap_turned(tmp_path, on):
+    """Peaks are material: the trace z presses as the gap -z does, bit for bit, whichever piece it was measured on."""
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
+    z = 2e-6 * np.cos(2 * np.pi * x / 4e-3) - x**2 / 2 / 3.0
+    side = f'on = "{on}"\n'
+    surface = profile(tmp_path, x, z, "surface.csv") + 'heights = "surface"\n' + side
+    gap = profile(tmp_path, x, -z, "gap.csv") + side
+    (one, trace), (other, turned) = (solved(part, path=tmp_path / "scene.toml") for part in (surface, gap))
+    assert trace == turned and np.array_equal(one.gap, other.gap)
+    upright = solved(profile(tmp_path, x, z, "gap.csv") + side, path=tmp_path / "scene.toml")[1]
+    assert upright["pressure_peak"] > 1.5 * trace["pressure_peak"]  # it rides on its two ends
+
+
+def test_exact_a_crown_measured_as_a_surface_is_the_crown(tmp_path):
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
+    tables = profile(tmp_path, x, -(x**2) / 2 / 5.0) + 'heights = "surface"\n'
+    read, crown = (solved(part, path=tmp_path / "scene.toml")[1]
+                   for part in (tables, '[contact.crown]\nradius = "5 m"\n'))
+    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness"):
+        assert read[name] == pytest.approx(crown[name], rel=1e-5), name
+
+
 def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
     patch, found = solved(profile(tmp_path, x, 1e-3 * x), path=tmp_path / "scene.toml")

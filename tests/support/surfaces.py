@@ -20,9 +20,9 @@ def scan(rows=4, count=6, seed=2) -> np.ndarray:
 def zipped(members: dict) -> bytes:
     """A zip file of {name: bytes}."""
     out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(out, "w") as archive:
         for name, data in members.items():
-            archive.writestr(zipfile.ZipInfo(name), data)
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
     return out.getvalue()
 
 

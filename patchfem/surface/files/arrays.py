@@ -27,9 +27,8 @@ HEIGHTS = ("z", "gap", "height", "heights")
 
 def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
     """The surface in an .npy file of two or three columns; PatchfemError for objects, other shapes, absent units."""
-    path = raw.path
+    path, table = raw.path, _npy(raw)
     factors = lengths(raw, units)
-    table = _npy(raw)
     if table.ndim == 2 and table.shape[0] in (2, 3) and table.shape[1] > 3:
         table = table.T
     if table.ndim != 2 or table.shape[1] not in (2, 3):
@@ -39,9 +38,8 @@ def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
 
 def mat(raw: Raw, units: tuple | None) -> Profile | Areal:
     """The surface in a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
-    path = raw.path
+    path, found = raw.path, variables(raw)
     factors = lengths(raw, units)
-    found = variables(raw)
     named = {name.lower(): name for name in found}
     height = next((named[name] for name in HEIGHTS if name in named), None)
     if height is not None and "x" in named:

@@ -17,7 +17,7 @@ from ..profile import Profile
 from ..samples import checked
 from .arrays import lengths
 from .raster import areal
-from .raw import BROKEN, POINTS, Raw, shown
+from .raw import BROKEN, POINTS, Raw, reason, shown
 
 PYTHON = sys.executable
 SECONDS = 60.0
@@ -70,7 +70,7 @@ def _understood(path, answer: bytes) -> tuple:
     try:
         found = json.loads(head)
         if "error" in found:
-            raise PatchfemError(f"{path}: SurfaceTopography cannot read it ({_short(found['error'])}); export the "
+            raise PatchfemError(f"{path}: SurfaceTopography cannot read it ({reason(found['error'])}); export the "
                                 "surface as text or X3P")
         file, arrays = io.BytesIO(rest), []
         while file.tell() < len(rest):
@@ -81,7 +81,3 @@ def _understood(path, answer: bytes) -> tuple:
         raise PatchfemError(f"{path}: SurfaceTopography found no heights in it; export the surface as text or X3P")
     return found, arrays
 
-
-def _short(text: str) -> str:
-    text = " ".join(str(text).split())
-    return text if len(text) <= 160 and text.isprintable() else shown(text[:160])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from .raw import BROKEN, POINTS, RATIO, SMALL, Raw
+from .raw import BROKEN, POINTS, RATIO, SMALL, Raw, reason, shown
 
 _STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _MATRIX, _COMPRESSED = 14, 15
@@ -49,7 +49,8 @@ def variables(raw: Raw) -> dict:
         try:
             one = _variable(raw, body, kind == _COMPRESSED, order) if kind in (_MATRIX, _COMPRESSED) else None
         except (*BROKEN, UnicodeDecodeError, MemoryError, TypeError) as error:
-            raise PatchfemError(f"{path}: a variable of the MATLAB file is damaged ({error}); save it anew") from None
+            raise PatchfemError(f"{path}: a variable of the MATLAB file is damaged ({reason(error)}); save it anew"
+                                ) from None
         if one is not None:
             found[one[0]] = one[1]
         at += 8 + size + (0 if kind == _COMPRESSED else -size % 8)
@@ -86,8 +87,8 @@ def _variable(raw: Raw, body, packed: bool, order: str) -> tuple | None:
         try:
             return _values(raw, body, packed, (order, shape, at, total))
         except (*BROKEN, MemoryError, TypeError) as error:
-            raise PatchfemError(f"{raw.path}: variable {name.decode('latin-1')} is damaged ({error}); save it anew"
-                                ) from None
+            raise PatchfemError(f"{raw.path}: variable {shown(name.decode('latin-1'))} is damaged ({reason(error)}); "
+                                "save it anew") from None
 
     return name.decode("latin-1"), Array(shape, values)
 

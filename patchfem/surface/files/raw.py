@@ -110,7 +110,7 @@ def _gunzipped(path, data: bytes) -> bytes:
                 most = min(TEXT, most)
             out = _upto(file, head, most + 1)
     except BROKEN as error:
-        raise PatchfemError(f"{path}: the gzip file is damaged ({error}); pack it again") from None
+        raise PatchfemError(f"{path}: the gzip file is damaged ({reason(error)}); pack it again") from None
     if len(out) > most:
         _limited(path, _kind(head), out)
         raise PatchfemError(f"{path}: unpacks to more than {RATIO} times its size; give the unpacked file")
@@ -120,7 +120,7 @@ def _gunzipped(path, data: bytes) -> bytes:
 def _unzipped(raw: Raw, packed: bool = False) -> Raw:
     """An X3P stays as it is; any other zip file of one member is that member; else another program's file."""
     archive = opened(raw)
-    names = [one.filename for one in archive.infolist() if not one.is_dir()]
+    names = [one.filename for one in archive.infolist() if not one.filename.endswith("/")]
     if any(Path(name).name == "main.xml" for name in names):
         return raw._replace(kind="x3p")
     if len(names) == 1 and not packed:
@@ -141,7 +141,7 @@ def opened(raw: Raw) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(io.BytesIO(raw.data))
     except BROKEN as error:
-        raise PatchfemError(f"{raw.path}: the zip file is damaged ({error}); pack it again") from None
+        raise PatchfemError(f"{raw.path}: the zip file is damaged ({reason(error)}); pack it again") from None
 
 
 def member(raw: Raw, archive: zipfile.ZipFile, name: str, most: int = LARGEST) -> bytes:
@@ -156,7 +156,7 @@ def member(raw: Raw, archive: zipfile.ZipFile, name: str, most: int = LARGEST) -
     except KeyError:
         raise PatchfemError(f"{raw.path}: no {shown(name)} inside it; export the surface anew") from None
     except BROKEN as error:
-        raise PatchfemError(f"{raw.path}: {shown(name)} inside it is damaged ({error}); export the surface anew"
+        raise PatchfemError(f"{raw.path}: {shown(name)} inside it is damaged ({reason(error)}); export the surface anew"
                             ) from None
     if len(out) != info.file_size:
         raise PatchfemError(f"{raw.path}: {shown(name)} inside it is damaged (its size is wrong); export it anew")
@@ -173,3 +173,10 @@ def shown(text: str) -> str:
     """A text of a file for a message: printable, 40 characters at most."""
     text = text.encode("unicode_escape").decode() if not text.isprintable() else text
     return text if len(text) <= 40 else text[:37] + "..."
+
+
+def reason(error) -> str:
+    """What a library says of a damaged file, for a message: printable, one line, 120 characters at most."""
+    text = " ".join(str(error).split())
+    text = text if text.isprintable() else text.encode("unicode_escape").decode()
+    return text if len(text) <= 120 else text[:117] + "..."

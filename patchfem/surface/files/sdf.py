@@ -41,7 +41,7 @@ def _checked(raw: Raw, header: dict) -> dict:
         if name not in header:
             raise PatchfemError(f"{path}: the header lacks {name}; export the scan anew")
     for name in ("NumPoints", "NumProfiles"):
-        if header[name] != int(header[name]) or not 1 <= header[name] <= POINTS:
+        if not 1 <= header[name] <= POINTS or header[name] != int(header[name]):
             raise PatchfemError(f"{path}: {name} = {header[name]:g}; a whole number from 1 on is wanted")
         header[name] = int(header[name])
     if header["NumPoints"] * header["NumProfiles"] > POINTS:

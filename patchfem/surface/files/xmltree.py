@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from ...core import PatchfemError
+from .raw import reason
 
 DEEPEST = 50  # elements inside one another
 MOST = 500_000  # elements
@@ -62,5 +63,5 @@ def parsed(path, data: bytes) -> Node:
     try:
         parser.Parse(data, True)
     except (expat.ExpatError, ValueError, UnicodeError, LookupError) as error:
-        raise PatchfemError(f"{path}: main.xml is damaged ({error}); export the surface anew") from None
+        raise PatchfemError(f"{path}: main.xml is damaged ({reason(error)}); export the surface anew") from None
     return top.children[0]

@@ -173,6 +173,7 @@ def test_exact_sdf_of_one_profile_is_a_trace(tmp_path):
     (b"NumPoints = 6", b"NumPoints = 5", "more heights than 20 are wanted"),
     (b"NumPoints = 6", b"NumPoints = 999999999", r"NumPoints = 1e\+09; a whole number from 1 on"),
     (b"NumPoints = 6", b"NumPoints = 40000000", r"40000000 x 4 heights, more than 5e\+07"),
+    (b"NumPoints = 6", b"NumPoints = 1e400", "NumPoints = inf; a whole number from 1 on"),
     (b"NumPoints = 6", b"NumPoints = six", ":3: NumPoints = 'six': a number is wanted"),
     (b"NumPoints = 6\n", b"", "the header lacks NumPoints"),
     (b"Zscale = 1e-06", b"Zscale = 0", r"Zscale = 0; a length > 0 m is wanted"),
