@@ -7,11 +7,14 @@ from ..areal import Areal
 from ..profile import Profile
 from .arrays import mat, npy
 from .dektak import MARK, dektak
+from .instruments import instrument
 from .raw import PLAIN, Raw, fetch
 from .sdf import sdf
 from .text import columns
+from .x3p import x3p
 
-EXACT = {"npy": npy, "mat": mat, "sdf": lambda raw, units: sdf(raw)}
+KINDS = {"npy": npy, "mat": mat, "sdf": lambda raw, units: sdf(raw), "x3p": lambda raw, units: x3p(raw),
+         "binary": instrument}
 
 
 def read_surface(path, units: tuple | None = None) -> Profile | Areal:
@@ -24,13 +27,7 @@ def read_surface(path, units: tuple | None = None) -> Profile | Areal:
     if units is not None and (isinstance(units, str) or len(tuple(units)) != 2):
         raise PatchfemError(f'{path}: units are two, of x and of z, such as ("mm", "um"), not {units!r}')
     raw = fetch(path)
-    if raw.kind in EXACT:
-        return EXACT[raw.kind](raw, units)
-    if raw.kind == "x3p":
-        from .x3p import x3p
-
-        return x3p(raw)
-    return _text(raw, units) if raw.kind == "text" else _instrument(raw, units)
+    return _text(raw, units) if raw.kind == "text" else KINDS[raw.kind](raw, units)
 
 
 def read_profile(path, units: tuple | None = None) -> Profile:
@@ -50,10 +47,5 @@ def _text(raw: Raw, units: tuple | None) -> Profile | Areal:
     except PatchfemError:
         if raw.suffix in PLAIN or find_spec("SurfaceTopography") is None:
             raise
-    return _instrument(raw, units)
-
-
-def _instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
-    from .instruments import instrument
-
     return instrument(raw, units)
+
