@@ -25,7 +25,7 @@ def profile_gap(path: Path, x, asked: float | None, rough: bool, material: bool 
     it.
     """
     size = float(np.diff(x).max())
-    whole = cleaned(placed(trace_of(path), x), 2 * size)
+    whole = _whole(path, x, 2 * size)
     if material:
         whole = replace(whole, z=frozen_array(-whole.z))
     trace = level(whole)
@@ -50,6 +50,15 @@ def trace_of(path: Path) -> Profile:
         return _read(path, stamp)
     except PatchfemError as error:
         raise type(error)(str(error), "contact.profile.file") from None
+
+
+def _whole(path: Path, x, longest: float) -> Profile:
+    """The cleaned part of a trace over the nodes; a line may bridge `longest` [m]."""
+    found = trace_of(path)
+    try:
+        return cleaned(placed(found, x), longest)
+    except PatchfemError as error:
+        raise type(error)(str(error), error.key or "contact.profile.file") from None
 
 
 @lru_cache(maxsize=4)

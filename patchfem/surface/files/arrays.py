@@ -10,10 +10,10 @@ import struct
 import numpy as np
 
 from ...core import PatchfemError
+from ...inputs.matlab import variables
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import checked
-from .matlab import variables
 from .raster import areal, raster
 from .raw import POINTS, Raw, shown
 from .text import UNITS
@@ -38,20 +38,20 @@ def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
 
 def mat(raw: Raw, units: tuple | None) -> Profile | Areal:
     """The surface in a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
-    path, found = raw.path, variables(raw)
+    path, found = raw.path, {name: one for name, one in variables(raw.path, raw.data).items() if one.kind == "number"}
     factors = lengths(raw, units)
     named = {name.lower(): name for name in found}
     height = next((named[name] for name in HEIGHTS if name in named), None)
     if height is not None and "x" in named:
         take = [found[named[name]] for name in ("x", "y") if name in named]
-        return _named(path, [one() for one in take], found[height](), factors)
+        return _named(path, [one.values() for one in take], found[height].values(), factors)
     tables = [name for name, one in found.items() if len(one.shape) == 2 and one.shape[1] in (2, 3)
               and one.shape[0] >= _LEAST]
     if len(tables) != 1:
         listed = ", ".join(f"{shown(name)} {one.shape}" for name, one in list(found.items())[:8]) or "no array"
         raise PatchfemError(f"{path}: holds {listed}; variables x, z or x, y, z, or one matrix of these columns, are "
                             "wanted")
-    return _table(path, found[tables[0]](), factors)
+    return _table(path, found[tables[0]].values(), factors)
 
 
 def lengths(raw: Raw, units: tuple | None) -> tuple:
