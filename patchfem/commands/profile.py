@@ -11,13 +11,14 @@ from .shared import Json, Out, Refused, say
 Length = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
-def profile(file: Path, /, *more: Path, cutoff: Length = "", window: Length = "", tip: Length = "", out: Out = None,
-            json_: Json = False,
+def profile(file: Path, /, *more: Path, cutoff: Length = "", window: Length = "", tip: Length = "", units: str = "",
+            out: Out = None, json_: Json = False,
             verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
     """Print roughness parameters of each FILE with the intervals that one trace allows; a page goes to -o DIR.
 
     --cutoff "0.25 mm" splits off the roughness profile; --window "468 um,733 um" takes the part between two cursors;
-    --tip "12.5 um" checks the valleys against the stylus; -v prints the definitions.
+    --tip "12.5 um" checks the valleys against the stylus; --units "mm,um" names the units of x and z where the file
+    names none; -v prints the definitions.
     """
     asked = {"cutoff": _length("cutoff", cutoff) if cutoff else None, "window": _window(window) if window else None,
              "tip": _length("tip", tip) if tip else None}
@@ -28,7 +29,8 @@ def profile(file: Path, /, *more: Path, cutoff: Length = "", window: Length = ""
     from ..surface.files.read import read_surface
     from ..surface.roughness.report import report_of
 
-    reports = [report_of(read_surface(path), **asked) for path in (file, *more)]
+    named = tuple(word.strip() for word in units.split(",")) if units else None
+    reports = [report_of(read_surface(path, named), **asked) for path in (file, *more)]
     for report in reports:
         if not json_:
             print("\n".join(lines_of(report, verbose)))
