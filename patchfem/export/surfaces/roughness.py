@@ -10,6 +10,9 @@ from ..pictures import LADDERS, step_of
 from ..report import CSS
 from . import pictures
 
+AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
+         "spectrum of this scan, wider where the kurtosis is above 3. It does not know a surface that differs from "
+         "place to place, nor waves longer than the scan.")
 INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on a surface with Gaussian heights and "
             "the spectrum of this trace, wider where the kurtosis is above 3. It does not know a surface that differs "
             "from place to place.")
@@ -166,7 +169,7 @@ def _table(report: RoughnessReport) -> str:
             if one.value is not None else f"<td colspan=3 class=soft>{escape(one.reason)}</td>"
         rows.append(f"<tr><td>{escape(one.name)}</td>{text}</tr>")
     return ("<h2>Parameters</h2><table><tr><th>parameter<th class=n>value<th class=n>5 .. 95 %<th>unit</tr>"
-            f"{''.join(rows)}</table><p class=soft>{escape(INTERVAL)}</p>")
+            f"{''.join(rows)}</table><p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>")
 
 
 def _printed(report: RoughnessReport) -> str:

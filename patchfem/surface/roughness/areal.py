@@ -3,6 +3,7 @@
 import numpy as np
 
 LOW, HIGH = 0.05, 0.95
+SPENT = 0.85  # share of the degrees of freedom that is left when the spectrum is estimated too (240 made scans)
 
 
 def areal_parameters(flat: np.ndarray) -> dict:
@@ -30,7 +31,7 @@ def areal_intervals(flat: np.ndarray, values: dict) -> dict:
         return out
     wider = max(1.0, (values["Sku"] - 1) / 2)
     shares, cubes, fourths = _scatter(np.nan_to_num(flat))
-    freedom = max(2 / shares / wider, 1.0)
+    freedom = max(SPENT * 2 / shares / wider, 1.0)
     low, high = (float(np.sqrt(freedom / chi2.ppf(p, freedom))) for p in (HIGH, LOW))
     for name in ("Sa", "Sq"):
         out[name] = values[name] * low, values[name] * high

@@ -1,6 +1,5 @@
 """Abbott curve of a trace and the core, peaks and valleys read off it (ISO 13565-2, ISO 21920-2)."""
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -70,7 +69,8 @@ def _ratio_at(z, level: float) -> float:
     return float((k - 0.5 + (z[k - 1] - level) / (z[k - 1] - z[k] if z[k - 1] > z[k] else 1.0)) / n)
 
 
-@lru_cache(maxsize=8)
 def core_of(heights: Heights) -> Core | None:
-    """`core` of a record, worked out once for its five parameters."""
-    return core(heights)
+    """`core` of a record, worked out once for its five parameters and kept with it."""
+    if "core" not in heights.kept:
+        heights.kept["core"] = core(heights)
+    return heights.kept["core"]

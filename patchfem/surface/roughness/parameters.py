@@ -1,6 +1,6 @@
 """Parameters of height and slope of an even trace, and the record that all of a trace's parameters are read from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -12,11 +12,13 @@ class Heights:
     """Heights z (n,) [m] about their mean line, every `step` [m]: the primary or the roughness profile.
 
     section: length [m] over which a peak, a valley or a spacing is looked for, the cut-off; None: the whole trace.
+    kept: results that several parameters share.
     """
 
     z: np.ndarray
     step: float
     section: float | None = None
+    kept: dict = field(default_factory=dict)
 
     @property
     def length(self) -> float:
