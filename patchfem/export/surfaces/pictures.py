@@ -70,6 +70,10 @@ def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None)
 
 
 def _spectrum(axis, spectrum, band: tuple, cutoff: float | None) -> None:
+    axis.set(ylabel="density [um$^3$]", title="Power spectral density")
+    if not spectrum.density.any():
+        axis.text(0.5, 0.5, "the trace is flat", ha="center", transform=axis.transAxes)
+        return
     name, scale = axis_unit([1 / spectrum.frequency[0] / 4], "m")
     low, high = spectrum.band()
     pick = np.unique(np.round(np.geomspace(1, spectrum.frequency.size, CURVE)).astype(int)) - 1
@@ -86,7 +90,7 @@ def _spectrum(axis, spectrum, band: tuple, cutoff: float | None) -> None:
         axis.axvline(spectrum.dominant * scale, color=ORANGE, lw=1.2, ls="--", label="dominant wavelength")
     if cutoff is not None:
         axis.axvline(cutoff * scale, color="0.3", lw=1.0, ls=":", label="cut-off")
-    axis.set(xlabel=f"wavelength [{name}]", ylabel="density [um$^3$]", title="Power spectral density", xlim=ends)
+    axis.set(xlabel=f"wavelength [{name}]", xlim=ends)
     axis.legend(loc="upper left", fontsize=8)
 
 

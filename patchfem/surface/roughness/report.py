@@ -94,7 +94,7 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
             raise PatchfemError(f"{surface.source}: an areal scan; a cut-off or a window is for one trace of it")
         return _of_scan(surface)
     cut = surface if window is None else windowed(surface, *window)
-    trace = _enough(even(cut))
+    trace = _enough(even(_enough(cut)))
     primary, found = _primary(trace, band)
     heights, spectrum = found.heights, found.spectrum
     values = [_value(row, row.of(heights), found) for row in rows.PRIMARY]
@@ -136,7 +136,7 @@ def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: 
     if row is None or row in rows.AREAL or row in rows.WINDOW:
         known = ", ".join(each.name for each in (*rows.PRIMARY, *rows.WAVES, *rows.ROUGH))
         raise PatchfemError(f"'{name}' is no parameter of a trace; known are {known}")
-    trace = _enough(even(profile))
+    trace = _enough(even(_enough(profile)))
     if row not in rows.ROUGH:
         found = _primary(trace, band)[1]
         return _waves(row, trace.source, found) if row in rows.WAVES else _value(row, row.of(found.heights), found)
@@ -160,7 +160,7 @@ def reread(profile: Profile) -> tuple:
         cursors = one.reference[0], one.measure[0]
         if cursors not in parts:
             try:
-                part = even(windowed(profile, *cursors))
+                part = even(_enough(windowed(profile, *cursors)))
             except PatchfemError:
                 continue
             parts[cursors] = part, Heights(level(part).z, part.length / (part.x.size - 1))
