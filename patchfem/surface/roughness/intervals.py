@@ -8,10 +8,16 @@ and the spectrum of this trace, in 90 of 100 traces. Two ways lead to it:
 - For the others, `COUNT` traces are made with the spectrum and with random phases and heights. The parameter of the
   trace stands to its mean like those of the made traces to theirs: as a ratio, or as a difference.
 
-Heights with a kurtosis above 3 scatter more. Their intervals are wider by sqrt((kurtosis - 1) / 2), which is exact for
-the mean square of independent heights. What a trace cannot tell is not in the interval: a surface that differs from
-place to place, waves longer than the trace.
+Heights (slopes, for Rdq) with a kurtosis above 3 scatter more. Their intervals are wider by sqrt((kurtosis - 1) / 2),
+which is exact for the mean square of independent heights. What a trace cannot tell is not in the interval: a surface
+that differs from place to place, waves longer than the trace.
+
+On plateaus with valleys (Gaussian heights cut at half a deviation, 250 traces of 1 mm) the intervals of Rku, Rk, Rpk
+and Mr2 held the mean in 66 to 72 of 100 traces, those of Pku, Pk, Ppk and PMr2 in 41 to 66, all others in 87 or more.
+The report says so where the skewness tells such a surface.
 """
+
+from functools import cached_property
 
 import numpy as np
 
@@ -35,9 +41,13 @@ class Intervals:
         """levelled: made traces are levelled like the trace, as the primary profile is; band: wavelengths [m]."""
         self.heights, self.levelled, self.band = heights, levelled, band
         self.spectrum = spectrum_of(heights.z, heights.step) if found is None else found
-        high = kurtosis(heights)
-        self.wider = 1.0 if high is None else float(np.sqrt(max(1.0, (high - 1) / 2)))
         self._made = None
+
+    @cached_property
+    def _wider(self) -> tuple:
+        """Factors of the intervals of heights and of slopes for what scatters more than Gaussian ones."""
+        found = [kurtosis(one) for one in (self.heights, Heights(np.diff(self.heights.z), self.heights.step))]
+        return tuple(1.0 if high is None else float(np.sqrt(max(1.0, (high - 1) / 2))) for high in found)
 
     def of(self, row: Parameter, value: float | None) -> tuple:
         """Interval (low, high) of the value of a row, (None, None) where there is none."""
@@ -57,7 +67,7 @@ class Intervals:
             return FLOOR
         squares = float(density @ density) / (1 + 1 / found.tapers)  # a density of 2 tapers scatters by 1 / tapers
         whole = 2 * found.length * float(density.sum()) ** 2 * found.step / squares
-        return max((whole - SPENT) / self.wider**2, FLOOR)
+        return max((whole - SPENT) / self._wider[kind == "slope"] ** 2, FLOOR)
 
     def _by_freedom(self, kind: str, value: float) -> tuple:
         from scipy.stats import chi2
@@ -72,21 +82,18 @@ class Intervals:
         values = np.array([one for one in found if one is not None])
         if values.size < COUNT / 2:
             return None, None
-        spread = self.wider
+        spread = self._wider[0]
         if row.kind != "extreme":  # an extreme of a longer trace scatters hardly less
             spread *= np.sqrt(min(1.0, self._made[0].length / self.heights.length))
-        mean = values.mean()
         if row.kind == "wave":
             spread *= PEAK
-        if row.kind in ("shift", "share"):
-            low, high = np.quantile(values - mean, (LOW, HIGH)) * spread
-            low, high = value - float(high), value - float(low)
-            return (max(low, 0.0), min(high, 1.0)) if row.kind == "share" else (low, high)
-        values = values[values > 0]  # a made trace without peaks above its core has Rpk = 0
-        if values.size < COUNT / 2 or value <= 0:
-            return None, None
-        low, high = np.quantile(np.log(values / mean), (LOW, HIGH)) * spread
-        return value * float(np.exp(-high)), value * float(np.exp(-low))
+        mean, positive = values.mean(), values[values > 0]  # a made trace without peaks above its core has Rpk = 0
+        if row.kind in ("shift", "share") or value <= 0 or positive.size < COUNT / 2:
+            low, high = value - np.quantile(values - mean, (HIGH, LOW)) * spread
+            return (float(low) if row.kind == "shift" else max(float(low), 0.0),
+                    min(float(high), 1.0) if row.kind == "share" else float(high))
+        low, high = value * np.exp(-np.quantile(np.log(positive / mean), (HIGH, LOW)) * spread)
+        return float(low), float(high)
 
 
 def made_traces(found: Spectrum, heights: Heights, levelled: bool, seed: int = 0) -> list:

@@ -111,8 +111,8 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
     stylus = None if radius is None else tip_check(heights, radius)
     return RoughnessReport(
         trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values),
-        trace.notes + _spiky(cut), cutoff, window, band, stylus, reread(surface), primary, waviness, roughness,
-        abbott(shown), core_of(shown), spectrum)
+        trace.notes + _spiky(cut) + _skewed(trace.source, values), cutoff, window, band, stylus, reread(surface),
+        primary, waviness, roughness, abbott(shown), core_of(shown), spectrum)
 
 
 def windowed(profile: Profile, first: float, last: float) -> Profile:
@@ -215,6 +215,18 @@ def _spiky(profile: Profile) -> tuple:
         return ()
     return (f"{profile.source}: {found.sum()} of {found.size} heights are spikes (the first at x = "
             f"{say(profile.x[np.argmax(found)])}); they count in every parameter",)
+
+
+def _skewed(source: str, values: list) -> tuple:
+    """A remark where heights are not Gaussian: the intervals of the shape of their distribution count on it."""
+    out = []
+    for one in values:
+        if one.name in ("Psk", "Rsk") and one.low is not None and not one.low <= 0 <= one.high:
+            letter = one.name[0]
+            named = f"{letter}ku, {letter}k, {letter}pk and " + ("PMr2" if letter == "P" else "Mr2")
+            out.append(f"{source}: {one.name} is {one.value:.2g} ({one.low:.2g} to {one.high:.2g}), so the heights are "
+                       f"not Gaussian; the intervals of {named} count on that and are too narrow")
+    return tuple(out)
 
 
 def _of_scan(scan: Areal) -> RoughnessReport:

@@ -4,6 +4,7 @@ from time import process_time
 
 import numpy as np
 import pytest
+from ring_traces import traces
 
 from patchfem.core import PatchfemError
 from patchfem.surface.areal import Areal
@@ -57,9 +58,19 @@ def test_exact_spikes_are_told_and_count():
     z = trace.z.copy()
     z[1000] += 50 * UM
     report = report_of(Profile(trace.x, z, "made.csv"))
-    assert report.notes == ("made.csv: 1 of 4001 heights are spikes (the first at x = 1 mm); they count in every "
-                            "parameter",)
+    assert report.notes[0] == ("made.csv: 1 of 4001 heights are spikes (the first at x = 1 mm); they count in every "
+                               "parameter")
     assert report["Pt"].value > 50 * UM
+
+
+def test_exact_a_plateau_is_told():
+    """Heights cut at half a deviation: the intervals that count on Gaussian heights are named; a sine has no remark."""
+    z = np.minimum(traces(1, 8e-3, UM, 6 * UM, 3)[0], 3 * UM)
+    notes = report_of(Profile(np.arange(z.size) * UM, z, "worn.csv"), 250 * UM).notes
+    assert [note.split(" is ")[0] for note in notes] == ["worn.csv: Psk", "worn.csv: Rsk"]
+    assert notes[1].endswith("so the heights are not Gaussian; the intervals of Rku, Rk, Rpk and Mr2 count on that and "
+                             "are too narrow")
+    assert report_of(made(), 250 * UM).notes == ()
 
 
 def test_exact_what_the_instrument_printed_is_read_again():
