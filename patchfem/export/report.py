@@ -140,7 +140,7 @@ def page(data: dict) -> str:
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     if warnings:
         parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
-    parts += [_placed(number, *shown) for number, shown in enumerate(figures(data))]
+    parts += [placed(number, *shown) for number, shown in enumerate(figures(data))]
     if "measured" in data:
         parts.append(_table_one(data))
     if "levels" in data:
@@ -156,7 +156,7 @@ def page(data: dict) -> str:
             f"<title>{escape(title)}</title><style>{CSS}</style></head><body>{body}</body></html>\n")
 
 
-def _placed(number: int, svg: str, caption: str) -> str:
+def placed(number: int | str, svg: str, caption: str) -> str:
     """A figure; one page holds many pictures, so their ids are told apart by the number."""
     svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)

@@ -1,0 +1,190 @@
+"""Roughness of one or several surfaces on paper: lines of text, plain data, a page that stands alone."""
+
+from html import escape
+from pathlib import Path
+
+from ... import __version__
+from ...surface.profile import say
+from ...surface.roughness.report import RoughnessReport, Value
+from ..pictures import LADDERS, step_of
+from ..report import CSS
+from . import pictures
+
+AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
+         "spectrum of this scan, wider where the kurtosis is above 3. It does not know a surface that differs from "
+         "place to place, nor waves longer than the scan.")
+INTERVAL = ("Interval: 5 to 95 %, of the mean over all traces of this length on a surface with Gaussian heights and "
+            "the spectrum of this trace, wider where the kurtosis is above 3. It does not know a surface that differs "
+            "from place to place.")
+
+
+def shown(one: Value) -> tuple:
+    """Value, interval and unit as texts, in the unit that suits the value; no interval is an empty text."""
+    if one.value is None:
+        return "-", "", "" if one.unit == "1" else one.unit
+    unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.value)
+    interval = "" if one.low is None else f"{one.low * scale:.3g} .. {one.high * scale:.3g}"
+    return f"{one.value * scale:.5g}", interval, unit
+
+
+def heading(report: RoughnessReport) -> str:
+    """What was measured and how it was treated, in one line."""
+    shape = " x ".join(str(count) for count in report.shape)
+    text = f"{shape} heights, {say(report.length)} long, every {say(report.step)}"
+    if report.kind == "areal":
+        return text + ", about the least-squares plane"
+    if report.window is not None:
+        text += f", window {say(report.window[0])} to {say(report.window[1])}"
+    text += ", about the least-squares line"
+    if report.cutoff is None:
+        return text + "; no cut-off, so no roughness profile"
+    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, no filter for short "
+            "waves")
+
+
+def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
+    """The report as lines: a table of value, interval and unit, with definitions where asked."""
+    out = [f"{report.source}: {heading(report)}"]
+    out.append(f"  {'':<20} {'value':>10}  {'5 .. 95 %':<20} unit")
+    for one in report.values:
+        value, interval, unit = shown(one)
+        tail = one.reason if one.value is None else ""
+        out.append(f"  {one.name:<20} {value:>10}  {interval:<20} {unit:<4} {tail}".rstrip())
+        if verbose:
+            out.append(f"  {'':<20}   {one.text}")
+    for one in report.printed:
+        out.append(f"  the instrument printed {_pair(one)}")
+    if report.tip is not None:
+        out.append(f"  {report.tip.sentence}")
+    return out
+
+
+def _pair(one) -> str:
+    unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
+    return f"{one.name} {one.printed * scale:.6g} {unit}".rstrip() + f"; from its heights {one.here * scale:.6g}"
+
+
+def data_of(report: RoughnessReport) -> dict:
+    """The report as plain data in SI."""
+    measures = {}
+    for one in report.values:
+        measures[one.name] = {"value": one.value, "low": one.low, "high": one.high, "unit": one.unit}
+        if one.value is None:
+            measures[one.name]["reason"] = one.reason
+    out = {"file": report.source, "kind": report.kind, "length": report.length, "step": report.step,
+           "shape": list(report.shape), "cutoff": report.cutoff,
+           "window": None if report.window is None else list(report.window), "measures": measures,
+           "notes": list(report.notes)}
+    if report.kind == "profile":
+        out["band"] = list(report.band)
+    if report.tip is not None:
+        out["tip"] = {"radius": report.tip.radius, "valley_radius": report.tip.valleys,
+                      "narrow_share": report.tip.share, "text": report.tip.sentence}
+    if report.printed:
+        out["printed"] = {one.name: {"printed": one.printed, "value": one.here, "unit": one.unit}
+                          for one in report.printed}
+    return out
+
+
+def page(reports: list) -> str:
+    """The page of one or several surfaces, nothing fetched."""
+    title = "Roughness of " + ", ".join(Path(one.source).name for one in reports)
+    body = "\n".join(_section(number, one, len(reports) > 1) for number, one in enumerate(reports))
+    return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width'>"
+            f"<title>{escape(title)}</title><style>{CSS}</style></head><body><h1>{escape(title)}</h1>"
+            f"<p class=soft>patchfem {escape(__version__)}</p>{body}</body></html>\n")
+
+
+def write_page(path: Path, reports: list) -> None:
+    """Write the page."""
+    Path(path).write_text(page(reports), encoding="utf-8")
+
+
+def _section(number: int, report: RoughnessReport, several: bool) -> str:
+    parts = [f"<h2>{escape(report.source)}</h2>"] if several else []
+    parts += [f"<p class=verdict>{verdict(report)}</p>", f"<p class=soft>{escape(heading(report))}.</p>"]
+    told = [*report.notes, *([report.tip.sentence] if report.tip is not None and not report.tip.reaches else [])]
+    if told:
+        parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(text)}.</p>" for text in told) + "</div>")
+    if report.tip is not None and report.tip.reaches:
+        parts.append(f"<p class=soft>Stylus: {escape(report.tip.sentence)}.</p>")
+    parts += [_figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
+    return "\n".join([*parts, _table(report), _printed(report), _definitions(report)])
+
+
+def verdict(report: RoughnessReport) -> str:
+    """The answer in a sentence."""
+    if report.kind == "areal":
+        names = ("Sa", "Sq", "Sz", "Ssk")
+    else:
+        names = ("Ra", "Rz", "RSm") if report.cutoff is not None else ("Pa", "Pq", "Pt")
+        names += ("dominant_wavelength", "band_amplitude")
+    known = [report[name] for name in names]
+    return "; ".join(f"<span class=v><b>{escape(one.name.replace('_', ' '))}</b> {escape(_said(one))}</span>"
+                     for one in known if one.value is not None) + "."
+
+
+def _said(one: Value) -> str:
+    value, interval, unit = shown(one)
+    return f"{value} {unit}".rstrip() + (f" ({interval})" if interval else "")
+
+
+def figures(report: RoughnessReport) -> list:
+    """Pictures [(svg, caption, alternative text)] of a report."""
+    if report.kind == "areal":
+        flat = report.scan
+        return [(pictures.scan(flat.x, flat.y, flat.z), "Heights about the least-squares plane and their distribution; "
+                 "colours end at all but the outermost 0.2 % of the points.",
+                 f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square")]
+    lines = "the waviness on it" if report.waviness is not None else "no cut-off was given"
+    height = report["Pt"]
+    out = [(pictures.trace(report.primary, report.waviness), f"Levelled trace; {lines}.",
+            f"Heights of {report.source} along x: {_said(height)} from the deepest valley to the highest peak")]
+    if report.roughness is not None:
+        out.append((pictures.rough(report.roughness, (report.primary.x[0], report.primary.x[-1]), report.cutoff),
+                    f"Roughness: the trace less the waviness, with its sections of {say(report.cutoff)}. The half "
+                    "section missing at each end is trimmed.", f"Roughness profile: Rq {_said(report['Rq'])}"))
+    kind = "roughness profile" if report.roughness is not None else "levelled trace"
+    count, wave = report.spectrum.tapers, report["dominant_wavelength"]
+    out.append((pictures.statistics(report.abbott, report.core, report.spectrum, report.band, report.cutoff),
+                f"Left: Abbott curve of the {kind}; dashed the straight line of its core. Right: spectrum of the "
+                f"levelled trace, the mean of {count} sine tapers, with its 95 % band by chi-square of {2 * count} "
+                "degrees of freedom.",
+                f"Abbott curve and power spectral density; the dominant wavelength is {_said(wave)}"))
+    return out
+
+
+def _figure(number: str, svg: str, caption: str, alternative: str) -> str:
+    from ..report import placed
+
+    svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
+    return placed(number, svg, caption)
+
+
+def _table(report: RoughnessReport) -> str:
+    rows = []
+    for one in report.values:
+        value, interval, unit = shown(one)
+        text = f"<td class=n>{escape(value)}</td><td class=n>{escape(interval)}</td><td>{escape(unit)}</td>" \
+            if one.value is not None else f"<td colspan=3 class=soft>{escape(one.reason)}</td>"
+        rows.append(f"<tr><td>{escape(one.name)}</td>{text}</tr>")
+    return ("<h2>Parameters</h2><table><tr><th>parameter<th class=n>value<th class=n>5 .. 95 %<th>unit</tr>"
+            f"{''.join(rows)}</table><p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>")
+
+
+def _printed(report: RoughnessReport) -> str:
+    if not report.printed:
+        return ""
+    rows = []
+    for one in report.printed:
+        unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
+        rows.append(f"<tr><td>{escape(one.name)}</td><td class=n>{one.printed * scale:.6g}</td>"
+                    f"<td class=n>{one.here * scale:.6g}</td><td>{escape(unit)}</td></tr>")
+    return ("<h2>What the instrument printed</h2><table><tr><th>result<th class=n>printed<th class=n>from its heights"
+            f"<th>unit</tr>{''.join(rows)}</table><p class=soft>Between the cursors of the file, about the "
+            "least-squares line, nothing filtered.</p>")
+
+
+def _definitions(report: RoughnessReport) -> str:
+    rows = "".join(f"<tr><td>{escape(one.name)}</td><td>{escape(one.text)}</td></tr>" for one in report.values)
+    return f"<h2>Definitions</h2><table>{rows}</table>"

@@ -1,0 +1,108 @@
+"""Gaussian profile filter of ISO 16610-21: a trace splits into waviness and roughness at a cut-off."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ..profile import Profile, level, say
+
+ALPHA = np.sqrt(np.log(2) / np.pi)  # half of a wave as long as the cut-off passes
+REACH = 1.25  # cut-offs to either side; beyond them lies 1.5e-10 of the weight
+FEWEST = 4  # steps of a cut-off
+MOST = 1 << 21  # samples of an evened trace
+
+
+def even(profile: Profile) -> Profile:
+    """A trace without gaps on an even step, which filter and spectrum want; the notes tell what that took.
+
+    A trace that is even and whole comes back as it is. Missing heights are bridged by straight lines. An uneven trace
+    is read off along its straight lines at its 10th percentile step, so that nothing between its samples is lost.
+    """
+    there, steps = ~profile.missing, np.diff(profile.x)
+    whole, regular = bool(there.all()), bool(np.ptp(steps) <= 1e-6 * steps.mean())
+    if whole and regular:
+        return profile
+    known, heights = profile.x[there], profile.z[there]
+    if known.size < 2:
+        raise PatchfemError(f"{profile.source}: {known.size} heights; a trace wants two at least")
+    x, notes = profile.x[(profile.x >= known[0]) & (profile.x <= known[-1])], profile.notes
+    if not whole:
+        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; straight lines stand in "
+                  f"their place, the longest over {say(float(np.diff(known).max()))}",)
+    if not regular:
+        step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / MOST)
+        count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
+        x = np.linspace(x[0], x[-1], count)
+        notes += (f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} apart; the "
+                  f"trace is read off every {say(float(x[1] - x[0]))} along its straight lines",)
+    return replace(profile, x=frozen_array(x), z=frozen_array(np.interp(x, known, heights)), notes=notes)
+
+
+def filtered(profile: Profile, cutoff: float, ends: str = "trimmed") -> tuple:
+    """Waviness and roughness of a trace at a cut-off [m], both of them a Profile.
+
+    The trace is put on an even step (`even`), its least-squares line is subtracted, and the weighting function of
+    ISO 16610-21, exp(-pi (x / (alpha cutoff))^2) / (alpha cutoff) with alpha = sqrt(ln 2 / pi), takes the mean line.
+    ends: "trimmed": half a cut-off is left off at each end, and where the weighting function still reaches beyond the
+    trace, the part within is scaled to a sum of one; "whole": nothing is left off, and the mean line at the ends is
+    that of the weighted least-squares line (ISO 16610-28, first moment). PatchfemError for a cut-off of fewer than
+    four steps or, trimmed, as long as the trace.
+    """
+    if ends not in ("trimmed", "whole"):
+        raise PatchfemError(f"ends of a filtered trace '{ends}' are not known; use trimmed or whole")
+    flat = level(even(profile))
+    step = flat.length / (flat.x.size - 1)
+    if not np.isfinite(cutoff) or cutoff < FEWEST * step * (1 - 1e-9):
+        raise PatchfemError(f"{profile.source}: a cut-off of {say(cutoff)} is shorter than {FEWEST} steps of "
+                            f"{say(step)}; the shortest here is {say(FEWEST * step)}")
+    edge = int(np.ceil(cutoff / 2 / step * (1 - 1e-9))) if ends == "trimmed" else 0
+    if 2 * edge > flat.x.size - 2 or cutoff > 2 * flat.length:
+        raise PatchfemError(f"{profile.source}: the trace is {say(flat.length)} long; half a cut-off of {say(cutoff)} "
+                            "goes off at each end, so the cut-off must be shorter than the trace")
+    line = mean_line(flat.z, cutoff / step, ends == "whole")
+    keep = slice(edge, flat.x.size - edge)
+    x = frozen_array(flat.x[keep])
+    return (replace(flat, x=x, z=frozen_array(line[keep])), replace(flat, x=x, z=frozen_array((flat.z - line)[keep])))
+
+
+def mean_line(z: np.ndarray, cutoff: float, tilted: bool = False) -> np.ndarray:
+    """Mean line (n,) of even heights z (n,) at a cut-off in steps, scaled at the ends, or tilted with the trace there.
+
+    One transform of the length of the trace and the weighting function. A million samples: 0.2 s.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    half = min(int(np.ceil(REACH * cutoff)), z.size - 1)
+    t = np.arange(-half, half + 1.0)
+    weight = np.exp(-np.pi * (t / (ALPHA * cutoff)) ** 2)
+    size = next_fast_len(z.size + half, real=True)  # what wraps falls beyond the trace
+    transform = rfft(z, size)
+
+    def through(kernel):
+        return irfft(transform * rfft(np.roll(np.pad(kernel, (0, size - kernel.size)), -half), size), size)[:z.size]
+
+    line = through(weight) / weight.sum()
+    last = min(half, (z.size - 1) // 2) + 1  # samples that see an end
+    for flip in (False, True):
+        place = np.arange(z.size)[::-1][:last] if flip else np.arange(last)
+        line[place] = _at_end(z[::-1] if flip else z, weight, last, line[place] * weight.sum(), tilted)
+    return line
+
+
+def _at_end(z, weight, last: int, means, tilted: bool) -> np.ndarray:
+    """Mean line at the first samples, whose weights start at the first sample and, in short traces, end at the last."""
+    half, at = weight.size // 2, np.arange(last)
+    low, high = np.maximum(half - at, 0), np.minimum(half + z.size - at, weight.size)
+
+    def moment(values):
+        total = np.concatenate([[0.0], np.cumsum(values)])
+        return total[high] - total[low]
+
+    t = np.arange(-half, half + 1.0)
+    m0 = moment(weight)
+    if not tilted:
+        return means / m0
+    m1, m2 = moment(weight * t), moment(weight * t * t)
+    first = np.array([(weight[a:b] * t[a:b]) @ z[i - half + a:i - half + b] for i, a, b in zip(at, low, high)])
+    return (means * m2 - first * m1) / (m0 * m2 - m1**2)

@@ -1,0 +1,242 @@
+"""Everything that a trace or an areal scan tells about its roughness, in one frozen record."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ..areal import Areal, level_plane
+from ..profile import Profile, level, say, spikes
+from . import rows
+from .areal import areal_intervals, areal_parameters
+from .bearing import abbott, core_of
+from .filter import even, filtered
+from .intervals import Intervals
+from .parameters import Heights
+from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
+from .tip import Tip, tip_check
+
+FEWEST = 16  # samples of a trace with a report
+ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
+PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
+           "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
+
+
+class Value(NamedTuple):
+    """A parameter [SI] with its interval, 5 to 95 %, its unit and definition; reason: why there is no value."""
+
+    name: str
+    value: float | None
+    low: float | None
+    high: float | None
+    unit: str
+    text: str
+    reason: str = ""
+
+
+class Reread(NamedTuple):
+    """A result that the instrument printed into the file, and the same one read off its heights [SI]."""
+
+    name: str
+    printed: float
+    here: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class RoughnessReport:
+    """What `report_of` found.
+
+    values: tuple of Value; length [m]; shape: samples, along y first; step [m] between samples; cutoff, window [m] or
+    None; band: wavelengths [m] of band_amplitude; notes: sentences about the file and what was done to it; tip: the
+    stylus against the valleys, or None; printed: tuple of Reread. Of traces only: primary, the levelled trace;
+    waviness, roughness, None without a cut-off; abbott: (ratio, height) of the roughness, of the primary without one,
+    and its core; spectrum of the primary. scan: the levelled areal scan.
+    """
+
+    source: str
+    kind: str
+    length: float
+    shape: tuple
+    step: float
+    values: tuple
+    notes: tuple
+    cutoff: float | None = None
+    window: tuple | None = None
+    band: tuple = BAND
+    tip: Tip | None = None
+    printed: tuple = ()
+    primary: Profile | None = None
+    waviness: Profile | None = None
+    roughness: Profile | None = None
+    abbott: tuple | None = None
+    core: tuple | None = None
+    spectrum: object | None = None
+    scan: Areal | None = None
+
+    def __getitem__(self, name: str) -> Value:
+        """The parameter of this name."""
+        return next(one for one in self.values if one.name == name)
+
+
+def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tuple | None = None,
+              tip: float | None = None, band: tuple = BAND) -> RoughnessReport:
+    """Parameters of a trace or of an areal scan with the intervals that one measurement of its size allows.
+
+    cutoff [m]: between waviness and roughness; without it there is the primary profile alone. window: (first, last)
+    [m] on the x axis of the file, as cursors (`windowed`). tip [m]: radius of the stylus, by default that of the file.
+    band [m]: wavelengths of band_amplitude. A trace of a million samples: 1.2 s. PatchfemError for fewer than 16
+    samples, a window beyond the trace, a cut-off that does not fit, or one for an areal scan.
+    """
+    if isinstance(surface, Areal):
+        if cutoff is not None or window is not None:
+            raise PatchfemError(f"{surface.source}: an areal scan; a cut-off or a window is for one trace of it")
+        return _of_scan(surface)
+    cut = surface if window is None else windowed(surface, *window)
+    trace = _enough(even(_enough(cut)))
+    primary, found = _primary(trace, band)
+    heights, spectrum = found.heights, found.spectrum
+    values = [_value(row, row.of(heights), found) for row in rows.PRIMARY]
+    values += [_waves(row, trace.source, found) for row in rows.WAVES]
+    waviness = roughness = rough = None
+    if cutoff is not None:
+        waviness, roughness = filtered(primary, cutoff)
+        rough = Heights(roughness.z, heights.step, cutoff)
+        inner = Intervals(rough, levelled=False)
+        values += [_value(row, row.of(rough), inner) for row in rows.ROUGH]
+    if window is not None:
+        values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
+    shown, radius = rough or heights, surface.tip_radius if tip is None else tip
+    stylus = None if radius is None else tip_check(heights, radius)
+    return RoughnessReport(
+        trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values),
+        trace.notes + _spiky(cut) + _skewed(trace.source, values), cutoff, window, band, stylus, reread(surface),
+        primary, waviness, roughness, abbott(shown), core_of(shown), spectrum)
+
+
+def windowed(profile: Profile, first: float, last: float) -> Profile:
+    """The part of a trace between two cursors [m], as an instrument takes it: from the last sample at or before the
+    one to the last at or before the other, both included.
+
+    PatchfemError for a window that turns back or does not lie within the trace.
+    """
+    x = profile.x
+    near = 1e-6 * profile.length / (x.size - 1)
+    if not first < last or first < x[0] - near or last > x[-1] + near:
+        raise PatchfemError(f"{profile.source}: a window from {say(first)} to {say(last)}; the trace runs from "
+                            f"{say(x[0])} to {say(x[-1])}")
+    low, high = (max(int(np.searchsorted(x, at + near, "right")) - 1, 0) for at in (first, last))
+    return replace(profile, x=x[low:high + 1], z=profile.z[low:high + 1])
+
+
+def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Value:
+    """One parameter of a trace with its interval; names as in `rows`, those of the roughness need a cut-off [m]."""
+    row = rows.TABLE.get(name)
+    if row is None or row in rows.AREAL or row in rows.WINDOW:
+        known = ", ".join(each.name for each in (*rows.PRIMARY, *rows.WAVES, *rows.ROUGH))
+        raise PatchfemError(f"'{name}' is no parameter of a trace; known are {known}")
+    trace = _enough(even(_enough(profile)))
+    if row not in rows.ROUGH:
+        found = _primary(trace, band)[1]
+        return _waves(row, trace.source, found) if row in rows.WAVES else _value(row, row.of(found.heights), found)
+    if cutoff is None:
+        raise PatchfemError(f"{profile.source}: {name} is of the roughness profile and wants a cut-off")
+    heights = Heights(filtered(_primary(trace, band)[0], cutoff)[1].z, trace.length / (trace.x.size - 1), cutoff)
+    return _value(row, row.of(heights), Intervals(heights, levelled=False))
+
+
+def reread(profile: Profile) -> tuple:
+    """What the instrument printed into the file, each beside the same result read off its heights; () without any.
+
+    The instrument levels the part between its cursors by least squares and filters nothing.
+    """
+    table = {row.name: row for row in (*rows.PRIMARY, *rows.WINDOW)}
+    out, parts = [], {}
+    for name, one in profile.printed.items():
+        row = table.get(PRINTED.get(name, ""))
+        if row is None or one.reference is None or one.measure is None or one.reference[1] or one.measure[1]:
+            continue
+        cursors = one.reference[0], one.measure[0]
+        if cursors not in parts:
+            try:
+                part = even(_enough(windowed(profile, *cursors)))
+            except PatchfemError:
+                continue
+            parts[cursors] = part, Heights(level(part).z, part.length / (part.x.size - 1))
+        part, heights = parts[cursors]
+        out.append(Reread(name, one.value, _ends(part) if row.of is None else row.of(heights), one.unit))
+    return tuple(out)
+
+
+def _enough(trace: Profile) -> Profile:
+    if trace.x.size < FEWEST:
+        raise PatchfemError(f"{trace.source}: {trace.x.size} samples; parameters want {FEWEST} at least")
+    return trace
+
+
+def _primary(trace: Profile, band: tuple) -> tuple:
+    flat = level(trace)
+    if np.ptp(flat.z) <= ROUND * np.abs(trace.z).max():
+        flat = replace(flat, z=frozen_array(np.zeros(flat.z.size)))
+    heights = Heights(flat.z, trace.length / (trace.x.size - 1))
+    return flat, Intervals(heights, True, spectrum_of(heights.z, heights.step), band)
+
+
+def _value(row, value, found: Intervals) -> Value:
+    low, high = found.of(row, value)
+    reason = ""
+    if value is None:
+        flat = found.heights.power == 0
+        reason = "the trace is flat" if flat else "the trace is shorter than one cut-off" \
+            if found.heights.section is not None and not len(found.heights.sections) else "the trace holds none"
+    return Value(row.name, value, low, high, row.unit, row.text, reason)
+
+
+def _waves(row, source: str, found: Intervals) -> Value:
+    if row.name == "dominant_wavelength":
+        return _value(row, found.spectrum.dominant, found)
+    low, high = found.band
+    text = row.text.replace("the band", f"{say(low)} to {say(high)}")
+    try:
+        refuse_band(source, low, high, found.heights.length, found.heights.step)
+    except PatchfemError as error:
+        return Value(row.name, None, None, None, row.unit, text, str(error))
+    return _value(row._replace(text=text), amplitude_of(found.spectrum, low, high), found)
+
+
+def _ends(trace: Profile) -> float:
+    return float(trace.z[-1] - trace.z[0])
+
+
+def _spiky(profile: Profile) -> tuple:
+    found = spikes(profile)
+    if not found.any():
+        return ()
+    return (f"{profile.source}: {found.sum()} of {found.size} heights are spikes (the first at x = "
+            f"{say(profile.x[np.argmax(found)])}); they count in every parameter",)
+
+
+def _skewed(source: str, values: list) -> tuple:
+    """A remark where heights are not Gaussian: the intervals of the shape of their distribution count on it."""
+    out = []
+    for one in values:
+        if one.name in ("Psk", "Rsk") and one.low is not None and not one.low <= 0 <= one.high:
+            letter = one.name[0]
+            named = f"{letter}ku, {letter}k, {letter}pk and " + ("PMr2" if letter == "P" else "Mr2")
+            out.append(f"{source}: {one.name} is {one.value:.2g} ({one.low:.2g} to {one.high:.2g}), so the heights are "
+                       f"not Gaussian; the intervals of {named} count on that and are too narrow")
+    return tuple(out)
+
+
+def _of_scan(scan: Areal) -> RoughnessReport:
+    flat = level_plane(scan)
+    found = areal_parameters(flat.z)
+    bounds = areal_intervals(flat.z, found)
+    values = tuple(Value(row.name, found[row.name], *bounds[row.name], row.unit, row.text,
+                         "" if found[row.name] is not None else "the scan is flat") for row in rows.AREAL)
+    lost = int(scan.missing.sum())
+    notes = scan.notes + ((f"{scan.source}: {lost} of {scan.z.size} heights are missing and do not count",) if lost
+                          else ())
+    return RoughnessReport(scan.source, "areal", float(scan.x[-1] - scan.x[0]), scan.z.shape,
+                           float(scan.x[-1] - scan.x[0]) / (scan.x.size - 1), values, notes, scan=flat)

@@ -1,0 +1,156 @@
+"""patchfem profile: table, definitions, JSON, page, several files, refusals with exit code 2."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import ALWAYS, MODULES, cli, loaded
+
+from patchfem.surface.roughness.report import report_of
+from patchfem.surface.roughness.rows import TABLE
+from patchfem.surface.synthetic import sine
+
+UM = 1e-6
+
+
+@pytest.fixture
+def trace(tmp_path) -> Path:
+    """A sine of 5 um and 80 um with a little noise, 4 mm long."""
+    x = np.arange(4001.0)
+    z = 5 * np.sin(2 * np.pi * x / 80) + np.random.default_rng(0).normal(0, 0.05, x.size)
+    path = tmp_path / "before.csv"
+    path.write_text("x [um],z [um]\n" + "".join(f"{a:g},{b:.17g}\n" for a, b in zip(x, z)))
+    return path
+
+
+@pytest.fixture
+def scan(tmp_path) -> Path:
+    rows = np.random.default_rng(1).normal(0, 1, (12, 16))
+    path = tmp_path / "scan.csv"
+    path.write_text("x [um],y [um],z [nm]\n" + "".join(f"{i},{k},{rows[k, i]!r}\n".replace("np.float64(", "").replace(
+        ")", "") for k in range(12) for i in range(16)))
+    return path
+
+
+def test_exact_the_table(trace):
+    answer = cli("profile", trace, "--cutoff", "0.25 mm")
+    assert answer.code == 0 and answer.err == ""
+    lines = answer.out.splitlines()
+    assert lines[0] == (f"{trace}: 4001 heights, 4 mm long, every 1 um, about the least-squares line; Gaussian filter "
+                        "at 250 um, half of it trimmed at each end, no filter for short waves")
+    rows = {line.split()[0]: line.split()[1:] for line in lines[2:]}
+    assert {"Pa", "Pq", "Pt", "Psk", "Pku", "Pdq", "Ra", "Rq", "Rp", "Rv", "Rz", "Rt", "Rsk", "Rku", "RSm", "Rdq", "Rk",
+            "Rpk", "Rvk", "Mr1", "Mr2", "dominant_wavelength", "band_amplitude"} <= set(rows)
+    assert float(rows["Ra"][0]) == pytest.approx(5 * 2 / np.pi, rel=0.01) and rows["Ra"][-1] == "um"
+    assert float(rows["RSm"][0]) == pytest.approx(80, rel=0.01) and rows["RSm"][2] == ".."
+
+
+def test_exact_definitions_where_asked(trace):
+    plain, long = cli("profile", trace).out, cli("profile", trace, "-v").out
+    assert "mean of the absolute heights" not in plain and "mean of the absolute heights" in long
+    assert "no cut-off, so no roughness profile" in plain and "  Ra " not in plain
+
+
+def test_exact_json_in_si(trace, scan):
+    answer = json.loads(cli("profile", trace, scan, "--json").out)
+    first, second = answer["profiles"]
+    assert first["file"] == str(trace) and first["kind"] == "profile" and second["kind"] == "areal"
+    assert first["measures"]["Pq"]["value"] == pytest.approx(5 * UM / np.sqrt(2), rel=0.01)
+    assert set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"} and first["measures"]["Pq"]["unit"] == "m"
+    assert first["cutoff"] is None and first["length"] == pytest.approx(4e-3)
+    assert second["measures"]["Sq"]["value"] == pytest.approx(1e-9, rel=0.2) and second["shape"] == [12, 16]
+    window = json.loads(cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)["profiles"][0]
+    assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
+    assert {"RzDin", "MaxDev", "ASH"} <= set(window["measures"])
+
+
+def test_exact_the_page_and_its_numbers(trace, tmp_path):
+    out = tmp_path / "out"
+    answer = cli("profile", trace, "--cutoff", "0.25 mm", "--tip", "12.5 um", "-o", out)
+    assert answer.out.splitlines()[-1] == f"results: {out}"
+    page, data = (out / "report.html").read_text(), json.loads((out / "profile.json").read_text())
+    assert page.count("<figure>") == 3 == page.count('role="img" aria-label="')
+    assert data["profiles"][0]["tip"]["radius"] == pytest.approx(12.5 * UM)
+    assert all(f"<td>{name}</td>" in page for name in data["profiles"][0]["measures"])
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+@pytest.mark.parametrize("words, says", [
+    (("--cutoff", "0.25"), "patchfem: profile --cutoff: '0.25' is a bare number without a unit"),
+    (("--cutoff", "-1 mm"), "patchfem: profile --cutoff -1 mm: a length above zero is wanted"),
+    (("--tip", "0 um"), "patchfem: profile --tip 0 um: a length above zero is wanted"),
+    (("--cutoff", "5 mm"), "the trace is 4 mm long; half a cut-off of 5 mm goes off at each end"),
+    (("--window", "1 mm"), "patchfem: profile --window '1 mm': two places are wanted, such as '468 um,733 um'"),
+    (("--window", "1 mm,9 mm"), "a window from 1 mm to 9 mm; the trace runs from 0 um to 4 mm"),
+    (("--units", "mm"), "units are two, of x and of z"),
+])
+def test_refuses_with_exit_code_2(trace, words, says):
+    answer = cli("profile", trace, *words)
+    assert answer.code == 2 and says in answer.err and answer.out == ""
+
+
+def test_refuses_a_file_that_is_not_there(tmp_path):
+    answer = cli("profile", tmp_path / "none.csv")
+    assert answer.code == 4 and "none.csv: no such" in answer.err
+
+
+def test_refuses_a_text_without_units(tmp_path):
+    path = tmp_path / "bare.csv"
+    path.write_text("".join(f"{k},{k % 7}\n" for k in range(50)))
+    answer = cli("profile", path)
+    assert answer.code == 2 and "units are never guessed" in answer.err
+    assert cli("profile", path, "--units", "um,nm").code == 0
+
+
+def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
+    modules = loaded(f"import sys\nfrom patchfem.__main__ import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit "
+                     f"as end:\n    assert not end.code\n{MODULES}", "profile", trace, "--cutoff", "0.25 mm")
+    assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
+
+
+def test_exact_the_pages_are_the_same_bytes(tmp_path):
+    from patchfem.export.surfaces.roughness import page
+
+    trace = sine(np.arange(4000) * UM, UM, 80 * UM, 0.2)
+    assert page([report_of(trace, 250 * UM)]) == page([report_of(trace, 250 * UM)])
+
+
+@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+def test_exact_the_dektak_file_as_it_is():
+    """The file as the instrument exports it: its own results between its own cursors, and the same by --window."""
+    path = Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv"
+    answer = json.loads(cli("profile", path, "--window", "468 um,733 um", "--json").out)["profiles"][0]
+    assert answer["step"] == pytest.approx(0.15625e-6, rel=1e-12)
+    known = {"Ra": ("Pa", 5.25e-9, 5e-12), "Rq": ("Pq", 11.43e-9, 5e-12), "Skew": ("Psk", 6.96, 5e-3),
+             "RzDin": ("RzDin", 49.17e-9, 5e-12), "WMaxDev": ("MaxDev", 128.61e-9, 5e-12),
+             "ASH": ("ASH", 2.89171e-6, 1.5e-11)}
+    for name, (ours, printed, near) in known.items():
+        assert answer["printed"][name]["printed"] == pytest.approx(printed, rel=1e-9)
+        assert answer["printed"][name]["value"] == answer["measures"][ours]["value"] == pytest.approx(printed, abs=near)
+
+
+@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+@pytest.mark.parametrize("name, units", [("nanovea-test1.txt.gz", "mm,um"), ("nanovea-test2.txt.gz", "mm,um")])
+def test_exact_areal_files_as_they_are(name, units):
+    folder = Path(os.environ["PATCHFEM_DATA"])
+    known = json.loads((folder / "truth.json").read_text())[name]
+    found = json.loads(cli("profile", folder / name, "--units", units, "--json").out)["profiles"][0]["measures"]
+    for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
+        assert found[key]["value"] == pytest.approx(known[key] * unit, rel=1e-6)
+
+
+@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+def test_exact_the_flatness_of_the_brake_reuss_beam():
+    folder = Path(os.environ["PATCHFEM_DATA"])
+    known = json.loads((folder / "truth.json").read_text())["brb_surface_data.mat"]
+    answer = json.loads(cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out)["profiles"][0]
+    assert answer["measures"]["Sz"]["value"] == pytest.approx(known["flatness_PV_um"] * UM, rel=1e-6)
+    assert sorted(answer["shape"]) == [54, 246] and "596 of 13284 heights are missing" in answer["notes"][-1]
+
+
+def test_exact_every_parameter_of_the_table_is_in_some_report():
+    trace = sine(np.arange(4000) * UM, UM, 80 * UM, 0.2)
+    found = {one.name for one in report_of(trace, 250 * UM, (100 * UM, 3900 * UM)).values}
+    assert found == {name for name in TABLE if not name.startswith("S")}

@@ -1,0 +1,43 @@
+"""Gaussian traces of an isotropic surface whose waves lie in a ring about 80 um, with a self-affine rest."""
+
+import numpy as np
+
+WAVE = 80e-6
+
+
+def density(frequency: np.ndarray, shortest: float = 8e-6) -> np.ndarray:
+    """One-sided density (k,) of a trace at frequencies [1/m], up to a factor: the surface's, integrated over the other
+    direction.
+
+    The surface has 0.8 of a ring exp(-(q - q0)^2 / 2 (q0 / 4)^2) and 0.2 of a rest that is flat below q0 and goes like
+    q^(-3.6) above, each with that share of the mean square.
+    """
+    q0 = 1 / WAVE
+    across = np.linspace(0, 1 / shortest, 2001)
+    parts = []
+    for kind in ("ring", "rest"):
+        def of(q, kind=kind):
+            value = np.exp(-((q - q0) / (0.25 * q0)) ** 2 / 2) if kind == "ring" else np.maximum(q / q0, 1.0) ** -3.6
+            return np.where(q <= 1 / shortest, value, 0.0)
+
+        line = np.array([np.trapezoid(of(np.hypot(f, across)), across) for f in frequency])
+        radial = np.trapezoid(of(across) * across, across)
+        parts.append(line / radial)
+    return 0.8 * parts[0] + 0.2 * parts[1]
+
+
+def traces(count: int, length: float, step: float, rms: float, seed: int) -> np.ndarray:
+    """Independent traces (count, n) [m], each cut from a period of eight times its length."""
+    size = round(length / step) + 1
+    period = 8 * size
+    frequency = np.arange(period // 2 + 1) / (period * step)
+    coarse = np.linspace(0, frequency[-1], 1500)
+    power = np.interp(frequency, coarse, density(coarse))
+    power[0] = 0.0
+    deviation = np.sqrt(power / power.sum()) * rms * period / 2
+    rng = np.random.default_rng(seed)
+    out = np.empty((count, size))
+    for k in range(count):
+        numbers = rng.standard_normal((2, frequency.size))
+        out[k] = np.fft.irfft(deviation * (numbers[0] + 1j * numbers[1]), period)[:size]
+    return out

@@ -1,0 +1,114 @@
+"""The Gaussian profile filter: transmission of sines, ends, uneven and missing samples, refusals."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem.core import PatchfemError
+from patchfem.surface.profile import Profile
+from patchfem.surface.roughness.filter import ALPHA, even, filtered, mean_line
+from patchfem.surface.roughness.parameters import Heights, root_mean_square
+from patchfem.surface.synthetic import sine
+
+UM = 1e-6
+WAVE = 400 * UM
+
+
+def passed(cutoff: float) -> float:
+    """Rq of a sine of amplitude 1 and wavelength WAVE behind the filter of ISO 16610-21."""
+    return (1 - 2.0 ** -((cutoff / WAVE) ** 2)) / np.sqrt(2)
+
+
+@pytest.mark.parametrize("cutoff, known", [(80, 0.0193359), (250, 0.1677264), (800, 0.6629126)])
+def test_exact_a_sine_through_the_filter(cutoff, known):
+    """Whole waves away from the ends to 1e-9, the whole trimmed trace of 1000 waves to 1e-5."""
+    assert passed(cutoff * UM) == pytest.approx(known, rel=3e-6)
+    trace = sine(np.arange(400_001) * UM, 1e-6, WAVE)
+    rough = filtered(trace, cutoff * UM)[1].z / 1e-6
+    assert abs(rough[2000:2000 + 400 * 900].std() - passed(cutoff * UM)) < 1e-9
+    assert abs(np.sqrt((rough**2).mean()) - passed(cutoff * UM)) < 1e-5
+
+
+@given(st.floats(20.0, 900.0), st.integers(0, 2**32 - 1))
+def test_exact_the_mean_line_is_the_weighted_mean(cutoff, seed):
+    """Every sample by the definition, the weights that lie within the trace scaled to one."""
+    z = np.random.default_rng(seed).normal(size=500)
+    line, x = mean_line(z, cutoff), np.arange(500)
+    for k in (0, 1, 37, 250, 498, 499):
+        weight = np.exp(-np.pi * ((x - k) / (ALPHA * cutoff)) ** 2)
+        assert line[k] == pytest.approx(weight @ z / weight.sum(), abs=1e-8)
+
+
+def test_exact_the_tilted_ends_are_weighted_lines():
+    z, x, cutoff = np.random.default_rng(3).normal(size=400), np.arange(400), 90.0
+    line = mean_line(z, cutoff, tilted=True)
+    for k in (0, 5, 60, 200, 399):
+        weight = np.exp(-np.pi * ((x - k) / (ALPHA * cutoff)) ** 2)
+        _, offset = np.polyfit(x - k, z, 1, w=np.sqrt(weight))
+        assert line[k] == pytest.approx(offset, abs=1e-7)
+
+
+def test_exact_half_a_cutoff_is_trimmed_at_each_end():
+    trace = sine(np.arange(10_001) * UM, 1e-6, 80 * UM)
+    waviness, rough = filtered(trace, 800 * UM)
+    assert rough.x[0] == pytest.approx(400 * UM) and rough.x[-1] == pytest.approx(9600 * UM)
+    assert np.array_equal(waviness.x, rough.x)
+    whole = filtered(trace, 800 * UM, "whole")[1]
+    assert whole.x.size == 10_001
+    assert whole.z[400:9601] == pytest.approx(rough.z, abs=2e-9)
+
+
+def test_exact_waviness_and_roughness_add_up_to_the_levelled_trace():
+    x = np.arange(3000) * UM
+    z = np.random.default_rng(0).normal(0, UM, 3000) + 0.01 * x
+    from patchfem.surface.profile import level
+
+    waviness, rough = filtered(Profile(x, z, "t"), 250 * UM)
+    assert waviness.z + rough.z == pytest.approx(level(Profile(x, z, "t")).z[125:-125], abs=1e-18)
+
+
+def test_always_a_tilt_is_no_roughness():
+    x = np.arange(2000) * UM
+    for ends in ("trimmed", "whole"):
+        assert abs(filtered(Profile(x, 3 * x + 1e-3, "tilted"), 250 * UM, ends)[1].z).max() < 1e-15
+
+
+def test_exact_an_even_whole_trace_stays_itself():
+    trace = sine(np.arange(100) * UM, UM, 30 * UM)
+    assert even(trace) is trace
+
+
+def test_exact_uneven_and_missing_samples_of_a_straight_flank():
+    x = np.array([0.0, 1, 2, 4, 5, 7, 8, 9, 10, 12]) * UM
+    z = 0.1 * x
+    z[4] = np.nan
+    found = even(Profile(x, z, "flank.csv"))
+    assert np.ptp(np.diff(found.x)) < 1e-12 and found.x[[0, -1]] == pytest.approx([0, 12 * UM])
+    assert found.z == pytest.approx(0.1 * found.x, abs=1e-18)
+    assert found.notes == ("flank.csv: 1 of 10 heights are missing; straight lines stand in their place, the longest "
+                           "over 3 um", "flank.csv: samples lie 1 um to 2 um apart; the trace is read off every 1 um "
+                           "along its straight lines")
+
+
+def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
+    rng = np.random.default_rng(5)
+    x = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 60_000))]) * UM
+    rough = filtered(Profile(x, 1e-6 * np.sin(2 * np.pi * x / WAVE), "s"), 250 * UM)[1]
+    assert root_mean_square(Heights(rough.z, 1.0)) / 1e-6 == pytest.approx(passed(250 * UM), rel=2e-3)
+
+
+@pytest.mark.parametrize("cutoff, says", [
+    (3 * UM, "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; the shortest here is 4 um"),
+    (1000 * UM, "1 sines: the trace is 999 um long; half a cut-off of 1 mm goes off at each end, so the cut-off must "
+     "be shorter than the trace"),
+    (np.nan, "a cut-off of"),
+])
+def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
+    with pytest.raises(PatchfemError, match=says.replace("(", r"\(")):
+        filtered(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)
+
+
+def test_refuses_ends_that_are_not_known():
+    with pytest.raises(PatchfemError, match="'padded' are not known; use trimmed or whole"):
+        filtered(sine(np.arange(1000) * UM, UM, 80 * UM), 80 * UM, "padded")

@@ -1,0 +1,131 @@
+"""Intervals of a single trace: how many of them hold the mean over all traces; the stylus's reach."""
+
+import numpy as np
+import pytest
+from ring_traces import traces
+
+from patchfem.surface.profile import Profile, level
+from patchfem.surface.roughness.filter import filtered
+from patchfem.surface.roughness.intervals import COUNT, Intervals, made_traces
+from patchfem.surface.roughness.parameters import Heights, root_mean_square
+from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
+from patchfem.surface.roughness.spectrum import amplitude_of, spectrum_of
+from patchfem.surface.roughness.tip import tip_check
+
+UM = 1e-6
+LENGTH, CUTOFF = 1e-3, 250e-6
+
+
+def read(z) -> list:
+    """(record, row, value) of every parameter of a trace of 1 mm, without and with a cut-off of 0.25 mm."""
+    trace = Profile(np.arange(z.size) * UM, z, "made")
+    primary = Heights(level(trace).z, UM)
+    rough = Heights(filtered(trace, CUTOFF)[1].z, UM, CUTOFF)
+    found = spectrum_of(primary.z, UM)
+    out = [(primary, row, amplitude_of(found, 60e-6, 110e-6) if row.of is None else row.of(primary))
+           for row in (*PRIMARY, *WAVES)]
+    return out + [(rough, row, row.of(rough)) for row in ROUGH]
+
+
+def coverage(count: int, seed: int, names=None) -> dict:
+    """Share of `count` traces whose interval holds the mean over 2000 others, by name."""
+    sums: dict = {}
+    for z in traces(2000, LENGTH, UM, 6e-6, seed + 1):
+        for _, row, value in read(z):
+            sums.setdefault(row.name, []).append(np.nan if value is None else value)
+    truth = {name: np.nanmean(values) for name, values in sums.items()}
+    held: dict = {name: [] for name in truth}
+    for z in traces(count, LENGTH, UM, 6e-6, seed):
+        made: dict = {}
+        for heights, row, value in read(z):
+            if value is None or (names is not None and row.name not in names):
+                continue
+            one = made.setdefault(id(heights), Intervals(heights, levelled=heights.section is None))
+            low, high = one.of(row, value)
+            held[row.name].append(low <= truth[row.name] <= high)
+    return {name: float(np.mean(values)) for name, values in held.items() if values}
+
+
+@pytest.mark.slow
+def test_always_nine_of_ten_intervals_hold_the_mean():
+    """600 traces of 1 mm of the 80 um surface, every parameter: 90 % within 4 (three deviations of the count)."""
+    found = coverage(600, 70_000)
+    assert len(found) == len(PRIMARY) + len(ROUGH) + len(WAVES)
+    assert all(0.86 <= share <= 0.96 for share in found.values()), found
+    assert 0.88 <= np.mean(list(found.values())) <= 0.92
+
+
+def test_always_intervals_by_degrees_of_freedom_hold_the_mean():
+    """The quick ones, on 300 traces: 90 % within three deviations of the count."""
+    names = {"Pq", "Rq", "Pdq", "Rdq", "band_amplitude"}
+    found = coverage(300, 4000, names)
+    assert set(found) == names and all(0.85 <= share <= 0.95 for share in found.values()), found
+
+
+def test_exact_degrees_of_freedom_of_white_noise():
+    """n independent heights have n degrees of freedom, so Rq scatters by 1 / sqrt(2 n)."""
+    n = 20_000
+    heights = Heights(np.random.default_rng(0).normal(size=n), UM)
+    found = Intervals(heights, levelled=False)
+    assert found.freedom("power") == pytest.approx(n, rel=0.05)
+    low, high = found.of(TABLE["Rq"], 1.0)
+    assert high - low == pytest.approx(2 * 1.645 / np.sqrt(2 * n), rel=0.05)
+
+
+def test_exact_long_tails_make_the_interval_wider():
+    """Laplace heights have a kurtosis of 6: the mean square scatters by sqrt(5 / 2) more."""
+    rng = np.random.default_rng(0)
+    found = [Intervals(Heights(z, UM), False).freedom("power") for z in (rng.normal(size=50_000),
+                                                                        rng.laplace(size=50_000))]
+    assert found[0] / found[1] == pytest.approx(2.5, rel=0.1)
+
+
+def test_always_a_longer_trace_tells_more():
+    """Four times the length halves the interval, by degrees of freedom and by made traces alike."""
+    z = traces(1, 64e-3, UM, 6e-6, 5)[0]
+    for name in ("Rq", "Ra", "Rsk"):
+        row, widths = TABLE[name], []
+        for size in (16_000, 64_000):
+            heights = Heights(z[:size], UM)
+            low, high = Intervals(heights, False).of(row, row.of(heights))
+            widths.append(high - low)
+        assert widths[0] / widths[1] == pytest.approx(2, rel=0.2), name
+
+
+def test_exact_made_traces_have_the_spectrum_and_are_the_same_each_time():
+    z = traces(1, 2e-3, UM, 6e-6, 9)[0]
+    heights = Heights(z - z.mean(), UM)
+    found = spectrum_of(heights.z, UM)
+    made = made_traces(found, heights, False)
+    assert len(made) == COUNT and made[0].z.size <= heights.z.size
+    power = np.mean([root_mean_square(one) ** 2 for one in made])
+    assert power == pytest.approx(found.density.sum() * found.step, rel=0.1)
+    assert np.array_equal(made[7].z, made_traces(found, heights, False)[7].z)
+
+
+def test_exact_a_share_stays_a_share():
+    z = traces(1, 0.3e-3, UM, 6e-6, 2)[0]
+    heights = Heights(z - z.mean(), UM)
+    for name in ("PMr1", "PMr2"):
+        low, high = Intervals(heights, True).of(TABLE[name], TABLE[name].of(heights))
+        assert 0 <= low <= high <= 1
+
+
+def test_exact_a_flat_trace_has_no_interval():
+    assert Intervals(Heights(np.zeros(100), UM), True).of(TABLE["Pa"], 0.0) == (None, None)
+
+
+@pytest.mark.parametrize("radius", [5.0, 12.5, 40.0, 100.0])
+def test_exact_the_valleys_of_a_sine(radius):
+    """Amplitude 5 um, wavelength 80 um: the radius at the bottom is lambda^2 / (4 pi^2 A) = 32.4 um."""
+    z = 5e-6 * np.sin(2 * np.pi * np.arange(4000) * 0.25 / 80)
+    found = tip_check(Heights(z, 0.25e-6), radius * UM)
+    if radius < 20:
+        assert found.valleys == pytest.approx(32.4e-6, rel=0.1)
+    assert found.reaches == (radius < 32) and found.share == (radius > 32)
+    assert f"a tip of radius {radius:g} um" in found.sentence and ("does not reach" in found.sentence) == (radius > 32)
+
+
+def test_exact_no_valley_no_check():
+    assert tip_check(Heights(np.zeros(10), UM), 1e-3) is None
+    assert tip_check(Heights(np.linspace(-1, 1, 200) * UM, UM), 5e-6) is None

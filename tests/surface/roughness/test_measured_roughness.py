@@ -1,0 +1,124 @@
+"""Measured traces and scans: the instrument's own printed results, and the numbers of other codes. Needs PATCHFEM_DATA.
+
+The other code takes Rq about the mean of the roughness profile, not about its mean line.
+"""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from patchfem.surface.areal import Areal
+from patchfem.surface.profile import Profile
+from patchfem.surface.roughness.bearing import core
+from patchfem.surface.roughness.filter import filtered
+from patchfem.surface.roughness.parameters import Heights
+from patchfem.surface.roughness.report import interval_of, report_of
+from patchfem.surface.roughness.spectrum import spectrum
+
+pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+UM = 1e-6
+TRACES = ("dektak-1.csv", "mitutoyo-2.csv.gz")
+
+
+@pytest.fixture(scope="module")
+def data() -> Path:
+    return Path(os.environ["PATCHFEM_DATA"])
+
+
+@pytest.fixture(scope="module")
+def truth(data) -> dict:
+    return json.loads((data / "truth.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def traces(data) -> dict:
+    """Both traces at their true steps, read here by hand."""
+    rows = (data / "dektak-1.csv").read_bytes().partition(b"Raw Micrometer,")[2].split()
+    stylus = np.array([float(row.split(b",")[1]) for row in rows if row.strip(b",")])
+    x, z = np.loadtxt(data / "mitutoyo-2.csv.gz", delimiter=",").T
+    return {"dektak-1.csv": Profile(np.arange(stylus.size) * 1500 / 9600 * UM, stylus * UM, "dektak-1.csv"),
+            "mitutoyo-2.csv.gz": Profile(x * UM, z * UM, "mitutoyo-2.csv.gz")}
+
+
+def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
+    """Ra, Rq, skewness, Rz(DIN) and deviation to the last printed digit, the step height to one of it."""
+    report = report_of(traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
+    printed = truth["dektak-1.csv"]["instrument_printed_results"]
+    assert report.shape == (1697,)
+    for name, key, digits in (("Pa", "Ra", 5), ("Pq", "Rq", 5), ("RzDin", "RzDin", 5), ("MaxDev", "WMaxDev", 5)):
+        assert round(report[name].value / UM, digits) == printed[key]
+    assert round(report["Psk"].value, 2) == printed["Skew"]
+    assert report["ASH"].value / UM == pytest.approx(printed["ASH"], abs=1.5e-5)
+    own = truth["dektak-1.csv"]["own_window_samples_2995_4692"]
+    for name, key in (("Pa", "Ra"), ("Pq", "Rq"), ("RzDin", "RzDin_5_sections"), ("MaxDev", "MaxDev"),
+                      ("ASH", "ASH_last_minus_first")):
+        assert report[name].value / UM == pytest.approx(own[key], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", TRACES)
+def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
+    report, known = report_of(traces[name]), truth[name]
+    assert report.cutoff is None and report.roughness is None
+    for key, unit in (("Pa", UM), ("Pq", UM), ("Pt", UM), ("Psk", 1), ("Pku", 1)):
+        assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
+    assert report["Pdq"].value == pytest.approx(known["Pdq_2pt"], rel=1e-6)
+    assert not any(one.name.startswith("R") for one in report.values)
+
+
+@pytest.mark.parametrize("name, cutoff", [("dektak-1.csv", 80), ("dektak-1.csv", 250), ("mitutoyo-2.csv.gz", 80),
+                                          ("mitutoyo-2.csv.gz", 250), ("mitutoyo-2.csv.gz", 800)])
+def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff):
+    known = truth[name][f"own_gauss_lc{cutoff}"]
+    report = report_of(traces[name], cutoff * UM)
+    heights = Heights(report.roughness.z, report.step, cutoff * UM)
+    trimmed = report.roughness.x[0] - traces[name].x[0]
+    assert len(heights.sections) == known["sections"]
+    assert trimmed == pytest.approx(known["trimmed_each_end_um"] * UM, rel=1e-6)
+    assert report["Ra"].value == pytest.approx(known["Ra"] * UM, rel=1e-3)
+    assert heights.z.std() == pytest.approx(known["Rq"] * UM, rel=1e-4)
+    assert report["Rq"].value == pytest.approx(known["Rq"] * UM, rel=5e-3)
+    assert report["Rz"].value == pytest.approx(known["Rz_mean_of_sections"] * UM, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", TRACES)
+def test_exact_the_core_of_another_code(traces, truth, name):
+    """To 5 %: the other code reads a curve of classes."""
+    found, known = report_of(traces[name]), truth[name]["surfalize"]
+    for key in ("k", "pk", "vk"):
+        assert found["P" + key].value == pytest.approx(known["R" + key] * UM, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
+def test_exact_areal_parameters_of_three_codes(data, truth, name):
+    z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * UM
+    report, known = report_of(Areal(np.arange(101) * 5 * UM, np.arange(101) * 5 * UM, z, name)), truth[name]
+    for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
+        assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
+        if key != "Sz":
+            assert report[key].low < report[key].value < report[key].high
+
+
+def test_exact_a_digitised_uneven_trace(data):
+    x, z = np.loadtxt(data / "xy-1.txt").T * UM
+    report = report_of(Profile(x, z, "xy-1.txt"))
+    assert "the trace is read off every" in report.notes[0]
+    dense = np.linspace(x[0], x[-1], 100_001)
+    flat = np.interp(dense, x, z)
+    flat -= np.polyval(np.polyfit(dense, flat, 1), dense)
+    assert report["Pq"].value == pytest.approx(np.sqrt((flat**2).mean()), rel=0.01)
+
+
+def test_exact_one_parameter_is_that_of_the_report(traces):
+    report = report_of(traces["mitutoyo-2.csv.gz"], 800 * UM)
+    for name in ("Pq", "Rz", "RSm", "band_amplitude", "dominant_wavelength"):
+        assert interval_of(name, traces["mitutoyo-2.csv.gz"], 800 * UM) == report[name]
+
+
+def test_exact_the_core_of_the_report_is_that_of_the_roughness(traces):
+    report = report_of(traces["mitutoyo-2.csv.gz"], 800 * UM)
+    assert report.core == pytest.approx(core(Heights(filtered(traces["mitutoyo-2.csv.gz"], 800 * UM)[1].z, 1.0)))
+    assert report["Rk"].value == report.core.core
+    assert report.spectrum.dominant == spectrum(traces["mitutoyo-2.csv.gz"]).dominant

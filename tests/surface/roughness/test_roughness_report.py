@@ -1,0 +1,138 @@
+"""The report of a surface: windows, flat and short traces, spikes, printed results, scans, refusals, its speed."""
+
+from time import process_time
+
+import numpy as np
+import pytest
+from ring_traces import traces
+
+from patchfem.core import PatchfemError
+from patchfem.surface.areal import Areal
+from patchfem.surface.profile import Printed, Profile
+from patchfem.surface.roughness.report import interval_of, report_of, windowed
+from patchfem.surface.synthetic import sine
+
+UM = 1e-6
+
+
+def made(count=4001, source="made.csv", **more) -> Profile:
+    x = np.arange(count) * UM
+    z = 2 * UM * np.sin(2 * np.pi * x / 80e-6) + np.random.default_rng(0).normal(0, 0.1 * UM, count)
+    return Profile(x, z, source, **more)
+
+
+@pytest.mark.parametrize("first, last, low, high", [(10.2, 20.9, 10, 20), (10.0, 20.0, 10, 20), (0, 4000, 0, 4000)])
+def test_exact_a_window_from_the_samples_at_or_before_its_cursors(first, last, low, high):
+    part = windowed(made(), first * UM, last * UM)
+    assert part.x == pytest.approx(np.arange(low, high + 1) * UM)
+
+
+def test_exact_a_sine_with_a_little_noise():
+    report = report_of(made(), 250 * UM)
+    assert report["Ra"].value == pytest.approx(2 * UM * 2 / np.pi * (1 - 2 ** -(250 / 80)**2), rel=0.01)
+    assert report["RSm"].value == pytest.approx(80 * UM, rel=0.01)
+    assert report["band_amplitude"].value == pytest.approx(2 * UM, rel=0.01)
+    assert report["dominant_wavelength"].value == pytest.approx(80 * UM, rel=0.01)
+    assert [one.low <= one.value <= one.high for one in report.values if one.low is not None].count(False) == 0
+    assert len({one.name for one in report.values}) == len(report.values) == 31
+
+
+def test_exact_a_flat_trace_says_so():
+    report = report_of(Profile(np.arange(4000) * UM, np.full(4000, 3e-6), "flat.csv"), 250 * UM)
+    assert report["Pq"].value == 0 and report["Rz"].value == 0 and report["band_amplitude"].value == 0
+    for name in ("Psk", "Rku", "Pk", "RSm", "dominant_wavelength"):
+        assert report[name].value is None and report[name].reason == "the trace is flat"
+    assert all(one.low is None or np.isfinite([one.low, one.high]).all() for one in report.values)
+
+
+def test_exact_a_trace_shorter_than_a_section_or_the_band_says_so():
+    report = report_of(made(400), 250 * UM)  # 150 um are left, no section of 250
+    assert report["Rz"].value is None and report["Rz"].reason == "the trace is shorter than one cut-off"
+    assert report["Ra"].value > 0
+    short = report_of(made(200))["band_amplitude"]
+    assert short.value is None and "shows waves of 2 um to 100 um, not the band 60 um to 110 um" in short.reason
+
+
+def test_exact_spikes_are_told_and_count():
+    trace = made()
+    z = trace.z.copy()
+    z[1000] += 50 * UM
+    report = report_of(Profile(trace.x, z, "made.csv"))
+    assert report.notes[0] == ("made.csv: 1 of 4001 heights are spikes (the first at x = 1 mm); they count in every "
+                               "parameter")
+    assert report["Pt"].value > 50 * UM
+
+
+def test_exact_a_plateau_is_told():
+    """Heights cut at half a deviation: the intervals that count on Gaussian heights are named; a sine has no remark."""
+    z = np.minimum(traces(1, 8e-3, UM, 6 * UM, 3)[0], 3 * UM)
+    notes = report_of(Profile(np.arange(z.size) * UM, z, "worn.csv"), 250 * UM).notes
+    assert [note.split(" is ")[0] for note in notes] == ["worn.csv: Psk", "worn.csv: Rsk"]
+    assert notes[1].endswith("so the heights are not Gaussian; the intervals of Rku, Rk, Rpk and Mr2 count on that and "
+                             "are too narrow")
+    assert report_of(made(), 250 * UM).notes == ()
+
+
+def test_exact_what_the_instrument_printed_is_read_again():
+    """A window of the file's cursors, levelled; results of other names or with wide cursors are left alone."""
+    cursors = {"reference": (100 * UM, 0.0), "measure": (900 * UM, 0.0)}
+    printed = {"Ra": Printed(1.2 * UM, "m", **cursors), "ASH": Printed(0.0, "m", **cursors),
+               "Slope": Printed(1.0, "1", **cursors), "Rq": Printed(1.0, "m", (100 * UM, 5 * UM), (900 * UM, 0.0))}
+    trace = made(printed=printed)
+    found = {one.name: one for one in report_of(trace).printed}
+    inside = report_of(trace, window=(100 * UM, 900 * UM))
+    assert set(found) == {"Ra", "ASH"}
+    assert found["Ra"].here == inside["Pa"].value and found["Ra"].printed == 1.2 * UM
+    assert found["ASH"].here == trace.z[900] - trace.z[100] == inside["ASH"].value
+
+
+def test_exact_the_tip_of_the_file_or_of_the_call():
+    assert report_of(made()).tip is None
+    assert report_of(made(tip_radius=5 * UM)).tip.radius == 5 * UM
+    assert report_of(made(tip_radius=5 * UM), tip=12.5 * UM).tip.radius == 12.5 * UM
+
+
+def scan(lost=False) -> Areal:
+    x, y = np.arange(120) * UM, np.arange(80) * UM
+    z = np.random.default_rng(2).normal(0, UM, (80, 120)) + 0.02 * x + 0.03 * y[:, None]
+    if lost:
+        z[:, 10] = np.nan
+    return Areal(x, y, z, "scan.txt")
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_exact_areal_parameters_of_white_noise(lost):
+    report = report_of(scan(lost))
+    n = 80 * (120 - lost)
+    assert report["Sq"].value == pytest.approx(UM, rel=3 / np.sqrt(2 * n))
+    assert (report["Sq"].high - report["Sq"].low) / report["Sq"].value == pytest.approx(3.29 / np.sqrt(2 * n), rel=0.15)
+    assert report["Ssk"].value == pytest.approx(0, abs=3 * np.sqrt(6 / n))
+    assert report["Sku"].value == pytest.approx(3, abs=3 * np.sqrt(24 / n))
+    assert bool(report.notes) == lost and report["Sz"].low is None
+
+
+@pytest.mark.parametrize("surface, more, says", [
+    (made(10), {}, "made.csv: 10 samples; parameters want 16 at least"),
+    (made(), {"window": (20 * UM, 10 * UM)}, "a window from 20 um to 10 um; the trace runs from 0 um to 4 mm"),
+    (made(), {"window": (20 * UM, 5e-3)}, "a window from 20 um to 5 mm"),
+    (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm goes off at each end"),
+    (scan(), {"cutoff": 1e-4}, "scan.txt: an areal scan; a cut-off or a window is for one trace of it"),
+])
+def test_refuses(surface, more, says):
+    with pytest.raises(PatchfemError, match=says):
+        report_of(surface, **more)
+
+
+@pytest.mark.parametrize("name, says", [("Rx", "'Rx' is no parameter of a trace; known are Pa, "),
+                                        ("Rq", "Rq is of the roughness profile and wants a cut-off")])
+def test_refuses_a_parameter(name, says):
+    with pytest.raises(PatchfemError, match=says):
+        interval_of(name, made())
+
+
+def test_always_a_million_samples_take_two_seconds():
+    trace = sine(np.arange(1_000_000) * 0.1 * UM, UM, 80 * UM)
+    report_of(made(), 250 * UM)  # what scipy loads once
+    begin = process_time()
+    report_of(trace, 800 * UM)
+    assert process_time() - begin < 2

@@ -1,0 +1,123 @@
+"""Height, slope, spacing and bearing parameters against closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import norm
+
+from patchfem.surface.roughness import parameters as height
+from patchfem.surface.roughness.bearing import abbott, core
+from patchfem.surface.roughness.parameters import Heights
+from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE
+from patchfem.surface.roughness.spacing import crossings, mean_spacing
+
+UM = 1e-6
+
+
+def wave(count=8000, length=400.0, amplitude=UM, section=None) -> Heights:
+    """A whole number of sine waves every micrometre, phase off the samples."""
+    return Heights(amplitude * np.sin(2 * np.pi * (np.arange(count) + 0.3) / length), UM, section)
+
+
+def test_exact_a_sine():
+    sine = wave()
+    assert height.mean_deviation(sine) == pytest.approx(2 / np.pi * UM, rel=1e-4)
+    assert height.root_mean_square(sine) == pytest.approx(UM / np.sqrt(2), rel=1e-12)
+    assert height.skewness(sine) == pytest.approx(0, abs=1e-12) and height.kurtosis(sine) == pytest.approx(1.5)
+    assert height.total_height(sine) == pytest.approx(2 * UM, rel=1e-4)
+    chord = 2 * np.sin(np.pi / 400) / UM  # of the slope between two samples
+    assert height.slope(sine) == pytest.approx(UM / np.sqrt(2) * chord, rel=1e-4)
+    assert mean_spacing(sine) == pytest.approx(400 * UM, rel=1e-6)
+
+
+def test_exact_sections_of_a_growing_sine():
+    """Rz is the mean over whole sections, Rt that of all, and Rz = Rp + Rv."""
+    x = np.arange(1000)
+    found = Heights(np.where(x < 950, 1 + x // 200, 99.0) * np.sin(2 * np.pi * x / 40), 1.0, 200.0)
+    assert found.sections.shape == (5, 200)
+    trace = Heights(found.z[:999], 1.0, 200.0)
+    assert trace.sections.shape == (4, 200)  # what is left belongs to none
+    assert height.peak_to_valley(trace) == pytest.approx(2 * np.mean([1, 2, 3, 4]), rel=1e-12)
+    assert height.peak(trace) + height.valley(trace) == pytest.approx(height.peak_to_valley(trace), rel=1e-14)
+    assert height.total_height(trace) == pytest.approx(198, rel=1e-9)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(20, 300), st.floats(0.1, 10))
+def test_always_heights_scale_and_numbers_do_not(seed, count, factor):
+    z = np.random.default_rng(seed).normal(0, UM, count)
+    one, other = Heights(z, UM), Heights(factor * z, UM)
+    for row in PRIMARY:
+        grown = 1.0 if row.name in ("PSm", "PMr1", "PMr2", "Psk", "Pku") else factor
+        value = row.of(one)
+        assert row.of(other) == (None if value is None else pytest.approx(grown * value, rel=1e-9)), row.name
+
+
+def test_exact_small_and_narrow_hills_do_not_count():
+    """A ripple of 4 % on a wave crosses the mean line many times more; the spacing stays that of the wave."""
+    x = np.arange(40_000.0)
+    z = np.sin(2 * np.pi * x / 4000 + 0.5) + 0.04 * np.sin(2 * np.pi * x / 50)
+    found = Heights(z, UM, 8000 * UM)
+    assert (np.diff(z > 0) != 0).sum() > 20
+    assert crossings(found).size == 20
+    assert mean_spacing(found) == pytest.approx(4000 * UM, rel=0.005)
+    spiked = z.copy()
+    spiked[200:210] -= 3  # deep enough, but narrower than 1 % of the section
+    assert crossings(Heights(spiked, UM, 8000 * UM)).size == 20
+    assert crossings(Heights(spiked, UM)).size == 22  # without a cut-off there is no section to compare with
+
+
+def test_exact_a_trace_without_two_elements_has_no_spacing():
+    assert mean_spacing(Heights(np.sin(np.linspace(0, 6, 100)), UM)) is None
+    assert mean_spacing(Heights(np.zeros(100), UM)) is None
+
+
+def test_exact_core_of_even_heights():
+    """Heights spread evenly from -1 to 1: the curve is straight, all of it core."""
+    z = np.linspace(-1, 1, 10_001)
+    found = core(Heights(np.random.default_rng(1).permutation(z), UM))
+    assert found.core == pytest.approx(2, rel=1e-3)
+    assert found.peaks == pytest.approx(0, abs=1e-3) and found.valleys == pytest.approx(0, abs=1e-3)
+    assert found.first == pytest.approx(0, abs=1e-3) and found.second == pytest.approx(1, abs=1e-3)
+
+
+def test_exact_core_of_gaussian_heights():
+    """The curve of a Gaussian surface by its quantiles; line, ratios and areas by quadrature of the normal law."""
+    n = 200_001
+    ratio = (np.arange(n) + 0.5) / n
+    found = core(Heights(norm.isf(ratio), UM))
+    middle = ratio[np.abs(ratio - 0.5) <= 0.2]
+    slope = np.polyfit(middle, norm.isf(middle), 1)[0]
+    top = -slope / 2
+    first = norm.sf(top)
+    area = norm.pdf(top) - top * first  # of the peaks above the top
+    assert found.core == pytest.approx(-slope, rel=1e-4) and found.top == pytest.approx(top, rel=1e-4)
+    assert [found.first, found.second] == pytest.approx([first, 1 - first], rel=1e-3)
+    assert [found.peaks, found.valleys] == pytest.approx([2 * area / first] * 2, rel=1e-3)
+
+
+def test_exact_a_plateau_with_valleys():
+    """Plateau from 0 to -0.1 on 80 % of the length, valleys down to -2: the valleys alone stand out."""
+    z = np.concatenate([np.linspace(0, -0.1, 8000), np.linspace(-0.1, -2.1, 2001)[1:]])
+    found = core(Heights(z, UM))
+    assert found.core == pytest.approx(0.125, rel=1e-3) and found.peaks == pytest.approx(0, abs=1e-4)
+    share = 0.2 * (1 - 0.025 / 2)  # of the length below the bottom at -0.125
+    assert found.second == pytest.approx(1 - share, abs=1e-4)
+    assert found.valleys == pytest.approx(2.1 - 0.125, rel=1e-3)
+
+
+def test_exact_abbott_curve_of_a_sine():
+    ratio, level = abbott(wave(), 101)
+    assert level == pytest.approx(UM * np.cos(np.pi * ratio), abs=0.01 * UM)
+
+
+def test_exact_a_flat_trace_has_no_shape():
+    flat = Heights(np.zeros(100), UM, 20 * UM)
+    without = [row.name for row in ROUGH if row.of(flat) is None]
+    assert without == ["Rsk", "Rku", "RSm", "Rk", "Rpk", "Rvk", "Mr1", "Mr2"]
+
+
+def test_exact_every_row_has_a_name_of_its_own_and_a_definition():
+    rows = [*PRIMARY, *ROUGH]
+    assert len(rows) + 10 == len(TABLE)
+    assert all(len(row.text.split()) > 4 and row.unit in ("m", "1") for row in TABLE.values())
