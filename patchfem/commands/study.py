@@ -7,7 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..effects import unbuilt
-from .shared import Json, NotReached, Out, Quiet, Refused, Sets, model_of, say, scene_of
+from .shared import Json, NotReached, Out, Quiet, Refused, Sets, model_of, progress_bar, say, scene_of
 
 MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak",
         "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
@@ -43,18 +43,22 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
         print(json.dumps(answer))
 
 
-def fit(scene: Path, /, *, to: Path, free: Annotated[tuple[str, ...], Parameter(negative=())],
+def fit(scene: Path, /, *, to: str, free: Annotated[tuple[str, ...], Parameter(negative=())],
         hold: Annotated[tuple[str, ...], Parameter(negative=())] = (),
         out: Out = None, set_: Sets = (),
         json_: Json = False,
         quiet: Quiet = False):
     """Fit keys of SCENE (--free table.key=low..high,...) to the measured loop --to FILE; rows that --hold names
-    (column=value,...) are only predicted."""
+    (column=value,...) are only predicted. With [wear]: its coefficient, to a worn depth (--to compare.json, or --to
+    "worn_depth_max=2.5 um..3.5 um")."""
     found = scene_of(scene, set_)
+    if found.wear is not None:
+        _fit_wear(found, to, free, out, json_, quiet)
+        return
     from ..campaigns.fit import fit_loop
     from ..export.fit_folder import fit_into
 
-    fitted = fit_loop(found, to, free, hold, None if quiet else say)
+    fitted = fit_loop(found, Path(to), free, hold, None if quiet else say)
     target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
     answer = fit_into(fitted, target)
     if json_:
@@ -68,6 +72,26 @@ def fit(scene: Path, /, *, to: Path, free: Annotated[tuple[str, ...], Parameter(
         print(f"results: {target}")
     if answer["outcome"] == "not_converged":
         raise NotReached
+
+
+def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) -> None:
+    from ..campaigns.wear_coefficient import wear_coefficient
+    from ..export.wear_fit import fit_into
+    from ..model.model import build
+    from ..scene.scene import loads
+
+    with progress_bar(quiet or json_) as progress:
+        fitted = wear_coefficient(build(found), to, free, progress)
+    target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
+    text = loads(found.text, found.path, [*found.sets, fitted.bounds.assigned(fitted.value)]).resolved()
+    answer = fit_into(fitted, found.title, text, target)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+        return
+    one = answer["values"]["wear.coefficient"]
+    print(f"wear.coefficient {one['value']:.6g} {one['unit']}, {one['interval'][0]:.4g} to {one['interval'][1]:.4g} by "
+          f"the interval of {fitted.measured.name}")
+    print(f"results: {target}")
 
 
 def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float) -> None:

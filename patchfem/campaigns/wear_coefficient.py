@@ -1,0 +1,151 @@
+"""The wear coefficient that explains a measured depth, with the interval of the measurement.
+
+Worn depth depends on the coefficient and the cycles by their product alone, so one run at the largest coefficient
+gives the depth for all smaller ones. The value read off it is then run itself and corrected.
+"""
+
+import json
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ..core import Missing, NotConverged, PatchfemError
+from ..model.model import Model
+from ..scene.keys.quantities import parse
+from ..scene.ranges import Range, ranges
+from ..scene.scene import SceneError
+
+QUANTITIES = ("worn_depth_mean", "worn_depth_max")  # as compare's JSON names them, the better known first
+MOST_RUNS = 6
+LARGEST = 1 << 20  # bytes of a file of compare
+KEY = "wear.coefficient"
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A measured depth [m], by name, with its interval low..high; where: its source."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    where: str
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """A wear coefficient [m2/N] with its interval; model: what the scene gives with it, of the measured quantity;
+    bounds: of the search; runs: how many wear runs it took."""
+
+    value: float
+    low: float
+    high: float
+    measured: Measured
+    model: float
+    bounds: Range
+    runs: int
+
+
+def measured_of(text: str) -> Measured:
+    """A measured quantity from "worn_depth_max=2.5 um..3.5 um" (or one value), or from a file of `compare --json`.
+
+    PatchfemError and Missing name what is wrong.
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        return _from_file(Path(text))
+    if name not in QUANTITIES:
+        raise PatchfemError(f"--to {text}: {name} is not known; one of {', '.join(QUANTITIES)}, such as "
+                            '"worn_depth_max=2.5 um..3.5 um", or the JSON of compare')
+    try:
+        ends = [parse(part.strip(), "length") for part in value.split("..")]
+    except ValueError as error:
+        raise PatchfemError(f"--to {name}: {error}") from None
+    if len(ends) > 2 or not 0 < ends[0] <= ends[-1]:
+        raise PatchfemError(f"--to {text}: one value above zero or low..high is wanted")
+    return Measured(name, (ends[0] + ends[-1]) / 2, ends[0], ends[-1], "--to")
+
+
+def _from_file(path: Path) -> Measured:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise PatchfemError(f"{path}: more than {LARGEST} bytes; the JSON of compare is wanted")
+        found = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise Missing(f"{path}: no such file; --to wants the JSON of compare or worn_depth_max=VALUE") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise PatchfemError(f"{path}: not the JSON of compare ({error})") from None
+    found = found.get("measures", found) if isinstance(found, dict) else {}
+    for name in QUANTITIES:
+        one = found.get(name) if isinstance(found, dict) else None
+        parts = [one.get(key) for key in ("value", "low", "high")] if isinstance(one, dict) else [None]
+        if all(isinstance(part, (int, float)) and math.isfinite(part) for part in parts) and parts[0] > 0:
+            return Measured(name, float(parts[0]), max(float(parts[1]), 0.0), float(parts[2]), str(path))
+    raise PatchfemError(f"{path}: no worn depth above zero in it; compare gives none where both traces lack a common "
+                        "reference")
+
+
+def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
+    """The coefficient of a model with [wear] within free ("wear.coefficient=low..high",) that gives what was measured.
+
+    to: as `measured_of` takes it. PatchfemError where no coefficient in the range does, NotConverged where the runs do
+    not settle on one.
+    """
+    bounds, target = _bounds(free), measured_of(to)
+    if model.patch is None:
+        raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; name [contact]", "normal")
+    curve, most = _curve(model, bounds.high, target.name, progress)
+    if not curve[1][-1] >= target.value:
+        raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches {target.name} = "
+                            f"{curve[1][-1]:.4g} of the measured {target.value:.4g}; raise the high bound")
+    inverse = _inverse(curve)
+    value, runs, reached = float(bounds.high * inverse(target.value)), 1, math.nan
+    while runs < MOST_RUNS:
+        runs += 1
+        _, reached = _curve(model, value, target.name, progress)
+        if abs(reached - target.value) <= 0.1 * model.accuracy.tolerance * target.value:
+            break
+        value *= float(inverse(target.value) / inverse(reached))
+    else:
+        raise NotConverged(f"fit {KEY}: {MOST_RUNS} runs end at {target.name} = {reached:.6g}, not {target.value:.6g}")
+    if value < bounds.low:
+        raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} wants {value:.4g} m^2/N, below the low "
+                            f"bound {bounds.low:.4g}; lower it")
+    low, high = (value * inverse(min(end, most)) / inverse(target.value) for end in (target.low, target.high))
+    return Coefficient(float(value), float(low), float(high), target, float(reached), bounds, runs)
+
+
+def _bounds(free) -> Range:
+    found, wrong = ranges(free)
+    if wrong:
+        raise SceneError(wrong)
+    if [one.key for one in found] != [KEY]:
+        raise PatchfemError(f"--free: beside [wear] only {KEY} is fitted, such as {KEY}=1e-16 m^2/N..1e-12 m^2/N")
+    return found[0]
+
+
+def _curve(model: Model, coefficient: float, name: str, progress) -> tuple:
+    """((share of the cycles, quantity) (j,) each, the last quantity) of a model with this coefficient."""
+    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
+    from ..runs.patch.ladder import solve_all
+    from ..runs.wear.evolve import evolve
+
+    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    found = evolve(model, patch, (None, None), progress)
+    if found.stopped:
+        raise PatchfemError(f"fit {KEY}: {found.stopped}")
+    area = patch.pieces.interface.weight
+    rows = np.array([one.depth for one in found.moments])
+    depth = rows.max(axis=1) if name == "worn_depth_max" else rows @ area / area.sum()
+    return (np.array([one.cycle for one in found.moments]) / model.wear.cycles, depth), float(depth[-1])
+
+
+def _inverse(curve: tuple):
+    """Share of the cycles as a function of the quantity."""
+    share, quantity = curve
+    keep = np.concatenate([[True], np.diff(quantity) > 0])
+    return PchipInterpolator(quantity[keep], share[keep], extrapolate=False) if keep.sum() > 2 else \
+        lambda value: np.interp(value, quantity[keep], share[keep])
