@@ -9,6 +9,7 @@ as they stand; other arrays in the file are left alone.
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, frozen_array
+from ..inputs.matlab import variables
 from . import masses, matrices
 
 PATCH = ("normal", "pitch", "lateral", "yaw")
@@ -25,21 +26,19 @@ def read(path) -> dict:
         if str(path).lower().endswith(".npz"):
             with np.load(path, allow_pickle=False) as file:
                 return {key: file[key] for key in KNOWN if key in file.files}
-        from scipy.io import loadmat
-
-        found = loadmat(path)
-    except NotImplementedError:
-        raise PatchfemError(f"structure.file: {path} is a version 7.3 .mat file; save it with '-v7'") from None
+        with open(path, "rb") as file:
+            found = variables(path, file.read())
+        return {key: _plain(found[key].values()) for key in KNOWN if key in found}
+    except PatchfemError as error:
+        why = str(error).removeprefix(f"{path}: ")
+        raise PatchfemError(f"structure.file: {path} cannot be read ({why})") from None
     except Exception as error:  # a damaged file raises whatever its reader trips over
         raise PatchfemError(f"structure.file: {path} cannot be read ({error}); plain arrays are wanted, no objects") \
             from None
-    return {key: _plain(found[key]) for key in KNOWN if key in found}
 
 
 def _plain(value):
     """An array of a .mat file without the two dimensions that it always has."""
-    if hasattr(value, "toarray"):
-        return value.toarray()
     return value if value.ndim == 2 and min(value.shape) > 1 else value.ravel()
 
 

@@ -1,0 +1,96 @@
+"""The reader of MATLAB files: what SciPy wrote, and damaged files, some of which make SciPy's own reader crash."""
+
+import io
+import random
+
+import numpy as np
+import pytest
+from scipy.io import loadmat, savemat
+from scipy.sparse import random as scattered
+
+from patchfem.core import PatchfemError
+from patchfem.inputs.matlab import variables
+
+SPARSE = scattered(7, 5, 0.4, "csc", random_state=3)
+NAMES = np.array(["axial", "yaw", "é"], dtype=object)
+WRITTEN = {
+    "full": np.random.default_rng(1).normal(size=(4, 3)), "scalar": 2.0, "counts": np.arange(6, dtype="u1")[None],
+    "small": np.array([[1.5, -2.5]], "f4"), "scattered": SPARSE, "none": np.zeros((0, 3)), "cells": NAMES,
+    "letters": np.array(["ab", "cde"]), "cube": np.arange(24.0).reshape(2, 3, 4), "waves": np.ones(3) * 1j,
+    "pair": {"x": 1.0}, "big": np.tile(np.arange(40.0), (300, 1)),
+}  # fmt: skip
+
+
+def written(packed: bool, only=tuple(WRITTEN)) -> bytes:
+    out = io.BytesIO()
+    savemat(out, {name: WRITTEN[name] for name in only}, do_compression=packed)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_exact_every_array_is_the_one_that_scipy_reads(packed):
+    data = written(packed)
+    found, known = variables("a.mat", data), loadmat(io.BytesIO(data))
+    assert {name: one.kind for name, one in found.items()} == {
+        "full": "number", "scalar": "number", "counts": "number", "small": "number", "scattered": "sparse",
+        "none": "number", "cells": "text", "letters": "text", "cube": "number", "big": "number"}
+    for name, one in found.items():
+        if one.kind != "text":
+            truth = known[name].toarray() if one.kind == "sparse" else known[name]
+            assert one.shape == truth.shape and np.array_equal(one.values(), truth.astype(float)), name
+    assert found["cells"].values().tolist() == ["axial", "yaw", "é"]
+    assert found["letters"].values().tolist() == ["ab", "cde"]
+
+
+def damaged(seed: bytes, rng: random.Random) -> bytes:
+    """One to three bytes, or the counts of four bytes that lie there, turned into others."""
+    data = bytearray(seed)
+    for _ in range(rng.randint(1, 3)):
+        at = rng.randrange(128, len(data) - 4)
+        if rng.random() < 0.5:
+            data[at] = rng.randrange(256)
+        else:
+            data[at & ~3:(at & ~3) + 4] = rng.choice((b"\xff\xff\xff\xff", b"\x00\x00\x00\x80", b"\xff\xff\xff\x7f",
+                                                      b"\x01\x00\x00\x00", b"\x0e\x00\x00\x00"))
+    return bytes(data)
+
+
+def refused(count: int, packed: bool) -> int:
+    """How many of `count` damaged files are refused; all others give arrays of the shapes that they name."""
+    seed, rng, out = written(packed, ("full", "scattered", "cells", "letters", "scalar")), random.Random(5), 0
+    for _ in range(count):
+        try:
+            for one in variables("a.mat", damaged(seed, rng)).values():
+                got = one.values()
+                assert got.shape == one.shape or one.kind == "text"
+        except PatchfemError as error:
+            assert str(error).startswith("a.mat: ") and len(str(error)) < 400
+            out += 1
+    return out
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_always_a_damaged_file_is_read_or_refused_by_name(packed):
+    assert 50 < refused(300, packed) <= 300
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("packed", [False, True])
+def test_always_ten_thousand_damaged_files_are_read_or_refused_by_name(packed):
+    assert refused(10_000, packed) > 1000
+
+
+@pytest.mark.parametrize("data, said", [
+    (b"", "damaged or of version 4"), (b"MATLAB 5.0 MAT-file" + bytes(200), "damaged or of version 4"),
+    (b"MATLAB 7.3 MAT-file" + bytes(200), r"version 7\.3; save it with save\(name, '-v7'\)"),
+    (written(False)[:-4], "cut off or damaged")])
+def test_refuses_files_that_are_no_matlab_arrays(data, said):
+    with pytest.raises(PatchfemError, match=said):
+        variables("a.mat", data)
+
+
+def test_refuses_a_variable_that_unpacks_to_much_more_than_its_size():
+    out = io.BytesIO()
+    savemat(out, {"zeros": np.zeros((1500, 1500))}, do_compression=True)
+    with pytest.raises(PatchfemError, match="unpacks to more than 200 times its packed size; save it with"):
+        variables("a.mat", out.getvalue())["zeros"].values()
