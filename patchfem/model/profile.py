@@ -1,31 +1,33 @@
 """A measured profile as its share of the gap."""
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from ..core import PatchfemError
-from ..scene.keys.quantities import KINDS
+from ..core import PatchfemError, frozen_array
+from ..surface.files.read import read_profile
 from ..surface.fine import too_fine
 from ..surface.nodes import on_nodes, placed
-from ..surface.profile import cleaned, level
-from ..surface.trace import read_trace
+from ..surface.profile import Profile, cleaned, level
 
 NOISE = 1e-10  # m: heights below it are digits
 
 
-def profile_gap(path: Path, x, asked: float | None, rough: bool) -> tuple:
-    """Heights (m,) [m] of a profile in a file at the nodes x (m,) [m], and notes for the user.
+def profile_gap(path: Path, x, asked: float | None, rough: bool, material: bool = False) -> tuple:
+    """Gap (m,) [m] that a profile in a file adds at the nodes x (m,) [m], and notes for the user.
 
-    The profile is levelled, freed of spikes and averaged over the nodes' cells. Heights count from the lowest, where
+    The profile is levelled, freed of spikes and averaged over the nodes' cells. The gap counts from its least, where
     flat pieces touch first. asked [m]: element size that decides what a profile may hold, None: that of the nodes;
-    rough: asperities stand for what is finer. PatchfemError where too much of it is finer than the mesh and no
-    asperities stand for it.
+    rough: asperities stand for what is finer; material: heights of a surface, on either piece measured outwards, so
+    that a peak closes the gap. PatchfemError where too much of it is finer than the mesh and no asperities stand for
+    it.
     """
-    stamp = path.stat().st_mtime_ns if path.exists() else 0
     size = float(np.diff(x).max())
-    whole = cleaned(placed(_read(path, stamp), x), 2 * size)
+    whole = _whole(path, x, 2 * size)
+    if material:
+        whole = replace(whole, z=frozen_array(-whole.z))
     trace = level(whole)
     slope = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0])
     notes = trace.notes
@@ -41,6 +43,24 @@ def profile_gap(path: Path, x, asked: float | None, rough: bool) -> tuple:
     return heights - heights.min(), notes
 
 
+def trace_of(path: Path) -> Profile:
+    """The trace in a file, heights as they stand there; a file is read once. PatchfemError with the key of the file."""
+    stamp = path.stat().st_mtime_ns if path.exists() else 0
+    try:
+        return _read(path, stamp)
+    except PatchfemError as error:
+        raise type(error)(str(error), "contact.profile.file") from None
+
+
+def _whole(path: Path, x, longest: float) -> Profile:
+    """The cleaned part of a trace over the nodes; a line may bridge `longest` [m]."""
+    found = trace_of(path)
+    try:
+        return cleaned(placed(found, x), longest)
+    except PatchfemError as error:
+        raise type(error)(str(error), error.key or "contact.profile.file") from None
+
+
 @lru_cache(maxsize=4)
 def _read(path, stamp):
-    return read_trace(path, KINDS["length"])
+    return read_profile(path)

@@ -9,33 +9,46 @@ LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
 
 
-def checked(path, x, z, at, factors: tuple) -> Profile:
+def checked(path, x, z, at, factors: tuple, stated: bool = False) -> Profile:
     """Turn samples of a file into a trace in order of growing x, one height per place; the notes tell what that took.
 
-    x, z: (n,) in the units of the file, with their factors to metres; at: (n,) their lines. PatchfemError names line
-    and value.
+    x, z: (n,) in the units of the file, with their factors to metres; at: (n,) their lines, None where the file has
+    none; stated: the format itself says metres. PatchfemError names line and value.
     """
-    if np.isfinite(z).sum() < 2:
-        raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
-    for name, values, bad in (("x", x, ~np.isfinite(x)), ("z", z, np.isinf(z))):
-        if bad.any():
-            first = int(np.argmax(bad))
-            raise PatchfemError(f"{path}:{at[first]}: {name} is {values[first]:g}; finite numbers are wanted")
-    for name, values, factor in (("x", x, factors[0]), ("z", z, factors[1])):
-        worst = int(np.nanargmax(np.abs(values)))
-        if abs(values[worst]) > LONGEST / factor:
-            raise PatchfemError(f"{path}:{at[worst]}: {name} is {float(values[worst]) * factor:.4g} m; is its unit "
-                                "right? a missing height is written nan")
+    bounded(path, (x, z), ("x", "z"), at, factors)
     if x[-1] < x[0]:
-        x, z, at = x[::-1], z[::-1], at[::-1]
-    x, notes = _evened(path, x, factors[0])
+        x, z, at = x[::-1], z[::-1], None if at is None else at[::-1]
+    x, notes = evened(path, x, factors[0])
     x, z, more = _single(path, x, z, at, factors[0])
     x, z = x * factors[0], z * factors[1]
-    _plausible(path, x, z)
+    more += plausible(path, x, z, stated)
     return Profile(frozen_array(x), frozen_array(z), str(path), notes + more)
 
 
-def _evened(path, x, factor: float) -> tuple:
+def bounded(path, columns: tuple, names: tuple, at, factors: tuple) -> None:
+    """Refuse columns of a file that are not finite or too large for a surface; a height z may be NaN.
+
+    columns: (n,) each, in the units of the file, with their factors to metres; at: (n,) lines or None.
+    """
+    if names[-1] == "z" and np.isfinite(columns[-1]).sum() < 2:
+        raise PatchfemError(f"{path}: {np.isfinite(columns[-1]).sum()} heights; a trace wants two at least")
+    for name, values in zip(names, columns):
+        bad = np.isinf(values) if name == "z" else ~np.isfinite(values)
+        if bad.any():
+            first = int(np.argmax(bad))
+            raise PatchfemError(f"{_where(path, at, first)}: {name} is {values[first]:g}; finite numbers are wanted")
+    for name, values, factor in zip(names, columns, factors):
+        worst = int(np.nanargmax(np.abs(values)))
+        if abs(values[worst]) > LONGEST / factor:
+            raise PatchfemError(f"{_where(path, at, worst)}: {name} is {float(values[worst]) * factor:.4g} m; is its "
+                                "unit right? a missing height is written nan")
+
+
+def _where(path, at, k: int) -> str:
+    return f"{path}: sample {k + 1}" if at is None else f"{path}:{at[k]}"
+
+
+def evened(path, x, factor: float, name: str = "x") -> tuple:
     """Places x without the rounding of their printed digits, where even spacing explains every one of them.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
@@ -54,7 +67,8 @@ def _evened(path, x, factor: float) -> tuple:
     digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
     if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
         return x, ()
-    return even, (f"{path}: x is printed to {say(digit * factor)}; taken as evenly spaced at {say(step * factor)}",)
+    return even, (f"{path}: {name} is printed to {say(digit * factor)}; taken as evenly spaced at "
+                  f"{say(step * factor)}",)
 
 
 def _single(path, x, z, at, factor: float) -> tuple:
@@ -63,8 +77,10 @@ def _single(path, x, z, at, factor: float) -> tuple:
     same = 1e-6 * (x[-1] - x[0]) / x.size
     if (step < -same).any():
         back = int(np.argmax(step < -same))
-        one, other = sorted((back, back + 1), key=lambda k: at[k])
-        raise PatchfemError(f"{path}:{at[other]}: x turns back, {say(x[one] * factor)} and then "
+        one, other = back, back + 1
+        if at is not None and at[one] > at[other]:
+            one, other = other, one
+        raise PatchfemError(f"{_where(path, at, other)}: x turns back, {say(x[one] * factor)} and then "
                             f"{say(x[other] * factor)}; a trace runs one way: keep one trace per file")
     if x[-1] == x[0]:
         raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace wants two places at least")
@@ -74,17 +90,25 @@ def _single(path, x, z, at, factor: float) -> tuple:
     heights = np.bincount(group, np.isfinite(z))
     with np.errstate(invalid="ignore"):
         mean = np.bincount(group, np.nan_to_num(z)) / heights
-    first = int(at[np.argmax(step <= same) + 1])
-    note = f"{path}: {x.size - mean.size} samples lie where another one does (the first in line {first}): mean taken"
+    first = int(np.argmax(step <= same)) + 1
+    place = f"sample {first + 1}" if at is None else f"line {at[first]}"
+    note = f"{path}: {x.size - mean.size} samples lie where another one does (the first in {place}): mean taken"
     return np.bincount(group, x) / np.bincount(group), mean, (note,)
 
 
-def _plausible(path, x, z) -> None:
+def plausible(path, x, z, stated: bool = False) -> tuple:
+    """Refuse heights z [m] without two numbers and, where no unit is `stated`, too high for their length x [m].
+
+    Where metres are stated, a note tells of heights that are too high.
+    """
     if np.isfinite(z).sum() < 2:
         raise PatchfemError(f"{path}: {np.isfinite(z).sum()} heights; a trace wants two at least")
     length, span = float(x[-1] - x[0]), float(np.nanmax(z) - np.nanmin(z))
     if length < SHORTEST:
         raise PatchfemError(f"{path}: the profile is {length:.3g} m long; is the unit of x right?")
-    if span > length:
-        raise PatchfemError(f"{path}: heights span {say(span)} over a length of {say(length)}; is the unit of z right? "
-                            "a missing height is written nan")
+    if span <= length:
+        return ()
+    steep = f"{path}: heights span {say(span)} over a length of {say(length)}"
+    if not stated:
+        raise PatchfemError(f"{steep}; is the unit of z right? a missing height is written nan")
+    return (f"{steep}: the file gives both in metres",)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
+from patchfem.surface.areal import level_plane
+from patchfem.surface.files.read import read_surface
 from patchfem.surface.fine import spectrum, too_fine
 from patchfem.surface.nodes import on_nodes, placed
 from patchfem.surface.profile import Profile, cleaned, level, spikes
-from patchfem.surface.trace import read_trace
 
 pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
 
@@ -29,24 +30,18 @@ def truth(data) -> dict:
     return json.loads((data / "truth.json").read_text())
 
 
-def mitutoyo(data, tmp_path) -> Profile:
-    rows = gzip.decompress((data / "mitutoyo-2.csv.gz").read_bytes()).partition(b"\n")[2]
-    path = tmp_path / "mitutoyo.csv.gz"
-    path.write_bytes(gzip.compress(b"x [um],z [um]\n" + rows))
-    return read_trace(path)
+def mitutoyo(data) -> Profile:
+    return read_surface(data / "mitutoyo-2.csv.gz")
 
 
-def dektak(data, tmp_path) -> Profile:
-    rows = (data / "dektak-1.csv").read_bytes().partition(b"Raw Micrometer,")[2]
-    path = tmp_path / "dektak.csv"
-    path.write_bytes(b"x [um],z [um],\n" + rows)
-    return read_trace(path)
+def dektak(data) -> Profile:
+    return read_surface(data / "dektak-1.csv")
 
 
 @pytest.mark.parametrize("read, name", [(mitutoyo, "mitutoyo-2.csv.gz"), (dektak, "dektak-1.csv")])
-def test_exact_height_parameters_of_three_codes(data, truth, tmp_path, read, name):
+def test_exact_height_parameters_of_three_codes(data, truth, read, name):
     known = truth[name]
-    flat = level(read(data, tmp_path))
+    flat = level(read(data))
     z = flat.z * 1e6
     slope = np.diff(z) / np.diff(flat.x * 1e6)
     assert flat.x.size == known["n"] and np.median(np.diff(flat.x)) == pytest.approx(known["dx_um"] * 1e-6, rel=1e-6)
@@ -54,23 +49,84 @@ def test_exact_height_parameters_of_three_codes(data, truth, tmp_path, read, nam
         [known["Pt"], known["Pa"], known["Pq"], known["Pdq_2pt"]], rel=1e-6)
 
 
-def test_exact_rounded_x_of_the_stylus_is_evened(data, tmp_path):
-    profile = dektak(data, tmp_path)
-    assert profile.notes[0].endswith("x is printed to 100 nm; taken as evenly spaced at 156.2 nm")
-    assert profile.length == pytest.approx(9599 * 0.15625e-6, rel=1e-6)
+def test_exact_the_step_of_the_stylus_is_length_over_points(data):
+    """The export prints x to 0.1 um; 1500 um over 9600 points is 0.15625 um."""
+    profile = dektak(data)
+    assert np.diff(profile.x) == pytest.approx(np.full(9599, 1500e-6 / 9600), rel=1e-9)
+    assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
+    assert profile.notes[0].endswith("x is printed to 100 nm; the step is 1.5 mm/9600 = 156.2 nm by the header")
+    assert profile.tip_radius == pytest.approx(2.5e-6)
 
 
-def test_exact_measured_traces_hold_few_spikes(data, tmp_path):
-    assert not spikes(mitutoyo(data, tmp_path)).any() and not spikes(dektak(data, tmp_path)).any()
+def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):
+    """Five of the printed results to their last digit; the step height is off by one digit of 0.01 nm."""
+    profile, known = dektak(data), truth["dektak-1.csv"]["instrument_printed_results"]
+    printed = profile.printed
+    assert {name: one.value * (1e6 if one.unit == "m" else 1) for name, one in printed.items()} == pytest.approx(
+        {"Ra": known["Ra"], "Rq": known["Rq"], "Skew": known["Skew"], "RzDin": known["RzDin"], "Wa": known["Ra"],
+         "Wq": known["Rq"], "WMaxDev": known["WMaxDev"], "ASH": known["ASH"]}, rel=1e-12)
+    assert printed["Ra"].reference == pytest.approx((468e-6, 0)) and printed["Ra"].measure == pytest.approx((733e-6, 0))
+    low, high = (int(np.floor(cursor[0] / 0.15625e-6 + 1e-9)) for cursor in (printed["Ra"].reference,
+                                                                             printed["Ra"].measure))
+    part = slice(low, high + 1)  # samples 2995 to 4691, both ends included
+    assert (part.start, part.stop) == (2995, 4692)
+    z = level(Profile(profile.x[part], profile.z[part], "window")).z
+    found = {"Ra": np.abs(z).mean(), "Rq": np.sqrt((z**2).mean()), "WMaxDev": np.abs(z).max()}
+    assert {name: round(value * 1e6, 5) for name, value in found.items()} == {
+        name: known[name] for name in found}
+    assert round(float((z**3).mean() / found["Rq"] ** 3), 2) == known["Skew"]
+    step = (profile.z[part][-1] - profile.z[part][0]) * 1e6
+    assert step == pytest.approx(known["ASH"], abs=1.1e-5)
+
+
+@pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
+def test_exact_areal_parameters_of_three_codes(data, truth, name):
+    known, scan = truth[name], read_surface(data / name, ("mm", "um"))
+    assert scan.z.shape == tuple(known["shape"]) and np.diff(scan.x) == pytest.approx(np.full(100, 5e-6), rel=1e-9)
+    flat = level_plane(scan)
+    z = flat.z * 1e6
+    rms = np.sqrt((z**2).mean())
+    assert [np.abs(z).mean(), rms, np.ptp(z), (z**3).mean() / rms**3, (z**4).mean() / rms**4] == pytest.approx(
+        [known[key] for key in ("Sa", "Sq", "Sz", "Ssk", "Sku")], rel=1e-6)
+    off = scan.z - flat.z
+    slopes = [(off[0, -1] - off[0, 0]) / 5e-4, (off[-1, 0] - off[0, 0]) / 5e-4]
+    assert slopes == pytest.approx(known["plane_slope_per_um"], rel=1e-6)
+    with pytest.raises(PatchfemError, match=r":1: no header, and units are never guessed; write the header as"):
+        read_surface(data / name)
+
+
+def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
+    """A gap map in metres: 246 x 54 places, each at the height that SciPy reads there."""
+    known, scan = truth["brb_surface_data.mat"], read_surface(data / "brb_surface_data.mat", ("m", "m"))
+    assert scan.z.shape == tuple(reversed(known["grid"])) and np.isfinite(scan.z).sum() == known["finite"]
+    assert [scan.x[-1] - scan.x[0], scan.y[-1] - scan.y[0]] == pytest.approx(
+        [known["extent_mm"][0] * 1e-3, known["extent_mm"][1] * 1e-3], rel=1e-6)
+    assert np.nanmax(scan.z) - np.nanmin(scan.z) == pytest.approx(known["gap_PV_um"] * 1e-6, rel=1e-6)
+    flat = level_plane(scan)
+    assert np.nanmax(flat.z) - np.nanmin(flat.z) == pytest.approx(known["flatness_PV_um"] * 1e-6, rel=1e-6)
+    points = loadmat(data / "brb_surface_data.mat")["mesoscale_xygap"]
+    column, row = np.searchsorted(scan.x, points[:, 0] - 1e-9), np.searchsorted(scan.y, points[:, 1] - 1e-9)
+    assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
+
+
+def test_exact_an_ascii_surface_data_file(data):
+    scan = read_surface(data / "sdf-1.sdf")
+    lines = (data / "sdf-1.sdf").read_text().split("*")[1].split()
+    assert scan.z.shape == (4, 7) and scan.z.ravel() == pytest.approx(np.array(lines, float) * 1e-6, rel=1e-15)
+    assert scan.x == pytest.approx(np.arange(7) * 1e-6) and scan.y == pytest.approx(np.arange(4) * 1e-6)
+
+
+def test_exact_measured_traces_hold_few_spikes(data):
+    assert not spikes(mitutoyo(data)).any() and not spikes(dektak(data)).any()
     for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):
         z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
         found = sum(int(spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
         assert found <= 10  # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
 
 
-def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth, tmp_path):
+def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
     """Rq behind a Gaussian filter from another code: the spectrum with each wave less the 2^-(cut/wave)^2 let by."""
-    profile = mitutoyo(data, tmp_path)
+    profile = mitutoyo(data)
     known = truth["mitutoyo-2.csv.gz"]
     waves, power = spectrum(profile)
     assert np.sqrt(power.sum()) == pytest.approx(known["Pq"] * 1e-6, rel=1e-4)
@@ -82,10 +138,10 @@ def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth, tmp
         too_fine(profile, 100e-6))
 
 
-def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data, tmp_path):
+def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
     """Coarse nodes see the means: their variance is what the waves keep after a box of one element."""
     nodes = np.linspace(-4.9e-3, 4.9e-3, 197)
-    trace = level(cleaned(placed(mitutoyo(data, tmp_path), nodes), 1e-4))
+    trace = level(cleaned(placed(mitutoyo(data), nodes), 1e-4))
     assert "the trace is centred, x moved by -4.997 mm" in trace.notes[0]
     gap = on_nodes(trace, nodes)
     fine = np.interp(np.linspace(nodes[0], nodes[-1], 196 * 50 + 1), trace.x, trace.z)
@@ -93,16 +149,14 @@ def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data, tmp_path):
     assert gap[1:-1] == pytest.approx(box[:195], abs=2e-8)
 
 
-@pytest.mark.parametrize("name", ["xy-1.txt", "dektak-1.csv", "mitutoyo-2.csv.gz", "nanovea-test1.txt.gz", "sdf-1.sdf",
-                                  "brb_surface_data.mat", "truth.json"])
-def test_refuses_files_without_a_header_of_two_columns(data, name):
-    with pytest.raises(PatchfemError, match=r"write the header as `x \[um\],z \[um\]`"):
-        read_trace(data / name)
+@pytest.mark.parametrize("name", ["xy-1.txt", "nanovea-test1.txt.gz", "brb_surface_data.mat", "truth.json",
+                                  "friction-damper-1hz.csv"])
+def test_refuses_files_that_name_no_units_or_are_no_surface(data, name):
+    with pytest.raises(PatchfemError, match=r"header (as )?`x \[um\],z \[um\]`"):
+        read_surface(data / name)
 
 
-def test_exact_a_digitised_uneven_trace_in_blanks(data, tmp_path):
-    path = tmp_path / "xy.txt"
-    path.write_text("x [um] z [um]\n" + (data / "xy-1.txt").read_text())
-    profile, known = read_trace(path), np.loadtxt(data / "xy-1.txt") * 1e-6
+def test_exact_a_digitised_uneven_trace_without_a_header(data):
+    profile, known = read_surface(data / "xy-1.txt", ("um", "um")), np.loadtxt(data / "xy-1.txt") * 1e-6
     assert profile.x == pytest.approx(known[:, 0], rel=1e-14) and profile.z == pytest.approx(known[:, 1], rel=1e-14)
     assert profile.notes == ()

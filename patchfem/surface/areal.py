@@ -1,0 +1,72 @@
+"""An areal scan of heights on a rectangular raster: its rows and columns as traces, and its levelling."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core import PatchfemError, frozen_array
+from .profile import Profile
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Areal:
+    """Heights z (m, n) [m] at x (n,) [m] along a row and y (m,) [m] along a column, NaN where none was measured.
+
+    x and y increase. source: a name of the scan for messages; notes: what was done to it on the way, one sentence each;
+    tip_radius: of the stylus [m], None where the file does not tell it.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    source: str
+    notes: tuple = ()
+    tip_radius: float | None = None
+
+    @property
+    def missing(self) -> np.ndarray:
+        """Whether no height was measured, (m, n) bool."""
+        return np.isnan(self.z)
+
+    def row(self, k: int) -> Profile:
+        """The trace along x at y[k]; negative k count from the end."""
+        return self._trace(self.x, self.z[self._within(k, 0)], f"row {k}")
+
+    def column(self, k: int) -> Profile:
+        """The trace along y at x[k]; negative k count from the end."""
+        return self._trace(self.y, self.z[:, self._within(k, 1)], f"column {k}")
+
+    def _within(self, k: int, axis: int) -> int:
+        count = self.z.shape[axis]
+        if not -count <= k < count:
+            name = ("row", "column")[axis]
+            raise PatchfemError(f"{self.source}: no {name} {k}; the scan has {count} of them, from 0 on")
+        return k
+
+    def _trace(self, along, heights, name: str) -> Profile:
+        return Profile(frozen_array(along), frozen_array(heights), f"{self.source}, {name}", self.notes,
+                       self.tip_radius)
+
+
+def level_plane(scan: Areal) -> Areal:
+    """Level a scan: subtract the least-squares plane of its measured heights, which all count alike.
+
+    PatchfemError where fewer than three heights are measured, or all of them in one line.
+    """
+    there, (x, y) = ~scan.missing, (_reduced(axis) for axis in (scan.x, scan.y))
+    count, across, along = there.sum(), there.sum(0), there.sum(1)  # of all, of each column, of each row
+    normal = np.array([[count, across @ x, along @ y],
+                       [across @ x, across @ x**2, y @ (there @ x)],
+                       [along @ y, y @ (there @ x), along @ y**2]])
+    if count < 3 or np.linalg.matrix_rank(normal / count, tol=1e-12, hermitian=True) < 3:
+        raise PatchfemError(f"{scan.source}: {count} heights, all in one line; a plane wants three that are not")
+    mean = scan.z[there].mean()
+    off = np.where(there, scan.z - mean, 0.0)
+    level, slope, pitch = np.linalg.solve(normal, [off.sum(), off.sum(0) @ x, off.sum(1) @ y])
+    return replace(scan, z=frozen_array(scan.z - (mean + level + slope * x + (pitch * y)[:, None])))
+
+
+def _reduced(axis) -> np.ndarray:
+    """An axis from -1 to 1."""
+    half = (axis[-1] - axis[0]) / 2
+    return (axis - (axis[0] + axis[-1]) / 2) / (half if half > 0 else 1.0)

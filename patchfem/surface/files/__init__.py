@@ -1,0 +1,6 @@
+"""Files of measured surfaces: text, Dektak exports, arrays, SDF, X3P, and other instruments through SurfaceTopography.
+
+In: a path, and the units of files that name none. Out: a `Profile` or an `Areal` in metres, or a refusal that names
+file and line. A format is known by its content first, by the suffix of the file second. Sizes are read from a header
+and limited before anything is allocated. Read `read` first.
+"""

@@ -1,0 +1,123 @@
+"""Arrays in NumPy's .npy and MATLAB's .mat: columns x, z or x, y, z, or variables of these names. Nothing is executed.
+
+Such files name no units, so the caller does.
+"""
+
+import ast
+import re
+import struct
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...inputs.matlab import variables
+from ..areal import Areal
+from ..profile import Profile
+from ..samples import checked
+from .raster import areal, raster
+from .raw import POINTS, Raw, shown
+from .text import UNITS
+
+_HEADER = 10_000  # bytes of the header of an .npy
+_KIND = re.compile(r"[<>=|]?[fiu][1248]")
+_LEAST = 8  # rows of a matrix that may be columns of a table
+TABLE = 'np.save("scan.npy", np.column_stack([x, z]))'
+HEIGHTS = ("z", "gap", "height", "heights")
+
+
+def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
+    """The surface in an .npy file of two or three columns; PatchfemError for objects, other shapes, absent units."""
+    path, table = raw.path, _npy(raw)
+    factors = lengths(raw, units)
+    if table.ndim == 2 and table.shape[0] in (2, 3) and table.shape[1] > 3:
+        table = table.T
+    if table.ndim != 2 or table.shape[1] not in (2, 3):
+        raise PatchfemError(f"{path}: an array of shape {table.shape}; columns x, z or x, y, z are wanted: {TABLE}")
+    return _table(path, table, factors)
+
+
+def mat(raw: Raw, units: tuple | None) -> Profile | Areal:
+    """The surface in a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
+    path, found = raw.path, {name: one for name, one in variables(raw.path, raw.data).items() if one.kind == "number"}
+    factors = lengths(raw, units)
+    named = {name.lower(): name for name in found}
+    height = next((named[name] for name in HEIGHTS if name in named), None)
+    if height is not None and "x" in named:
+        take = [found[named[name]] for name in ("x", "y") if name in named]
+        return _named(path, [one.values() for one in take], found[height].values(), factors)
+    tables = [name for name, one in found.items() if len(one.shape) == 2 and one.shape[1] in (2, 3)
+              and one.shape[0] >= _LEAST]
+    if len(tables) != 1:
+        listed = ", ".join(f"{shown(name)} {one.shape}" for name, one in list(found.items())[:8]) or "no array"
+        raise PatchfemError(f"{path}: holds {listed}; variables x, z or x, y, z, or one matrix of these columns, are "
+                            "wanted")
+    return _table(path, found[tables[0]].values(), factors)
+
+
+def lengths(raw: Raw, units: tuple | None) -> tuple:
+    """Factors to metres of x (and y) and of z from the names of their units; PatchfemError where they are not given."""
+    if units is None:
+        raise PatchfemError(f"{raw.path}: the file names no units, and units are never guessed; give those of x and z, "
+                            'such as units=("mm", "um"), or write it as text with the header `x [um],z [um]`')
+    for unit in units:
+        if unit not in UNITS:
+            raise PatchfemError(f"{raw.path}: unknown unit '{shown(str(unit))}'; use one of {', '.join(UNITS)}")
+    return UNITS[units[0]], UNITS[units[1]]
+
+
+def _table(path, table, factors: tuple) -> Profile | Areal:
+    columns = [np.ascontiguousarray(column, dtype=float) for column in table.T]
+    if len(columns[0]) < 2:
+        raise PatchfemError(f"{path}: {len(columns[0])} rows; a trace wants two at least")
+    if len(columns) == 2:
+        return checked(path, *columns, None, factors)
+    return raster(path, *columns, None, (factors[0], *factors))
+
+
+def _named(path, places: list, z, factors: tuple) -> Profile | Areal:
+    """x, (y) and z as variables: vectors of one length, a raster's axes and its matrix, or three alike matrices."""
+    places = [np.asarray(one, float) for one in places]
+    z, flat = np.asarray(z, float), [one.ravel() for one in places]
+    if all(one.size == z.size for one in flat):
+        columns = [*flat, z.ravel()]
+    elif len(flat) == 2 and z.shape == (flat[1].size, flat[0].size):
+        return areal(path, flat[0] * factors[0], flat[1] * factors[0], z * factors[1])
+    else:
+        shapes = ", ".join(str(one.shape) for one in (*places, z))
+        raise PatchfemError(f"{path}: x, y and z of shapes {shapes} do not fit; z wants a row for each y and a column "
+                            "for each x")
+    if not z.size > 1:
+        raise PatchfemError(f"{path}: {z.size} heights; a trace wants two at least")
+    return _table(path, np.column_stack(columns), factors)
+
+
+def _npy(raw: Raw):
+    """The array of an .npy file, a view of its bytes."""
+    path, data = raw.path, raw.data
+    if len(data) < 12 or data[6] not in (1, 2):
+        raise PatchfemError(f"{path}: an .npy file of an unknown version; save it anew: {TABLE}")
+    start, size = (10, struct.unpack_from("<H", data, 8)[0]) if data[6] == 1 else (
+        12, struct.unpack_from("<I", data, 8)[0])
+    try:
+        if size > _HEADER:
+            raise ValueError
+        head = ast.literal_eval(data[start:start + size].decode("latin-1").strip())
+        kind, order, shape = head["descr"], head["fortran_order"], head["shape"]
+        plain = isinstance(kind, str) and isinstance(order, bool) and isinstance(shape, tuple)
+        if not plain or not all(type(one) is int and one >= 0 for one in shape):
+            raise ValueError
+    except (ValueError, SyntaxError, TypeError, KeyError, RecursionError, MemoryError):
+        raise PatchfemError(f"{path}: the header of the .npy file is damaged or holds no plain array; save it anew: "
+                            f"{TABLE}") from None
+    if not _KIND.fullmatch(kind):
+        what = "Python objects, which are never loaded" if "O" in kind else f"'{shown(kind)}'"
+        raise PatchfemError(f"{path}: holds {what}; save numbers: {TABLE}")
+    count, dtype = 1, np.dtype(kind)
+    for one in shape:
+        count *= one
+    if count > POINTS * 3:
+        raise PatchfemError(f"{path}: {count} numbers by its header, more than {POINTS:.0e} points; save a part of it")
+    if count * dtype.itemsize != len(data) - start - size:
+        raise PatchfemError(f"{path}: {len(data) - start - size} bytes where {count} numbers of {dtype.name} are "
+                            "wanted; the file is cut off or damaged")
+    return np.frombuffer(data, dtype, count, start + size).reshape(shape, order="F" if order else "C")

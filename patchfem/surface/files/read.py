@@ -1,0 +1,51 @@
+"""Any file of a measured surface as a trace or an areal scan; the format is known by its content, then its suffix."""
+
+from importlib.util import find_spec
+
+from ...core import PatchfemError
+from ..areal import Areal
+from ..profile import Profile
+from .arrays import mat, npy
+from .dektak import MARK, dektak
+from .instruments import instrument
+from .raw import PLAIN, Raw, fetch
+from .sdf import sdf
+from .text import columns
+from .x3p import x3p
+
+KINDS = {"npy": npy, "mat": mat, "sdf": lambda raw, units: sdf(raw), "x3p": lambda raw, units: x3p(raw),
+         "binary": instrument}
+
+
+def read_surface(path, units: tuple | None = None) -> Profile | Areal:
+    """Read the surface in a file: a trace as `Profile`, an areal scan as `Areal`, heights and places in metres.
+
+    units: names of the units of x (and y) and of z, such as ("mm", "um"), for a file that names none; a header of text
+    that names others is refused. Heights keep the sign of the file. PatchfemError names file and line of a fault,
+    Missing what is not there.
+    """
+    if units is not None and (isinstance(units, str) or len(tuple(units)) != 2):
+        raise PatchfemError(f'{path}: units are two, of x and of z, such as ("mm", "um"), not {units!r}')
+    raw = fetch(path)
+    return _text(raw, units) if raw.kind == "text" else KINDS[raw.kind](raw, units)
+
+
+def read_profile(path, units: tuple | None = None) -> Profile:
+    """Read the one trace in a file (`read_surface`); PatchfemError for an areal scan."""
+    found = read_surface(path, units)
+    if isinstance(found, Areal):
+        raise PatchfemError(f"{path}: an areal scan of {found.z.shape[0]} x {found.z.shape[1]} heights where one trace "
+                            "is wanted; write one of its rows to a file with the header `x [um],z [um]`")
+    return found
+
+
+def _text(raw: Raw, units: tuple | None) -> Profile | Areal:
+    if raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t").startswith(MARK):
+        return dektak(raw)
+    try:
+        return columns(raw, units)
+    except PatchfemError:
+        if raw.suffix in PLAIN or find_spec("SurfaceTopography") is None:
+            raise
+    return instrument(raw, units)
+

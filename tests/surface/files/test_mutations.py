@@ -1,0 +1,121 @@
+"""Damaged files of every format: read or refused by name, whatever was cut, put in, turned over or doubled."""
+
+import gzip
+import random
+import struct
+import tempfile
+import warnings
+from collections import Counter
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+import pytest
+import surfaces as write
+
+from patchfem.core import Missing, PatchfemError
+from patchfem.surface.areal import Areal
+from patchfem.surface.files import instruments
+from patchfem.surface.files.read import read_surface
+
+Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.scan())
+POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
+RAW = Z.astype("<f8").tobytes()
+AXES = write.axis("CX", increment=5e-7) + write.axis("CY", increment=7.5e-7) + write.axis("CZ", "A")
+LISTED = write.main_xml(AXES, write.matrix(6, 4) + "<DataList>" + "".join(
+    "<Datum/>" if np.isnan(v) else f"<Datum>{float(v)!r}</Datum>" for v in Z.ravel()) + "</DataList>")
+LINES = "".join(f"{x:.2f},{y:.2f},{float(z)!r}\n" for x, y, z in POINTS)
+
+ROWS = "".join(f"{k}.5,0.{k * 37 % 500:03d}\n" for k in range(40))
+
+# name of the file, what is damaged, how the file is made of it
+SEEDS = {
+    "text": ("a.csv", f"# tip 2 um\nx [um],z [um]\n{ROWS}".encode(), bytes),
+    "decimal comma": ("a.csv", f"x_um;z_um\n{ROWS}".replace(",", ";").replace(".", ",").encode(), bytes),
+    "raster": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode(), bytes),
+    "utf-16": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode("utf-16"), bytes),
+    "gzip": ("a.csv.gz", gzip.compress(f"x [um],y [um],z [um]\n{LINES}".encode(), mtime=0), bytes),
+    "dektak": ("a.csv", write.dektak(np.sin(np.arange(60.0)), 9.375), bytes),
+    "sdf ascii": ("a.sdf", write.sdf_ascii(Z), bytes),
+    "sdf binary": ("a.sdf", write.sdf_binary(Z, 5, 1e-10), bytes),
+    "npy": ("a.npy", write.npy(POINTS), bytes),
+    "mat": ("a.mat", write.mat(False, points=POINTS), bytes),
+    "mat packed": ("a.mat", write.mat(points=POINTS), bytes),
+    "x3p": ("a.x3p", write.x3p_of(Z, "I", 1e-10), bytes),
+    "x3p main.xml": ("a.x3p", write.main_xml(AXES, write.matrix(6, 4) + write.link(RAW)),
+                     lambda xml: write.x3p(xml, RAW)),
+    "x3p list": ("a.x3p", LISTED, write.x3p),
+    "x3p heights": ("a.x3p", RAW, lambda raw: write.x3p(
+        write.main_xml(AXES, write.matrix(6, 4) + write.link(raw)), raw)),
+    "zip": ("a.zip", write.zipped({"a.sdf": write.sdf_ascii(Z)}), bytes),
+}  # fmt: skip
+WORDS = (b"-1", b"0", b"65535", b"2000000000", b"1e400", b"nan", b"inf", b"", b"*", b",", b";", b"\n", b"\x00", b"<",
+         b'"', b"9" * 400, struct.pack("<i", -1), struct.pack("<d", np.nan), struct.pack("<q", 2**62))
+
+
+def mutated(seed: bytes, rng: random.Random) -> bytes:
+    """One to four damages: bytes turned over, cut out, doubled, put in, or the end cut off."""
+    data = bytearray(seed)
+    for _ in range(rng.randint(1, 4)):
+        at, size = rng.randrange(len(data) + 1), rng.choice((1, 1, 2, 4, 8, 40))
+        kind = rng.randrange(6)
+        if kind == 0 and at < len(data):
+            data[at] ^= 1 << rng.randrange(8)
+        elif kind == 1 and at < len(data):
+            data[at] = rng.randrange(256)
+        elif kind == 2:
+            del data[at:at + size]
+        elif kind == 3:
+            data[at:at] = data[at:at + size]
+        elif kind == 4:
+            data[at:at + rng.choice((0, size))] = rng.choice(WORDS)
+        elif rng.random() < 0.3:
+            del data[at:]
+    return bytes(data)
+
+
+def outcome(path: Path) -> str:
+    """ "read", "refused" or "missing"; what was read must be a surface."""
+    start = process_time()
+    try:
+        with warnings.catch_warnings(action="error"):
+            found = read_surface(path, ("um", "um") if path.suffix in (".npy", ".mat") else None)
+    except PatchfemError as error:
+        assert str(path) in str(error) and len(str(error)) < 500 + len(str(path))
+        said = "missing" if isinstance(error, Missing) else "refused"
+    else:
+        heights = found.z[np.isfinite(found.z)]
+        assert heights.size >= 2 and not np.isinf(found.z).any() and np.abs(heights).max() <= 10.0
+        axes = (found.x, found.y) if isinstance(found, Areal) else (found.x,)
+        assert all(np.isfinite(axis).all() and (np.diff(axis) > 0).all() for axis in axes)
+        assert found.z.shape == tuple(axis.size for axis in reversed(axes))
+        said = "read"
+    assert process_time() - start < 10.0
+    return said
+
+
+def campaign(name: str, count: int, monkeypatch) -> Counter:
+    monkeypatch.setattr(instruments, "PYTHON", "/none")  # what is no known format any more starts no process
+    file, seed, make = SEEDS[name]
+    rng, told = random.Random(f"surfaces {name}"), Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / file
+        path.write_bytes(make(seed))
+        assert outcome(path) == "read"
+        for _ in range(count):
+            path.write_bytes(make(mutated(seed, rng)))
+            told[outcome(path)] += 1
+    return told
+
+
+@pytest.mark.parametrize("name", SEEDS)
+def test_always_damaged_files_are_read_or_refused_by_name(name, monkeypatch):
+    assert campaign(name, 40, monkeypatch).total() == 40
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEEDS)
+def test_always_a_thousand_damaged_files_of_a_format(name, monkeypatch):
+    told = campaign(name, 1000, monkeypatch)
+    print(name, dict(told))
+    assert told.total() == 1000 and told["refused"] > 50

@@ -1,0 +1,60 @@
+"""Areal scans: levelling against a plane that is known and against a dense least-squares solve, rows and columns."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError, frozen_array
+from patchfem.surface.areal import Areal, level_plane
+
+
+def scan(z, notes=("one",)) -> Areal:
+    rows, columns = z.shape
+    return Areal(frozen_array(1e-3 + 5e-6 * np.arange(columns)), frozen_array(-2e-3 + 7e-6 * np.arange(rows)),
+                 frozen_array(z), "scan.txt", notes, 2e-6)
+
+
+def bumps(shape, missing=0.0, seed=5) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    z = rng.normal(0.0, 1e-6, shape)
+    return np.where(rng.random(shape) < missing, np.nan, z)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.3])
+def test_exact_a_plane_is_taken_out_and_nothing_else(missing):
+    """A plane added to a levelled scan changes nothing."""
+    flat = level_plane(scan(bumps((31, 47), missing)))
+    tilted = scan(flat.z + 4e-5 + 0.02 * flat.x - 0.05 * flat.y[:, None])
+    again = level_plane(tilted)
+    assert np.array_equal(np.isnan(again.z), flat.missing)
+    assert np.nanmax(np.abs(again.z - flat.z)) < 1e-18
+    assert again.notes == ("one",) and again.tip_radius == 2e-6 and not again.z.flags.writeable
+
+
+def test_exact_the_plane_of_a_dense_least_squares_solve():
+    one = scan(bumps((13, 21), 0.4))
+    rows, columns = np.nonzero(~one.missing)
+    base = np.column_stack([np.ones(rows.size), one.x[columns] * 1e3, one.y[rows] * 1e3])
+    plane = base @ np.linalg.lstsq(base, one.z[rows, columns], rcond=None)[0]
+    assert level_plane(one).z[rows, columns] == pytest.approx(one.z[rows, columns] - plane, abs=1e-18)
+
+
+def test_exact_rows_and_columns_are_traces():
+    one = scan(bumps((4, 6), 0.2))
+    row, column = one.row(2), one.column(-1)
+    assert np.array_equal(row.x, one.x) and np.array_equal(row.z, one.z[2], equal_nan=True)
+    assert np.array_equal(column.x, one.y) and np.array_equal(column.z, one.z[:, 5], equal_nan=True)
+    assert (row.source, column.source) == ("scan.txt, row 2", "scan.txt, column -1")
+    assert row.notes == ("one",) and column.tip_radius == 2e-6
+
+
+def test_refuses_rows_that_are_not_there_and_heights_in_one_line():
+    one = scan(bumps((4, 6)))
+    for take, which in ((one.row, 4), (one.row, -5), (one.column, 6)):
+        with pytest.raises(PatchfemError, match=r"scan\.txt: no (row|column) -?\d; the scan has [46] of them, from 0"):
+            take(which)
+    line = np.full((4, 6), np.nan)
+    line[range(4), range(4)] = 1e-6
+    line[0, 0], line[1, 1] = 2e-6, 1e-6
+    for heights in (line, np.full((4, 6), np.nan)):
+        with pytest.raises(PatchfemError, match="all in one line; a plane wants three that are not"):
+            level_plane(scan(heights))
