@@ -10,18 +10,25 @@ from .shared import Json, Refused, Sets, model_of, say, scene_of
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
-    """Name every mistake in SCENE and in the path it slides along; compute nothing."""
-    found = scene_of(scene, set_)
-    if found.slide is not None and found.slide.file is not None:
-        from ..model.slide import slide_asked
-
-        slide_asked(found)
+    """Name every mistake in SCENE and in the files that it names; compute nothing."""
+    found = scene_of(scene, set_, _faults)
     for remark in found.remarks:
         say(f"{scene}: {remark}")
     if json_:
         print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks}))
     else:
         print(f"{scene}: a {found.kind} scene without mistakes")
+
+
+def _faults(tables, folder: Path, whole: bool) -> list:
+    """Faults of the files that a scene names; without such files nothing is imported for them."""
+    from ..scene.scene import files_of
+
+    if not files_of(tables):
+        return []
+    from ..model.files import faults
+
+    return faults(tables, folder, whole)
 
 
 def plan(scene: Path, /, *, set_: Sets = (), json_: Json = False,

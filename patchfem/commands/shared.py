@@ -25,11 +25,14 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def scene_of(path: Path, sets):
-    """The scene of a file with the words of --set put in; SceneError names every mistake."""
+def scene_of(path: Path, sets, faults=None):
+    """The scene of a file with the words of --set put in; SceneError names every mistake.
+
+    faults: (tables, folder, whole) -> (key, message) of more mistakes.
+    """
     from ..scene.scene import load
 
-    return load(path, sets)
+    return load(path, sets, faults)
 
 
 def model_of(path: Path, sets):

@@ -45,7 +45,12 @@ def cycles_of(asked, drive) -> float:
 
 def recorded(scene) -> tuple:
     """(time (k,) [s], value (k,)) of drive.file: acceleration [m s-2] of the base, or force [N]; from 0 s on."""
-    name, path = "acceleration" if scene.drive.kind == "base" else "force", scene.beside(scene.drive.file)
+    return record(scene.beside(scene.drive.file), scene.drive.kind)
+
+
+def record(path, kind: str) -> tuple:
+    """(time (k,) [s], value (k,)) of a recorded drive of a kind, read once."""
+    name = "acceleration" if kind == "base" else "force"
     return _read(path, name, path.stat().st_mtime_ns if path.is_file() else 0)
 
 

@@ -21,7 +21,7 @@ class Gap:
 
     shapes: (name, keys of its table) each; profile: path of measured heights or None; profile_size [m]: the size down
     to which these heights stand for content, None: that of the mesh's own cells; rough: asperities stand for what is
-    finer; side: the piece that carries the shapes, "upper" or "lower".
+    finer; side: the piece that carries the shapes, "upper" or "lower"; material: peaks of the profile are material.
     """
 
     shapes: tuple
@@ -29,6 +29,7 @@ class Gap:
     profile_size: float | None
     rough: bool
     side: str
+    material: bool = False
 
     @property
     def angle(self) -> float:
@@ -47,7 +48,7 @@ class Gap:
             from .profile import profile_gap
 
             begin = perf_counter()
-            heights, notes = profile_gap(self.profile, x, self.profile_size, self.rough)
+            heights, notes = profile_gap(self.profile, x, self.profile_size, self.rough, self.material)
             gap = gap + heights
             seconds["profile"] = perf_counter() - begin
         return gap, notes, seconds
@@ -61,7 +62,7 @@ def gap_asked(contact: Contact, size: float | None, beside) -> Gap:
     shapes = tuple((name, part) for name, part in contact.shapes.items() if name in SHAPES)
     profile = contact.profile
     return Gap(shapes, beside(profile.file) if profile is not None else None, size, contact.asperities is not None,
-               shape_side(contact))
+               shape_side(contact), profile is not None and profile.heights == "surface")
 
 
 def shape_side(contact: Contact) -> str:

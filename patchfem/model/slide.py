@@ -121,7 +121,7 @@ def slide_asked(scene) -> SlidePath:
     slide, corners, across, amplitude = scene.slide, None, None, scene.slide.amplitude or scene.slide.distance
     if slide.kind == "file":
         path = scene.beside(slide.file)
-        found = _read(path, path.stat().st_mtime_ns if path.exists() else 0)
+        found = rows_of(path)
         corners, across = found[:2], found[2] if len(found) == 3 else None
         amplitude = float(max(np.ptp(column) for column in found[1:])) / 2
         if across is not None and (reason := sideways(scene.tables())):
@@ -143,6 +143,11 @@ def _dwell_corners(slide) -> tuple:
 def _lengths(slide, across=None) -> np.ndarray:
     """Lengths [m] of straight legs between corners."""
     return np.abs(np.diff(slide)) if across is None else np.hypot(np.diff(slide), np.diff(across))
+
+
+def rows_of(path) -> tuple:
+    """Columns of a path file (`read_path`), read once."""
+    return _read(path, path.stat().st_mtime_ns if path.exists() else 0)
 
 
 @lru_cache(maxsize=4)

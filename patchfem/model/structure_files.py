@@ -10,20 +10,35 @@ PLACES = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at
 
 def found_in_file(scene) -> tuple:
     """(basis, sentences on what was read otherwise than it stands) of structure.file; PatchfemError with its line."""
-    path = scene.beside(scene.structure.file)
+    try:
+        return built(scene.beside(scene.structure.file), scene.structure, scene.drive, scene.kind == "rig")
+    except PatchfemError as error:
+        raise type(error)(f"{scene.where(error.key)}: {error}") from None
+
+
+def built(path, structure, drive, rubs: bool) -> tuple:
+    """(basis, notes) of a file and the tables [structure] and [drive]; rubs: an interface is needed. PatchfemError with
+    the key at fault."""
     try:
         stamp = path.stat()
     except OSError as error:
-        raise PatchfemError(f"{scene.where('structure.file')}: {path} cannot be read ({error.strerror})") from None
-    kind, mass = scene.drive.kind, scene.drive.mass
+        raise PatchfemError(f"{path} cannot be read ({error.strerror})", "structure.file") from None
     try:
-        return _built(path, stamp.st_mtime_ns, stamp.st_size, scene.structure, kind, None if kind == "base" else mass,
-                      scene.kind == "rig")
+        return _built(path, stamp.st_mtime_ns, stamp.st_size, structure, drive.kind,
+                      None if drive.kind == "base" else drive.mass, rubs)
     except PatchfemError as error:
         head, _, rest = str(error).partition(": ")
         named = head.startswith(("structure.", "drive."))
-        key, text = (head, rest) if named else ("structure.file", str(error))
-        raise type(error)(f"{scene.where(key)}: {text}") from None
+        raise type(error)(rest if named else str(error), head if named else "structure.file") from None
+
+
+def content(path):
+    """Content of a file: arrays by name, or Shapes; PatchfemError with the key."""
+    stamp = path.stat()
+    try:
+        return _read(path, stamp.st_mtime_ns, stamp.st_size)
+    except PatchfemError as error:
+        raise type(error)(str(error).removeprefix("structure.file: "), "structure.file") from None
 
 
 @lru_cache(maxsize=8)

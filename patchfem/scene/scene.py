@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import shorten
@@ -85,8 +85,13 @@ class Scene:
         return self.path.parent / name
 
 
-def load(path: str | Path, sets: Iterable[str] = ()) -> Scene:
-    """Read a scene file, with ``table.key=value`` strings applied in order; SceneError with all mistakes at once."""
+def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = None) -> Scene:
+    """Read a scene file, with ``table.key=value`` strings applied in order; SceneError with all mistakes at once.
+
+    A file that the scene names and that is not there is a mistake. faults(tables, folder, whole) gives (key, message)
+    of more mistakes, such as those inside these files; it sees the tables as far as they could be read, whole where
+    they have no mistake.
+    """
     try:
         content = Path(path).read_bytes()
     except (OSError, ValueError) as error:
@@ -98,19 +103,26 @@ def load(path: str | Path, sets: Iterable[str] = ()) -> Scene:
         line = content.count(b"\n", 0, error.start) + 1
         byte = content[error.start]
         raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
-    return with_files(loads(text, path, sets))
+
+    def of_files(found: tables.Tables, whole: bool) -> Iterable[tuple[str, str]]:
+        folder = Path(path).parent
+        return [*absent_files(found, folder), *(faults(found, folder, whole) if faults else ())]
+
+    return loads(text, path, sets, of_files)
 
 
 def with_files(found: Scene) -> Scene:
     """The scene itself; SceneError where a file that it names is not there."""
-    missing = [_no_file(found, *named) for named in _files(found) if not found.beside(named[1]).is_file()]
+    lines, missing = key_lines(found.text), []
+    for key, message in absent_files(found.tables(), found.path.parent):
+        missing.append(f"{found.path}:{lines[key]}: {key}: {message}" if key in lines else f"--set: {key}: {message}")
     if missing:
         raise SceneError(missing)
     return found
 
 
-def _files(found: Scene) -> list[tuple[str, str]]:
-    """(key, file) of every file that the scene names."""
+def files_of(found: tables.Tables) -> list[tuple[str, str]]:
+    """(key, file) of every file that the tables of a scene name."""
     profile = found.contact and found.contact.profile
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
              ("slide.file", found.slide and found.slide.file), ("drive.file", found.drive and found.drive.file),
@@ -119,14 +131,25 @@ def _files(found: Scene) -> list[tuple[str, str]]:
     return [(key, file) for key, file in named if file]
 
 
-def _no_file(found: Scene, key: str, file: str) -> str:
-    line = key_lines(found.text).get(key)
-    where = f"{found.path}:{line}" if line else "--set"
-    return f"{where}: {key}: there is no file {found.beside(file)}; paths are relative to the scene"
+def is_there(path: Path) -> bool:
+    """Whether a path is that of a file; False for a text that can be no path."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
-def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) -> Scene:
-    """Read a scene from its text; `path` only names it in messages and is what its own paths are relative to."""
+def absent_files(found: tables.Tables, folder: Path) -> list[tuple[str, str]]:
+    """(key, message) of every file that the tables name and that is not there."""
+    return [(key, f"there is no file {folder / file}; paths are relative to the scene")
+            for key, file in files_of(found) if not is_there(folder / file)]
+
+
+def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), more: Callable | None = None) -> Scene:
+    """Read a scene from its text; `path` only names it in messages and is what its own paths are relative to.
+
+    more(tables, whole) gives (key, message) of mistakes beside those of the text; whole: the tables have none.
+    """
     try:
         raw = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -139,10 +162,10 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = ()) 
     kind = check(draft)
     wrong = bool(draft.mistakes)
     combinations(draft, kind)
-    if wrong:
-        raise SceneError(draft.lines_of_mistakes())
-    found = _finish(draft.tables, kind)
-    for key, message in not_yet_built(found):
+    found = None if wrong else _finish(draft.tables, kind)
+    for key, message in () if found is None else not_yet_built(found):
+        draft.say(key, message)
+    for key, message in () if more is None else more(draft.tables, not draft.mistakes):
         draft.say(key, message)
     if draft.mistakes:
         raise SceneError(draft.lines_of_mistakes())

@@ -2,12 +2,16 @@
 
 import csv
 import json
+import os
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import cli
 from scene_texts import COATED, COULOMB, PIECE, SLIDE
+from scipy.optimize import nnls
 
 from patchfem import closed_forms
 from patchfem.core import Outcome, PatchfemError, frozen_array
@@ -24,6 +28,7 @@ from patchfem.runs.patch.values import values
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
+from patchfem.surface.files.read import read_surface
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
 TEXT = PIECE + """\
@@ -162,6 +167,29 @@ def test_exact_a_crown_read_from_a_profile_is_the_crown(tmp_path):
         assert read[name] == pytest.approx(crown[name], rel=1e-5 if name != "approach" else 5e-3), name
 
 
+@pytest.mark.parametrize("on", ["upper", "lower"])
+def test_exact_a_stylus_trace_of_a_surface_is_its_gap_turned(tmp_path, on):
+    """Peaks are material: the trace z presses as the gap -z does, bit for bit, whichever piece it was measured on."""
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
+    z = 2e-6 * np.cos(2 * np.pi * x / 4e-3) - x**2 / 2 / 3.0
+    side = f'on = "{on}"\n'
+    surface = profile(tmp_path, x, z, "surface.csv") + 'heights = "surface"\n' + side
+    gap = profile(tmp_path, x, -z, "gap.csv") + side
+    (one, trace), (other, turned) = (solved(part, path=tmp_path / "scene.toml") for part in (surface, gap))
+    assert trace == turned and np.array_equal(one.gap, other.gap)
+    upright = solved(profile(tmp_path, x, z, "gap.csv") + side, path=tmp_path / "scene.toml")[1]
+    assert upright["pressure_peak"] > 1.1 * trace["pressure_peak"]  # it rides on its two ends
+
+
+def test_exact_a_crown_measured_as_a_surface_is_the_crown(tmp_path):
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
+    tables = profile(tmp_path, x, -(x**2) / 2 / 5.0) + 'heights = "surface"\n'
+    read, crown = (solved(part, path=tmp_path / "scene.toml")[1]
+                   for part in (tables, '[contact.crown]\nradius = "5 m"\n'))
+    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness"):
+        assert read[name] == pytest.approx(crown[name], rel=1e-5), name
+
+
 def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
     patch, found = solved(profile(tmp_path, x, 1e-3 * x), path=tmp_path / "scene.toml")
@@ -180,6 +208,32 @@ def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(t
     assert any("left to the law of the asperities" in note for note in patch.notes)
     box = np.sinc(0.127e-3 / 50e-6)  # of the average over a cell
     assert np.ptp(patch.gap[1:-1]) / 2 == pytest.approx(1e-7 * abs(box), rel=0.02)
+
+
+@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
+def test_exact_a_measured_gap_of_a_bolted_beam_is_pressed(tmp_path):
+    """Row 25 of 54 of the measured interface, 100 um of gap over 120 mm; the truth is a non-negative least-squares
+    problem: f >= 0 least in f C f/2 + g f at the load."""
+    row = read_surface(Path(os.environ["PATCHFEM_DATA"]) / "brb_surface_data.mat", ("m", "m")).row(25)
+    rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(row.x.tolist(), row.z.tolist()))
+    (tmp_path / "row.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
+    text = TEXT.format(keys='load = "10 kN"\nelement_size = "1 mm"', material=STEEL,
+                       tables='[contact.profile]\nfile = "row.csv"\n')
+    for key, value in (("length", "110 mm"), ("width", "25.4 mm"), ("height", "12.7 mm")):
+        text = re.sub(rf'^{key} = .*$', f'{key} = "{value}"', text, flags=re.M)
+    found = build(loads(text, tmp_path / "scene.toml")).patch
+    patch = solve(found, *bodies_of(found))
+    over = np.abs(row.x) < 55.5e-3
+    z = np.interp(patch.x, row.x[over], row.z[over])
+    line = np.polyval(np.polyfit(row.x[over], row.z[over], 1), patch.x)
+    assert patch.gap == pytest.approx(z - line - (z - line).min(), abs=1.5e-6)  # means over 1 mm against points
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    half = np.linalg.cholesky(patch.pieces.normal)
+    heavy = 1e4 * np.sqrt(np.trace(patch.pieces.normal))  # the load as one more row of the least squares
+    known, _ = nnls(np.vstack([half.T, np.full(force.size, heavy)]) * 1e3,
+                    np.append(-np.linalg.solve(half, patch.gap), heavy * 1e4) * 1e3)
+    assert force.sum() == pytest.approx(1e4, rel=1e-9) and 0 < (force > 0).sum() < 10
+    assert force == pytest.approx(known, abs=1e-2)
 
 
 # --------------------------------------------------------------------------------------------------- pieces that differ

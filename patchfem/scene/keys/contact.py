@@ -100,6 +100,7 @@ class ProfileFile(Table):
     """Measured heights, added to the gap."""
 
     file: Text
+    heights: Literal["gap", "surface"] = "gap"
     on: Piece = "upper"
 
 

@@ -44,7 +44,9 @@ MEANINGS = {
         "tangential_stiffness": "stiffness along x between the far face and what holds it; rigid unless given",
     },
     "ProfileFile": {
-        "file": "table of places along x and heights of the gap; a peak of the file is an opening",
+        "file": "one trace of heights along x: text with units in its header, or a file of an instrument",
+        "heights": "gap: a larger height is an opening; surface: a stylus trace, whose peaks are material of the piece "
+                   "that carries the shape",
         "on": "the piece that carries the shape",
     },
     "Asperities": {

@@ -1,0 +1,93 @@
+"""Faults of the files that a scene names, found by reading each of them; nothing is computed.
+
+Each file is read as the run reads it, so that what passes here is not refused there. Of a large mesh
+only the first bytes are looked at.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..core import PatchfemError
+from ..inputs.measured import read_table
+from ..scene.rules.limits import sideways
+from ..scene.scene import files_of, is_there
+from .drive import record
+from .patch import AUTOMATIC_CELLS
+from .profile import profile_gap, trace_of
+from .slide import rows_of
+
+WHOLE = 2 * 2**20  # bytes of a mesh that is read whole
+STARTS = {".msh": (b"$MeshFormat",), ".vtu": (b"<?xml", b"<VTKFile"), ".inp": (b"*",), ".unv": (b"-1", b"    -1")}
+
+
+def faults(tables, folder: Path, whole: bool = True) -> list:
+    """(key, message) of each fault in the files that the tables of a scene name.
+
+    whole: the tables have no mistake, so that a file may be held against them; else what is wrong in them is None, and
+    a file is only read. Files that are not there are left out.
+    """
+    found = []
+    for key, file in files_of(tables):
+        path = folder / file
+        if not is_there(path):
+            continue
+        try:
+            READERS[key](path, tables, whole)
+        except PatchfemError as error:
+            found.append((error.key or key, str(error).removeprefix(f"{key}: ")))
+    return found
+
+
+def _mesh(path: Path, tables, whole: bool) -> None:
+    start = STARTS.get(path.suffix)
+    if start is None or path.stat().st_size <= WHOLE:
+        from ..mesh.files import read_pieces
+
+        read_pieces(path)
+        return
+    with open(path, "rb") as file:
+        if not file.read(4096).lstrip().startswith(start):
+            raise PatchfemError(f"{path}: not a readable {path.suffix} file (it does not start like one)")
+
+
+def _profile(path: Path, tables, whole: bool) -> None:
+    """A trace that covers the patch and is no finer than its elements."""
+    trace_of(path)
+    contact = tables.contact
+    if not whole or contact.mesh is not None:
+        return
+    size = contact.element_size or contact.length / AUTOMATIC_CELLS
+    x = np.linspace(-contact.length / 2, contact.length / 2, max(1, round(contact.length / size)) + 1)
+    profile_gap(path, x, size, contact.asperities is not None, contact.profile.heights == "surface")
+
+
+def _slide(path: Path, tables, whole: bool) -> None:
+    """A path that the law and the contact can follow, sideways too where it goes there."""
+    across = len(rows_of(path)) == 3
+    if whole and across and (reason := sideways(tables)):
+        raise PatchfemError(reason)
+
+
+def _drive(path: Path, tables, whole: bool) -> None:
+    if whole or tables.drive.kind is not None:
+        record(path, tables.drive.kind)
+
+
+def _structure(path: Path, tables, whole: bool) -> None:
+    """The arrays of the file as a basis; a universal file is only read, its responses are not fitted here."""
+    from .structure_files import built, content
+
+    if path.suffix.lower() in (".uff", ".unv") or not whole:
+        content(path)
+        return
+    rubs = tables.friction is not None or bool(tables.structure.interface)
+    built(path, tables.structure, tables.drive, rubs)
+
+
+def _measured(path: Path, tables, whole: bool) -> None:
+    read_table(path)
+
+
+READERS = {"contact.mesh": _mesh, "contact.profile.file": _profile, "slide.file": _slide, "drive.file": _drive,
+           "structure.file": _structure, "measured.file": _measured}
