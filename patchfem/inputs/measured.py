@@ -35,10 +35,9 @@ def read_table(path: Path) -> list:
     frequency and input must stand in every row. PatchfemError names line and column of a mistake.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        lines = list(csv.reader(Path(path).read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise PatchfemError(f"{path}: the measured table cannot be read ({error})") from None
-    lines = list(csv.reader(text.splitlines()))
     if not lines:
         raise PatchfemError(f"{path}:1: the measured table is empty")
     columns = [_column(path, cell.strip()) for cell in lines[0]]
@@ -72,8 +71,8 @@ def _row(path, number: int, columns, cells) -> Row:
                 raise PatchfemError(f"{path}:{number}: flag '{cell}'; known letters are {', '.join(FLAGS)}")
             values[name] = cell
         elif cell:
-            if not re.fullmatch(r"\+?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell):
-                raise PatchfemError(f"{path}:{number}: {name}: '{cell}' is not a number >= 0")
+            if not re.fullmatch(r"\+?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", cell) or float(cell) == float("inf"):
+                raise PatchfemError(f"{path}:{number}: {name}: '{cell[:40]}' is not a number >= 0")
             values[name] = float(cell) * factor
     if values.get("frequency") is None or values.get("input") is None:
         raise PatchfemError(f"{path}:{number}: frequency and input are wanted in every row")

@@ -86,7 +86,9 @@ def _modes(root, K, stretch) -> tuple:
     if stretch is not None:
         return decouple(solve_triangular(root, np.asarray(stretch, float).T, lower=True).T)
     half = solve_triangular(root, K, lower=True)
-    unit = solve_triangular(root, half.T, lower=True)
+    unit = solve_triangular(root, half.T, lower=True, check_finite=False)
+    if not np.isfinite(unit).all():
+        raise PatchfemError("structure: K over M is too large for a number; are both in SI units?")
     square, turned = eigh((unit + unit.T) / 2)
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:

@@ -56,6 +56,8 @@ def test_exact_units_of_a_table(tmp_path):
     (HEAD + "143,5,6.0,,\n143,5,6.0,,X\n", ":3: flag 'X'"),
     (HEAD + ",5,6.0,,\n", ":2: frequency and input are wanted"),
     (HEAD + "143,,6.0,,\n", ":2: frequency and input are wanted"),
+    (HEAD + "143,5,1e999,,\n", ":2: acceleration: '1e999' is not a number"),
+    (HEAD + "1" * 200_000 + ",5,6,,\n", ": the measured table cannot be read (field larger than field limit"),
 ])  # fmt: skip
 def test_refuses_a_faulty_table(tmp_path, text, wanted):
     path = tmp_path / "t.csv"

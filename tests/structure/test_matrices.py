@@ -163,6 +163,7 @@ M2, K2 = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
     (M2, np.ones((2, 3)), None, "K must be square"),
     (M2 * np.nan, K2, None, "M holds values that are not finite"),
     (M2, [["a", "b"], ["c", "d"]], None, "K is no matrix of real numbers"),
+    (1e-300 * np.eye(2), 1e20 * np.eye(2), None, "K over M is too large for a number; are both in SI units"),
 ])  # fmt: skip
 def test_refuses_matrices_without_modes(M, K, C, says):
     with pytest.raises(PatchfemError) as caught:
