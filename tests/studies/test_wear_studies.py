@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 from study_module import study
 
@@ -39,3 +40,34 @@ def test_always_the_sentence_on_bands_in_full(bands):
     six = {round(r.stroke / bands.STEP): r.ratio for r in rows if r.worn > 5e-6}
     assert min(six, key=six.get) == 8 and six[8] == pytest.approx(0.53, abs=0.006)
     assert all(r.scatter < 0.03 for r in rows)
+
+
+@pytest.fixture(scope="module")
+def story():
+    return study("wear/rig_story.py")
+
+
+def told(story, rows, within):
+    """The numbers of the docstring against the rows: new, then each coefficient."""
+    new, ten, hundred = (next(r for r in rows if r.coefficient == kappa) for kappa in (0.0, 1e-14, 1e-13))
+    parts = [[100 * r.values["contact_fraction"], r.values["pressure_peak"] / 1e6] for r in (new, ten, hundred)]
+    assert np.ravel(parts) == pytest.approx([22.2, 7.9, 38.2, 2.71, 97.2, 0.90], rel=within)
+    assert [1e6 * ten.depth, 1e6 * hundred.depth] == pytest.approx([0.314, 1.203], rel=within)
+    assert [r.values["normal_stiffness"] / 1e6 for r in (new, ten)] == pytest.approx([539, 845], rel=within)
+    assert [r.values["tangential_stiffness"] / 1e6 for r in (new, ten)] == pytest.approx([230, 304], rel=within)
+    assert [r.onset for r in (new, ten, hundred)] == pytest.approx([3.88, 3.90, 4.00], abs=0.02)
+
+
+def test_always_the_sentence_on_the_worn_rig(story, tmp_path):
+    """Short marches and a loose tolerance: the patch is the same to some percent."""
+    rows = story.main((1e-14, 1e-13), motion=60, tolerance="3e-2", path=tmp_path / "x.svg")
+    told(story, rows, 0.15)
+    assert "friction loop, change" in (tmp_path / "x.svg").read_text()
+
+
+@pytest.mark.slow
+def test_always_the_sentence_on_the_worn_rig_in_full(story):
+    rows = story.main(path=None)
+    told(story, rows, 0.01)
+    motion = [[r.values["relative_displacement_amplitude"] * 1e6, r.values["loop_area"] * 1e3] for r in rows]
+    assert np.ravel([motion[0], *motion[2:]]) == pytest.approx([14.81, 1.96, 15.03, 2.00, 15.32, 2.04], rel=3e-3)

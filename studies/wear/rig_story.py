@@ -1,0 +1,119 @@
+"""What does wear do to the rig of the report: pressure, contact, onset of slip and friction loop, new and worn?
+
+The shipped rig (143 Hz, 5 g, one piece tilted by 0.1 mrad, bonds of 1 um, shear of the pieces) over 135 723 cycles,
+16 minutes; Archard's coefficient is assumed, 1e-15 to 1e-13 m2/N.
+
+Wear heals the tilt. New, 22 % of the length touches under a peak of 7.9 MPa. With 1e-14 m2/N 0.31 um wear off at the
+loaded end, 38 % touches and the peak is 2.7 MPa; normal and tangential stiffness rise from 539 to 845 and from 230 to
+304 N/um. With 1e-13 it is 97 % of the length, 0.90 MPa and 1.20 um.
+
+The motion hardly sees it: amplitude 14.81, 15.03 and 15.32 um, loop 1.96, 2.00 and 2.04 mJ, since the same load slides
+the same way. Onset of slip (elastic-plastic patch, so that it is sharp) goes from 3.88 g to 3.90 and 4.00 g: a patch
+that touches all over slips as one, at mu N/m = 4.00 g. So an onset measured between 3.8 and 4.2 g does not tell a
+worn rig from a new one; the part of the faces that is rubbed does.
+
+Run: python studies/wear/rig_story.py
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+
+from patchfem.core import G_N
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from patchfem.model.model import build
+from patchfem.runs import run as runner
+from patchfem.runs.patch.press import pressed
+from patchfem.runs.rig import levels
+from patchfem.runs.rig.engines import ENGINES
+from patchfem.runs.rig.numerics import choose
+from patchfem.scene import scene
+
+HERE = Path(__file__).parent
+SCENE = HERE.parent / "rig" / "rig.toml"
+RIG = SCENE.read_text()
+CYCLES = 135_723  # 16 minutes at 143 Hz
+COEFFICIENTS = (1e-15, 1e-14, 1e-13)  # m2/N, assumed: sprayed carbide on itself, mild to severe
+PLASTIC = '[friction]\nlaw = "elastic-plastic"\nbond_length = "1 um"\nstatic = 0.30\n'  # its onset is sharp
+SHOWN = ("contact_fraction", "pressure_peak", "normal_stiffness", "tangential_stiffness",
+         "relative_displacement_amplitude", "loop_area")
+
+
+class Row(NamedTuple):
+    """The rig after CYCLES at a coefficient [m2/N]: measures by name, onset of slip [g], largest depth [m], history
+    over the cycles, place x (m,) [m] and pressures (2, m) [Pa] new and worn."""
+
+    coefficient: float
+    values: dict
+    onset: float
+    depth: float
+    history: dict
+    x: np.ndarray
+    pressure: np.ndarray
+
+
+def onset(worn, cycles: int, pair=None) -> float:
+    """Level [g] at which the patch with this worn depth (m,) [m] begins to slip, raised from 3.5 g by .25 g."""
+    text = RIG[:RIG.index("[friction]")] + PLASTIC + RIG[RIG.index("[structure]"):RIG.index("[drive]")] + (
+        f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = {cycles}\n'
+        'levels = ["3.5 g", "3.75 g", "4 g", "4.25 g"]\n[accuracy]\ntolerance = 3e-3\nsteps_per_cycle = 400\n')
+    model = build(scene.loads(text, SCENE))
+    patch = pressed(model.patch, pair, worn)
+    found = ENGINES["march"].run(model, choose(model), patch)
+    return levels.onset(found.levels, found.slips, 3e-3)[0] / G_N
+
+
+def worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:
+    """The shipped rig worn with a coefficient [m2/N]; motion: cycles of each march."""
+    text = RIG + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = {cycles}\n'
+    found = runner.run(scene.loads(text, SCENE,
+                                   [f"accuracy.tolerance={tolerance}", f"drive.cycles={motion}"]), estimate=False)
+    depth, fields = found.fields["worn_depth"][-1], found.fields["normal_stress"]
+    values = {name: found.measures[name].value for name in SHOWN}
+    return Row(coefficient, values, onset(depth, motion, found.patch.pair), float(depth.max()), found.extra["wear"],
+               found.patch.x, fields[[0, -1]])
+
+
+def picture(rows: list, path: Path) -> Path:
+    """Pressure new and worn, what changes over the cycles, and onset and loop over the coefficient."""
+    middle = rows[len(rows) // 2]
+    with drawing(path, (9.6, 2.9), 1, 3) as (_, (a, b, c)):
+        a.plot(middle.x * 1e3, middle.pressure[0] / 1e6, color=GREY, label="new")
+        for row, colour in zip(rows, (ORANGE, BLUE, "#3f7d4e")):
+            label = f"{row.coefficient:.0e} m²/N"
+            a.plot(row.x * 1e3, row.pressure[1] / 1e6, color=colour, label=label)
+            b.plot(row.history["cycle"] / 1e3, row.history["contact_fraction"] * 100, color=colour, label=label)
+            first = row.history["loop_area"][0]
+            c.plot(row.history["cycle"] / 1e3, 100 * (row.history["loop_area"] / first - 1), color=colour, label=label)
+        a.set(title="pressure [MPa]", xlabel="x [mm]", ylim=(0, 8))
+        b.set(title="contact [% of the length]", xlabel="thousand cycles", ylim=(0, 105))
+        c.set(title="friction loop, change [%]", xlabel="thousand cycles")
+        a.legend(frameon=False, fontsize=7)
+    return path
+
+
+def main(coefficients=COEFFICIENTS, cycles=CYCLES, motion=200, tolerance="1e-2", path=HERE / "rig_story.svg") -> list:
+    """Rows of the rig, new and worn with each coefficient; printed as a table, drawn where a path is given."""
+    rows = [worn_rig(each, cycles, motion, tolerance) for each in coefficients]
+    new = {name: rows[0].history[name][0] for name in SHOWN}
+    still = np.zeros_like(rows[0].x)
+    pair = runner.run(scene.loads(RIG, SCENE, [f"drive.cycles={motion}"]), estimate=False).patch.pair
+    rows.insert(0, Row(0.0, new, onset(still, motion, pair), 0.0, {}, rows[0].x, rows[0].pressure[[0, 0]]))
+    print(f"{'kappa':>8} {'depth um':>9} {'contact %':>9} {'peak MPa':>9} {'K_n N/um':>9} {'K_t N/um':>9} "
+          f"{'amp um':>8} {'loop mJ':>8} {'onset g':>8}")
+    for r in rows:
+        v = [r.values[name] for name in SHOWN]
+        print(f"{r.coefficient:8.0e} {r.depth * 1e6:9.3f} {100 * v[0]:9.1f} {v[1] / 1e6:9.2f} {v[2] / 1e6:9.0f} "
+              f"{v[3] / 1e6:9.0f} {v[4] * 1e6:8.3f} {v[5] * 1e3:8.4f} {r.onset:8.3f}")
+    if path is not None:
+        picture(rows[1:], path)
+    return rows
+
+
+if __name__ == "__main__":
+    main()
