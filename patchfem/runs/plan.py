@@ -61,7 +61,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         read_table(model.measured[0])  # a broken table is named before anything runs
     unknowns, chain, groups = {}, {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
-    engine, steps, seconds, said = "static", 0, 0.25, [[], [], []]
+    engine, steps, seconds, more, said = "static", 0, 0.25, 0.0, [[], [], []]
     if model.rig is not None:
         from .rig import plan as of_rig
 
@@ -84,6 +84,11 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         engine, steps, more = of_bench.cost(model, unknowns)
         seconds, groups = seconds + more, of_bench.groups(model) | groups
+    if model.wear is not None and model.patch is not None:
+        from .wear import plan as of_wear
+
+        seconds += of_wear.cost(model, unknowns["interface_points"], more)
+        said[2] = [*said[2], of_wear.verdict(model)]
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
     if model.friction is not None:

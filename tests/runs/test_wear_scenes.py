@@ -142,6 +142,14 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     assert found == pytest.approx(stick / half + 0.6 * line / (np.pi * stick * peak), abs=2e-3)
 
 
+def test_exact_plan_names_the_jumps_and_what_they_share():
+    bench, rig = (pf.plan(loads(text + WEAR, "worn.toml")) for text in (TILTED + COULOMB + SINE, SOFT_RIG))
+    assert any("one motion for all" in line for line in bench.verdict)
+    assert any("found anew" in line for line in rig.verdict)
+    plain = pf.plan(loads(SOFT_RIG, "new.toml"))
+    assert rig.seconds > plain.seconds and not any("wear" in line for line in plain.verdict)
+
+
 def test_refuses_what_wear_does_not_go_with():
     text = TILTED + COULOMB + SINE + WEAR
     assert "scheme 'explicit' needs" in only(text + 'scheme = "explicit"\n')
