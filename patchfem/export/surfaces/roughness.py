@@ -6,7 +6,7 @@ from pathlib import Path
 from ... import __version__
 from ...surface.profile import say
 from ...surface.roughness.report import RoughnessReport, Value
-from ..pictures import LADDERS, step_of
+from ..drawing.pictures import LADDERS, step_of
 from ..report import CSS
 from . import pictures
 
