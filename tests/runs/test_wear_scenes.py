@@ -59,6 +59,18 @@ def test_exact_energy_form_is_archard_with_coefficient_times_friction():
         assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
 
 
+@pytest.mark.parametrize("law", ['law = "elastic-plastic"', 'law = "nonlocal"'])
+def test_exact_short_bonds_wear_as_coulomb_friction(law):
+    """Energy form: the friction work of a law with memory goes to that of Coulomb as its bond length goes to zero."""
+    form = WEAR + 'form = "energy"\n'
+    coulomb = ran(TILTED + COULOMB + SINE + form).measures["worn_volume"].value
+    misses = []
+    for length in ("0.1 um", "1e-6 um"):
+        text = TILTED + f'[friction]\n{law}\nstatic = 0.3\nbond_length = "{length}"\n' + SINE + form
+        misses.append(abs(ran(text).measures["worn_volume"].value / coulomb - 1))
+    assert 1e-4 < misses[0] < 0.05 and misses[1] < 1e-6
+
+
 def test_always_a_rig_under_partial_slip_wears_where_it_slips():
     """Slip paths of a march with shear modes: local, found anew after every jump, less than the holder's everywhere."""
     found = ran(SOFT_RIG + WEAR, **{"accuracy.tolerance": "1e-2"})

@@ -4,17 +4,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pieces import bare_pair, coated_pair
+from pieces import bare, bare_pair, coated_pair, refined_middle
 from scipy.linalg import expm
 
 from patchfem.closed_forms import (
     even_wear_pressure,
+    hertz_half_width,
     worn_crown_half_width,
     worn_pad_fraction,
     worn_volume,
 )
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import PatchfemError
+from patchfem.elasticity.elasticity import assemble, interface_compliance
 from patchfem.wear.depth import critical_jump, explicit_jump, jump, rates, refuse_explicit
 from patchfem.wear.jumps import Wearing, after, start
 
@@ -161,6 +163,24 @@ def test_order_worn_crown_tends_to_the_closed_half_width():
     exact = worn_crown_half_width(1e-13, LOAD / 12.7e-3, PATH * 135723, 0.05)
     width = (state.force > 0).sum() * 12.7e-3 / 400 / 2
     assert exact < width + 12.7e-3 / 400 and width < 1.15 * exact
+
+
+def test_exact_worn_hertz_contact_at_two_paths():
+    """Half-planes under gross slip. Where the worn parabola alone would be 2.207 and 3.891 wide (over Hertz' a0), an
+    independent half-space program found 2.315 and 3.959, and 1.060 and 1.023 of the mean pressure."""
+    width, radius, line, young = 10e-3, 0.05, 1e5, 121e9
+    half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
+    grid = refined_middle(5 * half, half / 10, 40 * half, 20 * half, 1.2)
+    nn, _, _ = interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32))))
+    x, area = grid.x, grid.tributary() * width
+    press, even = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width), np.ones(x.size)
+    for alone, wide, peak in ((2.207, 2.315, 1.060), (3.891, 3.959, 1.023)):
+        path = (alone * half) ** 3 / (1.5 * radius * line)
+        assert worn_crown_half_width(1.0, line, path, radius) == pytest.approx(alone * half)
+        state, _ = evolved(Wearing(press, lambda worn: even, area, 1.0, path), 3e-3)
+        found = np.ptp(x[state.force > 0]) / 2 + half / 20  # an edge lies somewhere in the cell behind its last node
+        assert found / half == pytest.approx(wide, abs=0.05)
+        assert (state.force / area).max() / (line / 2 / found) == pytest.approx(peak, abs=0.03)
 
 
 def test_exact_wear_coefficient_zero_changes_nothing():
