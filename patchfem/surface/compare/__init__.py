@@ -1,4 +1,4 @@
-"""Two traces of a surface before and after: where they lie on each other, what wore off, how much smaller the waves are.
+"""Two traces before and after: where one lies on the other, what wore off, how much smaller the waves are.
 
 In: two `Profile`, or two `Areal` and a direction. Out: a `Comparison`: shift, tilt and scale, worn depth and area where
 unworn valleys or flanks give a common reference, ratios of amplitude and slope, each with its 95 % interval, and what

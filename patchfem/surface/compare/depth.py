@@ -17,7 +17,7 @@ MAX, MEAN, AREA = ("largest worn depth", "mean worn depth over the common length
                    "worn area of the section, that is worn volume per width")
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # noises above the trace before from which a height is a deposit, not noise
-SLIGHT = 0.02  # of the noise: what wear less deep than the noise moves the reference by (test_pairs)
+SLIGHT = 0.01  # of the noise: what wear less deep than the noise moves the reference by (test_pairs)
 DRAWS = 300
 
 

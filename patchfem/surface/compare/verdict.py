@@ -12,8 +12,8 @@ NEAR = 1e-6  # a ratio that close to one is one but for round-off
 def verdicts(parts: list, directions: list = ()) -> tuple:
     """The headline and the sentences of one or two comparisons.
 
-    directions: (when, amplitude ratio x over y, slope ratio) for each time at which both directions are known. Headline:
-    "reduced", "increased" or "no change shown", by the amplitude of the band in each direction; "reduced" is said of
+    directions: (when, amplitude ratio x over y, slope ratio) for each time at which both directions are known. The
+    headline is "reduced", "increased" or "no change shown", by the amplitude of the band in each direction; "reduced" is said of
     unchanged surfaces in 2.5 of 100 cases, as is "increased".
     """
     words = [changed(one.amplitude_ratio) for one in parts]
