@@ -13,6 +13,7 @@ from .quantity import LEVEL
 
 PARTS = 40  # of the trace, in which the track is looked for
 LEAST = 4  # parts of each flank
+DRAWS = 100  # made traces that the track is put into for the intervals
 CLEAR = 1.2  # times the largest step of all made traces without a track
 
 
@@ -45,7 +46,7 @@ def flanks_of(before: Profile, after: Profile) -> Flanks | None:
     that leaves a tenth of the trace on either side. The box counts where it is clearer than in each of 200 traces
     without a track, made with the spectrum of `before`. A line is then fitted to the flanks, which counts what sticks
     out of them (pile-up) little, and the track runs as far as the mean depth of a part lies below the line. Intervals
-    come from the same line and track in the made traces: the roughness that wore away is not known.
+    come from the same search with this track put into the made traces: the roughness that wore away is not known.
     """
     one, other = level(even(before)), even(after)
     step = other.length / (other.x.size - 1)
@@ -58,14 +59,19 @@ def flanks_of(before: Profile, after: Profile) -> Flanks | None:
     own = _steps(_means(other.z), boxes)
     if own.max() <= CLEAR * max((each.max() for each in best), default=0.0) or own.max() <= 1e-12:
         return None
-    low, high = boxes[1][int(np.argmax(own))]
-    edges = np.linspace(0, other.x.size, PARTS + 1).astype(int)
-    beside = np.ones(other.x.size, bool)
-    beside[edges[max(low - 1, 1)]:edges[min(high + 1, PARTS - 1)]] = False
-    line = _line(other.x[beside], other.z[beside])
-    depth = line[0] + line[1] * other.x - other.z
-    start, end = _ends(depth, edges, low, high)
-    return _with_intervals(other, (start, end), line, depth, (made, beside, step))
+    box = boxes[1][int(np.argmax(own))]
+    line, depth, ends = _track(other.x, other.z, box)
+    return _with_intervals(other, (line, depth, ends), box, made)
+
+
+def _track(x, z, box: tuple) -> tuple:
+    """Line of the flanks, depth (n,) [m] below it, and the first and last sample of the track."""
+    edges = np.linspace(0, x.size, PARTS + 1).astype(int)
+    beside = np.ones(x.size, bool)
+    beside[edges[max(box[0] - 1, 1)]:edges[min(box[1] + 1, PARTS - 1)]] = False
+    line = _line(x[beside], z[beside])
+    depth = line[0] + line[1] * x - z
+    return line, depth, _ends(depth, edges, *box)
 
 
 def _made(spectrum, other: Profile, step: float) -> np.ndarray:
@@ -122,20 +128,25 @@ def _ends(depth, edges, low: int, high: int) -> tuple:
     return (int(before[-1]) + 1 if before.size else 0), (int(after[0]) - 1 if after.size else depth.size - 1)
 
 
-def _with_intervals(other: Profile, ends: tuple, line: tuple, depth, rest: tuple) -> Flanks:
-    made, beside, step = rest
-    track = slice(ends[0], ends[1] + 1)
-    area, largest = float(depth[track].sum()) * step, float(depth[track].max())
-    tail = (1 - LEVEL) / 2
-    areas, peaks = np.zeros(1), np.zeros(1)
-    if len(made):
-        x = other.x
-        t = np.column_stack([np.ones(x.size), x - x.mean()])
-        fitted = np.linalg.lstsq(t[beside], made[:, beside].T, rcond=None)[0]
-        off = (t @ fitted).T[:, track] - made[:, track]
-        areas, peaks = off.sum(axis=1) * step, off.max(axis=1)
-    low, high = np.quantile(areas, (tail, 1 - tail))
-    area = (area, max(area - float(high), 0.0), area - float(low))
-    largest = (largest, max(largest - float(np.quantile(peaks, 1 - tail)), 0.0),
-               largest + float(np.quantile(peaks, 1 - tail)))
-    return Flanks(float(other.x[track][0]), float(other.x[track][-1]), line, other.x, depth, area, largest)
+def _with_intervals(other: Profile, found: tuple, box: tuple, made) -> Flanks:
+    """The track with its intervals: the same search in tracks of this shape cut into made traces."""
+    line, depth, ends = found
+    x, step = other.x, other.length / (other.x.size - 1)
+
+    def sizes(depth, ends) -> tuple:
+        part = depth[ends[0]:ends[1] + 1]
+        return float(part.sum()) * step, float(part.max())
+
+    own = sizes(depth, ends)
+    shape = np.zeros(x.size)
+    width = max(x.size // PARTS // 2, 1)
+    smooth = np.convolve(np.pad(depth, (width // 2, width - 1 - width // 2), "edge"), np.full(width, 1 / width),
+                         "valid")
+    shape[ends[0]:ends[1] + 1] = np.maximum(smooth[ends[0]:ends[1] + 1], 0)
+    truth = float(shape.sum()) * step, float(shape.max())
+    tail, bounds = (1 - LEVEL) / 2, []
+    errors = np.array([np.subtract(sizes(*_track(x, z - shape, box)[1:]), truth) for z in made[:DRAWS]])
+    for place, value in enumerate(own):
+        low, high = np.quantile(errors[:, place], (tail, 1 - tail)) if len(errors) else (0.0, 0.0)
+        bounds.append((value, min(max(value - float(high), 0.0), value), max(value - float(low), value)))
+    return Flanks(float(x[ends[0]]), float(x[ends[1]]), line, x, depth, *bounds)

@@ -13,8 +13,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     """The headline and the sentences of one or two comparisons.
 
     directions: (when, amplitude ratio x over y, slope ratio) for each time at which both directions are known. The
-    headline is "reduced", "increased" or "no change shown", by the amplitude of the band in each direction; "reduced" is said of
-    unchanged surfaces in 2.5 of 100 cases, as is "increased".
+    headline is "reduced", "increased" or "no change shown", by the amplitude of the band in each direction. Unchanged
+    surfaces are called "reduced" in 2.5 of 100 cases, and as often "increased".
     """
     words = [changed(one.amplitude_ratio) for one in parts]
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
