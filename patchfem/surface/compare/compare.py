@@ -1,6 +1,6 @@
 """Two traces or two areal scans, before and after: everything that tells them apart, in one frozen record."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .depth import Worn
 from .flanks import Flanks, flanks_of
 from .place import CLEAR, Match, matched
 from .quantity import SIDE, Quantity, around, refused
-from .ratios import Size, at_step, likeness, ratio, size_along, size_of
+from .ratios import at_step, likeness, ratio, size_along, size_of
 from .registration import Registration, register
 
 # Noise of the registration over the root mean square height, and likeness that goes with it: where valleys agree to
@@ -154,12 +154,18 @@ def _scans(before: Areal, after: Areal, direction: str, band: tuple) -> Comparis
                       notes=before.notes + after.notes)
 
 
-def renamed(one: Comparison, direction: str) -> Comparison:
-    """The same comparison under another direction."""
-    return replace(one, direction=direction)
+def directions_of(parts: list) -> list:
+    """Direction x against y, before and after: (when, amplitude ratio, slope ratio) each; nothing for one direction.
 
-
-def anisotropy(along_x: Size, along_y: Size, when: str) -> tuple:
-    """Amplitude and slope of the traces along x over those along y, each a `Quantity`."""
-    return tuple(ratio(part, f"{part} along x over along y, {when}", along_x, along_y) for part in
-                 ("amplitude", "slope"))
+    Traces are read at the coarsest step of all of them, so that slopes compare.
+    """
+    if len(parts) < 2:
+        return []
+    along = {one.direction: one for one in parts}
+    sides = [(along["x"].before, along["y"].before), (along["x"].after, along["y"].after)]
+    sizes = [(one, other) for one, other in zip(along["x"].sizes, along["y"].sizes)]
+    if isinstance(parts[0].before, Profile):
+        step = max(one.length / (one.x.size - 1) for pair in sides for one in map(even, pair))
+        sizes = [tuple(size_of(one, step) for one in pair) for pair in sides]
+    return [(when, *(ratio(part, f"{part} along x over along y, {when}", *pair) for part in ("amplitude", "slope")))
+            for when, pair in zip(("before", "after"), sizes)]
