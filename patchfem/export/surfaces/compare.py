@@ -9,6 +9,7 @@ import numpy as np
 from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
+from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
 from ...surface.compare.quantity import LEVEL, Quantity
 from ...surface.profile import Profile, level
@@ -171,23 +172,27 @@ def figures(one: Comparison) -> list:
         out.append((pictures.difference(flanks.x, flanks.depth, None, None, (flanks.start, flanks.end)),
                     "Depth of the trace after below the line through its flanks.",
                     f"Depth of the wear track: largest {' '.join(shown(one.worn.largest)[::2])}"))
-    curves = [_abbott(each) for each in (one.before, one.after)]
+    about = "each one's own least-squares line or plane" if found is None else "the line of the trace before"
+    curves = [_abbott(each) for each in (one.before, one.after)] if found is None else \
+        [_bearing(z - tilt) for z in (found.first, second)]
     spectra = [each.spectrum for each in one.sizes]
     if all(each.density.any() for each in spectra):
-        out.append((pictures.statistics(curves, spectra, BAND), "Left: Abbott curves about the least-squares line or "
-                    "plane. Right: spectra with the band in which the true density lies with 95 % probability.",
+        out.append((pictures.statistics(curves, spectra, BAND), f"Left: Abbott curves about {about}. Right: "
+                    "spectra with the band in which the true density lies with 95 % probability.",
                     f"Abbott curves and spectra: amplitude ratio {shown(one.amplitude_ratio)[0]}"))
     return out
 
 
 def _abbott(surface) -> tuple:
     if isinstance(surface, Profile):
-        flat = level(even(surface))
-        return abbott(Heights(flat.z, flat.length / (flat.x.size - 1)))
-    from ...surface.areal import level_plane
-
+        return _bearing(level(even(surface)).z)
     known = level_plane(surface).z
-    return abbott(Heights(known[~np.isnan(known)], 1.0))
+    return _bearing(known[~np.isnan(known)])
+
+
+def _bearing(z) -> tuple:
+    """Abbott curve of heights; their order along the surface does not count."""
+    return abbott(Heights(z, 1.0))
 
 
 def _closer(x, worn) -> tuple:
@@ -232,7 +237,8 @@ def _pressing(found: Pressed) -> str:
         for name, words, *measures in found.rows():
             cells = "".join(f"<td class=n>{escape(_said(name, one))}</td>" for one in measures)
             rows += f"<tr><td>{escape(words)}</td>{cells}<td class=n>{_times(*measures)}</td></tr>"
-        parts.append(f"<table><tr><th>measure<th class=n>before<th class=n>after<th class=n>after / before</tr>{rows}</table>")
+        parts.append("<table><tr><th>measure<th class=n>before<th class=n>after<th class=n>after / before</tr>"
+                     f"{rows}</table>")
     parts += [f"<p class=soft>{escape(text)}.</p>" for text in found.lacking]
     return "\n".join(parts)
 
@@ -240,4 +246,4 @@ def _pressing(found: Pressed) -> str:
 def _times(first, second) -> str:
     if any(one is None or one.value is None for one in (first, second)) or not first.value:
         return ""
-    return f"{second.value / first.value:.3g}"
+    return f"{second.value / first.value:#.3g}"

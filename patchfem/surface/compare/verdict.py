@@ -94,7 +94,7 @@ def _worn(one: Comparison, name: str) -> str:
     if not _sure(mean):
         return f"Worn depth{name}: none shown; at most {say(mean.high)} in the mean."
     what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
-    text = f"Worn{name}: {_length(mean)} in the mean {what}, {_length(one.worn.largest)} at most."
+    text = f"Worn{name}: {_length(mean)} in the mean {what}, {_length(one.worn.largest)} at the deepest place."
     if one.worn.deposited > 0.05 * one.worn.area.value:
         text += f" {1e12 * one.worn.deposited:.3g} um^2 stand above the surface before: deposits."
     return text
@@ -109,6 +109,5 @@ def _direction(when: str, amplitude: Quantity, slope: Quantity) -> str:
         shown = "no difference is shown" if word == "no change shown" else \
             f"{'smaller' if word == 'reduced' else 'larger'} along x, at {sure(one)}"
         parts.append(f"{name} along x over along y {_range(one)}: {shown}")
-    whole = "anisotropic" if any(changed(one) in ("reduced", "increased") for one in (amplitude, slope)) \
-        else "no anisotropy shown"
+    whole = "anisotropic" if changed(amplitude) in ("reduced", "increased") else "no anisotropy shown"
     return f"{when[0].upper() + when[1:]}: {whole}; " + "; ".join(parts) + "."
