@@ -82,7 +82,7 @@ def compared(before: Profile | Areal, after: Profile | Areal, direction: str = "
 def same_place(before: Profile, after: Profile) -> tuple:
     """The search for the same place, and the registration where it is the same, else None."""
     match = matched(before, after)
-    if not match.clear > min(clear for _, clear in ENOUGH):
+    if match.repeats or not match.clear > min(clear for _, clear in ENOUGH):
         return match, None
     try:
         found = register(before, after, match.shift)
@@ -109,8 +109,9 @@ def _traces(before: Profile, after: Profile, direction: str, band: tuple) -> Com
             else refused("1", STRETCH, "too few heights are unworn")
         worn, reference = worn_depth.of_registration(found), "place"
     else:
-        why = (f"the traces show no common place: the best likeness of their valleys, {match.likeness:.2f}, is "
-               "reached by chance")
+        why = (f"the surface repeats itself: shifts apart from each other fit alike, {match.likeness:.3f} and "
+               f"{match.second:.3f}") if match.repeats and match.clear > CLEAR else \
+            f"the traces show no common place: chance brings their valleys the likeness of {match.likeness:.2f} too"
         shift, tilt, stretch = (refused(unit, text, why) for unit, text in
                                 (("m", SHIFT), ("rad", TILT), ("1", STRETCH)))
         flanks = flanks_of(before, after)

@@ -13,20 +13,28 @@ OVERLAP = 0.5  # of the shorter trace, at least, lies on the other one
 LONGEST = 0.25  # of the trace: longer waves, tilt among them, do not count in the search
 CHANCE = 100  # made traces
 CLEAR = 5.0  # standard deviations above the made traces: chance reaches it in about one of a thousand pairs
+APART, TWIN = 0.3, 0.9  # of Fisher's z to the second best shift (150 made pairs: 0.64 at least), and that itself
 SEED = 1985
 
 
 class Match(NamedTuple):
     """Where the valleys of two traces agree best.
 
-    shift [m]: a place at x of the one stands at x + shift of the other; likeness: correlation there; chance: mean and
+    shift [m]: a place at x of the one stands at x + shift of the other; likeness: correlation there; second: the best
+    correlation at another shift, beyond the next one without correlation; chance: mean and
     scatter of the best correlation of made traces, as Fisher's z; clear: how many scatters the likeness lies above it.
     """
 
     shift: float
     likeness: float
+    second: float
     chance: tuple
     clear: float
+
+    @property
+    def repeats(self) -> bool:
+        """Whether another shift fits nearly as well, as on a turned surface."""
+        return self.second > TWIN or fisher(self.likeness) - fisher(self.second) < APART
 
 def matched(before: Profile, after: Profile) -> Match:
     """Search the shift at which the valleys of both traces agree best, and how clearly it stands out.
@@ -34,7 +42,7 @@ def matched(before: Profile, after: Profile) -> Match:
     Waves longer than a quarter of the shorter trace are filtered off both and what lies above the median is cut off, as
     wear does. Every shift with half of the shorter trace in common is tried. The same search with `CHANCE` traces that
     have the spectrum of the first one and random phases tells what chance brings; a surface that repeats itself, such
-    as a turned one, gets no clear place this way. PatchfemError for fewer than 16 samples.
+    as a turned one, shows in the second best shift. PatchfemError for fewer than 16 samples.
     """
     one, other = even(before), even(after)
     if min(one.x.size, other.x.size) < 16:
@@ -44,13 +52,18 @@ def matched(before: Profile, after: Profile) -> Match:
     cutoff = LONGEST * min(first.size, second.size)
     first, second = (z - mean_line(z, cutoff, tilted=True) for z in (first, second))
     search = _Search(first.size, _valleys(second))
-    lag, likeness = search.best(_valleys(first))
+    lag, likeness, second = search.best(_valleys(first))
     random = np.random.default_rng(SEED)
     found = np.array([search.best(_valleys(_shuffled(first, random)))[1] for _ in range(CHANCE)])
-    z = np.arctanh(np.minimum(found, 1 - 1e-12))
-    clear = (np.arctanh(min(likeness, 1 - 1e-12)) - z.mean()) / z.std(ddof=1)
-    return Match(float(other.x[0] - one.x[0] + lag * step), float(likeness), (float(z.mean()), float(z.std(ddof=1))),
+    z = fisher(found)
+    clear = (fisher(likeness) - z.mean()) / z.std(ddof=1)
+    return Match(float(other.x[0] - one.x[0] + lag * step), likeness, second, (float(z.mean()), float(z.std(ddof=1))),
                  float(clear))
+
+
+def fisher(likeness):
+    """Fisher's z of a correlation: its scatter does not depend on it."""
+    return np.arctanh(np.clip(likeness, -1 + 1e-12, 1 - 1e-12))
 
 
 def _read(trace: Profile, step: float) -> np.ndarray:
@@ -94,7 +107,7 @@ class _Search:
         return whole[self.lags % self.size]
 
     def best(self, moved) -> tuple:
-        """Lag of the largest correlation, and that."""
+        """Lag of the largest correlation, that, and the largest one beyond the next lags without correlation."""
         from scipy.fft import rfft
 
         own = self._through(moved**2, rfft(np.ones(self.fixed.size), self.size))
@@ -103,4 +116,8 @@ class _Search:
         found = np.zeros(self.lags.size)
         np.divide(self._through(moved, self.transform), np.sqrt(product), out=found, where=worth)
         at = int(np.argmax(found))
-        return int(self.lags[at]), float(np.clip(found[at], -1.0, 1.0))
+        none = np.flatnonzero(found <= 0)
+        low, high = none[none < at], none[none > at]
+        beyond = np.concatenate([found[:low[-1]] if low.size else [], found[high[0]:] if high.size else []])
+        return (int(self.lags[at]), float(np.clip(found[at], -1.0, 1.0)),
+                float(np.clip(beyond.max(initial=-1.0), -1.0, 1.0)))

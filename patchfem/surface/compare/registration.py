@@ -66,7 +66,8 @@ def register(before: Profile, after: Profile, shift: float) -> Registration:
 
     Between its samples the first trace is a cubic spline. The fit starts from the one-sided line over the lowest third
     of the first trace. The noise is 1.4826 times the median of the depths below zero, which no wear makes; heights
-    within 2.5 of it make the next offset, slope and shift, until they stay the same. Slopes come from
+    within 2.5 of it make the next offset, slope and shift, until they stay the same; the first rounds count with the
+    noise of half a step of shift, halved from round to round. Slopes come from
     parabolas as long as the noise wants. A second fit lets the second trace
     be longer or shorter by a factor; where that halves the noise, the heights are compared with the factor taken out.
     PatchfemError where fewer than 12 heights are unworn.
@@ -91,16 +92,16 @@ def register(before: Profile, after: Profile, shift: float) -> Registration:
 
 def _settled(fit, state, used, free: int):
     """State of the fit of the first `free` numbers once its unworn heights stay the same, None where too few are."""
-    for _ in range(ROUNDS):
-        rest = fit.rest(state)[0]
-        now = _unworn(rest, fit.least)[1]
+    for turn in range(ROUNDS):
+        rest, least = fit.rest(state)[0], max(fit.least, fit.blur * 0.5**turn)
+        noise, now = _unworn(rest, least)
         if now.sum() < FEWEST:
             return None
         same = used.size == now.size and bool((used == now).all())
         new, used = fit.improved(state, now, free), now
         small = np.abs(new - state) <= 1e-9 * fit.scales
         state = new
-        if same and small.all():
+        if same and small.all() and (noise > least or least == fit.least):
             break
     return state
 
@@ -178,8 +179,8 @@ class _Fit:
         x = self.x[inside]
         low = np.interp(x - shift, self.one.x, self.flat)
         low = low <= np.quantile(low, LOWEST)
-        blur = float(np.std(gradient[:, 2])) * self.scales[2] / 2  # half a step of shift left open
-        line = one_sided_line(x[low], rest[low], "above", blur)
+        self.blur = float(np.std(gradient[:, 2])) * self.scales[2] / 2  # half a step of shift left open
+        line = one_sided_line(x[low], rest[low], "above", self.blur)
         state[:2] = -line.at(self.centre), -line.slope * self.half
         used = np.zeros(x.size, bool)
         used[np.flatnonzero(low)[line.used]] = True
