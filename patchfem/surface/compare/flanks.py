@@ -123,7 +123,7 @@ def _ends(depth, edges, low: int, high: int) -> tuple:
     width = max((edges[1] - edges[0]) // 2, 1)
     smooth = np.convolve(np.pad(depth, (width // 2, width - 1 - width // 2), "edge"), np.full(width, 1 / width),
                          "valid")
-    out = np.flatnonzero(smooth <= 0)
+    out = np.flatnonzero(smooth <= 1e-9 * smooth.max())  # zero but for round-off
     middle = edges[low] + int(np.argmax(smooth[edges[low]:edges[high]]))
     before, after = out[out < middle], out[out > middle]
     return (int(before[-1]) + 1 if before.size else 0), (int(after[0]) - 1 if after.size else depth.size - 1)

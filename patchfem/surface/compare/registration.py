@@ -116,7 +116,7 @@ def _unworn(rest, least: float) -> tuple:
 
 
 class _Fit:
-    """The two traces and the state (offset, slope, shift, stretch) of one on the other, offset and slope negative."""
+    """The two traces and the state of the second: offset, height of its slope at the end, shift, stretch."""
 
     def __init__(self, one: Profile, after: Profile, shift: float):
         from scipy.interpolate import CubicSpline
@@ -204,10 +204,12 @@ class _Fit:
         inverse = np.linalg.pinv(part.T @ part, rcond=1e-14, hermitian=True)
         spread = float(np.mean(rest[used] ** 2)) / KEPT
         covariance = inverse * max(spread, self.least**2 / 100) * TRIMMED * _together(rest, used)
-        turn = np.array([-1.0, -1 / self.half, 1.0, 1.0])[:free]  # offset and slope of the second, not of rest
+        turn = np.array([1.0, 1 / self.half, 1.0, 1.0])[:free]  # slope [rad] from the height at the end
         x, at = self.x[inside], self.at(state)[inside]
+        slope = float(state[1] / self.half)
+        offset = float(state[0]) + slope * (float(x[0] + x[-1]) / 2 - self.centre)
         return Registration(
-            float(state[2]), float(-state[1] / self.half), float(-state[0]), noise, frozen_array(x),
+            float(state[2]), slope, offset, noise, frozen_array(x),
             frozen_array(self.spline(at)), frozen_array(rest), used, frozen_array(gradient[:, :free] / turn),
             frozen_array(covariance * np.outer(turn, turn)), stretch)
 
