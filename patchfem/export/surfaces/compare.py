@@ -38,7 +38,15 @@ def shown(one: Quantity) -> tuple:
         ladder = {**LADDERS, "m2": (("um^2", 1e12),)}[one.unit]
         unit, scale = step_of(ladder, max(abs(one.low), abs(one.high)))
     digits = _digits(one)
-    return (f"{one.value * scale:.{digits}g}", f"{one.low * scale:.{digits}g} .. {one.high * scale:.{digits}g}", unit)
+    value, low, high = (_written(each * scale, digits) for each in (one.value, one.low, one.high))
+    return value, f"{low} .. {high}", unit
+
+
+def _written(value: float, digits: int) -> str:
+    """A number with so many digits, without a power of ten where it is below a million."""
+    if value == 0 or not 1 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
 
 
 def _digits(one: Quantity) -> int:

@@ -20,8 +20,10 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
     same = len(set(words)) == 1
     headline = words[0] if same else ", ".join(word + name for word, name in zip(words, names))
-    if headline == "no change shown" and any(_sure(one.worn.mean) for one in parts):
-        headline = "worn, no change of the waves shown"
+    if headline == "no change shown":
+        told = ["worn"] * any(_sure(one.worn.mean) for one in parts)
+        told += ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
+        headline = " and ".join(told) + ", no change of the waves shown" if told else headline
     out = []
     for one, word, name in zip(parts, words, names):
         out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), _worn(one, name)]
