@@ -15,12 +15,12 @@ from patchfem.surface.synthetic import report_area
 
 
 def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most():
-    sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in range(70000, 70100)]
+    sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in range(70000, 70040)]
     found = [ratio("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
     words = [changed(one) for one in found]
-    assert words.count("reduced") <= 10 and words.count("increased") <= 10  # of 200; 5 % and less
+    assert words.count("reduced") <= 4 and words.count("increased") <= 4  # of 80; 5 % and less
     values = np.quantile([one.value for one in found], (0.05, 0.95))
-    assert values == pytest.approx((0.64, 1.57), rel=0.1)  # measured on the report's surface, 1 mm
+    assert values == pytest.approx((0.64, 1.57), rel=0.15)  # measured on the report's surface, 1 mm
 
 
 def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_cases_at_most():
