@@ -11,13 +11,13 @@ from ..roughness.parameters import Heights
 from ..roughness.spectrum import spectrum_of
 from .flanks import Flanks
 from .quantity import LEVEL, Quantity, around, refused
-from .registration import Registration
+from .registration import REACH, Registration
 
 MAX, MEAN, AREA = ("largest worn depth", "mean worn depth over the common length",
                    "worn area of the section, that is worn volume per width")
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # noises above the trace before from which a height is a deposit, not noise
-SLIGHT = 0.01  # of the noise: what wear less deep than the noise moves the reference by (test_pairs)
+SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
 DRAWS = 300
 
 
@@ -35,9 +35,11 @@ def of_registration(found: Registration) -> Worn:
     """Worn depth over the common part of two registered traces.
 
     All depths are added up, so that noise of both signs cancels on the unworn heights, but not what stands more than 4
-    noises above the first trace: that is deposited. The interval of the sums has the noise of the worn heights and the
-    uncertainty of shift, tilt and offset. The largest of noisy depths is too large: the mean excess of `DRAWS` draws
-    with the noise added once more is taken off; its interval has the noise of a single height.
+    noises above the first trace: that is deposited. The interval of the sums has the noise of the worn heights, the
+    uncertainty of shift, tilt and offset with what the deeper half of the unworn heights doubts of them, and the wear
+    that hides in the noise: as many heights as are worn by 2.5 to 5 noises, by half a noise each. The largest of noisy
+    depths is too large: the mean excess of `DRAWS` draws with the noise added once more is taken off; its interval has
+    the noise of a single height.
     """
     width = _widths(found.x)
     length, rest = float(width.sum()), found.rest
@@ -48,8 +50,10 @@ def of_registration(found: Registration) -> Worn:
     pull = (weight[far] @ found.gradient[far])
     off = np.abs(rest[far])
     scatter = np.where(off < DEPOSIT * found.noise, np.maximum(off, found.noise), found.noise)  # or the tail of noise
-    error = float(np.sqrt(pull @ found.covariance @ pull + ((width[far] * scatter) ** 2).sum()))
-    error = float(np.hypot(error, SLIGHT * found.noise * length))
+    moved = max(float(weight @ found.gradient @ found.doubt) ** 2 - 4 * float(pull @ found.covariance @ pull), 0.0)
+    error = float(np.sqrt(pull @ found.covariance @ pull + moved + ((width[far] * scatter) ** 2).sum()))
+    slight = ((rest > REACH * found.noise) & (rest < 2 * REACH * found.noise)).sum() / found.used.sum()
+    error = float(np.hypot(error, SLIGHT * slight * found.noise * length))
     error = max(error, 0.1 * found.noise * float(np.sqrt((width**2).sum())))  # digits, where no height is worn
     area = area if abs(area) > 1e-6 * found.noise * length else 0.0
     return Worn(_largest(found), around(area / length, error / length, "m", MEAN, 0.0),
@@ -69,7 +73,7 @@ def _largest(found: Registration) -> Quantity:
     drawn = rest[near] + noise * np.random.default_rng(0).standard_normal((DRAWS, near.size))
     excess = float(drawn.max(axis=1).mean()) - top
     at = found.gradient[int(np.argmax(rest))]
-    error = float(np.sqrt(noise**2 + at @ found.covariance @ at))
+    error = float(np.hypot(noise, found.error(at)))
     if top <= 4.5 * noise:  # the largest of the noise of the whole trace
         return Quantity(0.0, 0.0, max(top, 0.0) + noise, "m", MAX)
     return around(top - excess, error, "m", MAX, 0.0)

@@ -35,7 +35,9 @@ class Registration:
     second that lie on the first; first (n,) [m]: the first trace there; rest (n,) [m]: depth of the second below the
     first, moved by slope and offset: worn depth plus noise; used (n,): the unworn heights of the fit; gradient (n, 3)
     of rest by offset, slope and shift, (n, 4) where the stretch was fitted too; covariance of these; stretch: length of
-    the second over that of the first, less one, its standard deviation, and whether it was taken out of rest.
+    the second over that of the first, less one, its standard deviation, and whether it was taken out of rest; doubt:
+    change of offset, slope and shift where the deeper half of the unworn heights alone makes the fit, as slight wear of
+    the higher half would bring it about.
     """
 
     shift: float
@@ -49,11 +51,17 @@ class Registration:
     gradient: np.ndarray
     covariance: np.ndarray
     stretch: tuple
+    doubt: np.ndarray
 
     @property
     def errors(self) -> tuple:
-        """Standard deviations of offset [m], slope [rad] and shift [m]."""
-        return tuple(float(one) for one in np.sqrt(np.diag(self.covariance)[:3]))
+        """Standard deviations of offset [m], slope [rad] and shift [m], with what the deeper half doubts."""
+        return tuple(self.error(row) for row in np.eye(self.doubt.size)[:3])
+
+    def error(self, pull: np.ndarray) -> float:
+        """Standard deviation of pull @ (offset, slope, shift): that of the noise, and a doubt beyond twice as much."""
+        noise = float(pull @ self.covariance @ pull)
+        return float(np.sqrt(noise + max((pull @ self.doubt) ** 2 - 4 * noise, 0.0)))
 
     @property
     def middle(self) -> float:
@@ -208,10 +216,14 @@ class _Fit:
         x, at = self.x[inside], self.at(state)[inside]
         slope = float(state[1] / self.half)
         offset = float(state[0]) + slope * (float(x[0] + x[-1]) / 2 - self.centre)
+        first = self.spline(at)
+        height = first - np.polyval(np.polyfit(x, first, 1), x)
+        deep = used & (height <= np.median(height[used]))
+        doubt = np.linalg.lstsq(gradient[deep, :free], -rest[deep], rcond=1e-10)[0]
         return Registration(
             float(state[2]), slope, offset, noise, frozen_array(x),
-            frozen_array(self.spline(at)), frozen_array(rest), used, frozen_array(gradient[:, :free] / turn),
-            frozen_array(covariance * np.outer(turn, turn)), stretch)
+            frozen_array(first), frozen_array(rest), used, frozen_array(gradient[:, :free] / turn),
+            frozen_array(covariance * np.outer(turn, turn)), stretch, frozen_array(doubt * turn))
 
 
 def _together(rest, used) -> float:

@@ -13,8 +13,10 @@ from patchfem.surface.compare.place import matched
 from patchfem.surface.compare.registration import register
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
+from patchfem.surface.synthetic import report_area
+from patchfem.wear.asperities import rub
 
-HELD_OUT = 30000
+HELD_OUT = 80000
 
 
 def scored(seed: int) -> tuple:
@@ -97,6 +99,24 @@ def test_always_unworn_traces_of_one_place_show_no_wear():
         found = compared(p.before, p.after)
         assert found.reference == "place"
         assert found.worn.mean.value < 0.004 * UM and found.worn.largest.value < 0.15 * UM
+
+
+def test_always_surfaces_that_wear_each_other_have_their_depth_or_none():
+    """Wear by 3 um leaves valleys that both traces share; by 6 um hardly any, and no depth may be claimed. The wear
+    runs out slowly between worn and unworn heights here, and only about half of the intervals hold the truth."""
+    step, count = 2 * UM, 512
+    pieces = [report_area((count, count), step, seed)[2] for seed in (0, 1)]
+    x, random = np.arange(count) * step, np.random.default_rng(1)
+    for worn, registered in ((3 * UM, True), (6 * UM, False)):
+        lower = rub(*pieces, step, 3 * step, 2 * worn, bite=0.05 * UM).lower
+        errors = []
+        for k in range(0, count, 64):
+            noise = 0.02 * UM * random.standard_normal((2, count))
+            found = compared(Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
+                             Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"))
+            if found.reference == "place":
+                errors.append(found.worn.mean.value - float((pieces[0][k] - lower[k]).mean()))
+        assert (len(errors) >= 6 and max(map(abs, errors)) < 0.02 * UM) if registered else not errors
 
 
 def test_always_a_turned_surface_has_no_place():
