@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Out, Quiet, Refused, Sets, model_of, say
+from .shared import Json, Out, Quiet, Refused, Sets, model_of, say, scene_of
 
 
 def compare(before: Path, after: Path, /, *other: Path, direction: str = "", units: str = "",
@@ -65,6 +65,8 @@ def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
 
     if not isinstance(part.before, Profile):
         raise Refused("compare --scene: a scene presses traces; write one row of each scan to a file")
+    if scene_of(scene, sets).contact is None:
+        raise Refused(f"compare --scene {scene}: no [contact] in it; a surface is pressed into a patch")
     models = []
     for name, trace in zip(("before", "after"), surfaces(part)):
         path = write_trace(target / f"{name}.csv", trace).resolve()

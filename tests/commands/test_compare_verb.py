@@ -118,6 +118,13 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
     assert found["verdict"] == "no change shown" and "one row" in found["worn_depth_max"]["reason"]
 
 
+def test_refuses_a_scene_without_a_patch(files, tmp_path):
+    (tmp_path / "point.toml").write_text('[normal]\nload = "10 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\n'
+                                         'kind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n')
+    answer = cli("compare", *files[:2], "--scene", tmp_path / "point.toml", "-o", tmp_path / "out")
+    assert answer.code == 2 and "no [contact] in it" in answer.err
+
+
 @pytest.mark.parametrize("words, says", [
     (("--direction", "z"), "compare --direction z: x or y is wanted"),
     (("third.csv",), "compare: 3 files; two are wanted, or four"),
