@@ -10,6 +10,7 @@ import sys  # noqa: E402
 from cyclopts import App, CycloptsError  # noqa: E402
 
 from . import __version__  # noqa: E402
+from .commands.compare import compare  # noqa: E402
 from .commands.look import export, view  # noqa: E402
 from .commands.profile import profile  # noqa: E402
 from .commands.run import run  # noqa: E402
@@ -19,8 +20,8 @@ from .commands.study import cost, fit  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-VERBS = (check, plan, run, profile, cost, fit, mesh, export, view)
-NOT_BUILT = ("sweep", "compare", "report", "import", "demo", "new",
+VERBS = (check, plan, run, profile, compare, cost, fit, mesh, export, view)
+NOT_BUILT = ("sweep", "report", "import", "demo", "new",
              "schema", "doctor", "cite")
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,

@@ -1,0 +1,93 @@
+"""A scene pressed with the surface before and with the surface after: its measures side by side with their errors."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import Measure, NotConverged, PatchfemError
+from ..model.model import Model
+from ..runs.plan import plan
+from ..runs.run import run
+
+SHOWN = {  # measure: (in words, what a scene needs for it)
+    "pressure_peak": ("largest pressure", "[contact]"),
+    "contact_fraction": ("share of the length in contact", "[contact]"),
+    "normal_stiffness": ("normal stiffness K_n", "[contact]"),
+    "tangential_stiffness": ("tangential stiffness K_t", "[contact.shear] or [contact.asperities]"),
+    "onset_level": ("onset of slip", '[structure] and [drive] with waveform = "levels"'),
+    "loop_area": ("energy of the friction loop per cycle", "[friction] with [slide], or with [structure] and [drive]"),
+}
+
+
+class Side(NamedTuple):
+    """One run: its measures by name, outcome, sentence, nodes x (n,) [m], normal stress there (n,) [Pa], warnings."""
+
+    measures: dict
+    outcome: str
+    sentence: str
+    x: np.ndarray
+    stress: np.ndarray
+    warnings: list
+
+
+class Pressed(NamedTuple):
+    """A scene pressed with both surfaces.
+
+    title: of the scene; before, after: `Side`, None where that run failed; failed: sentences of what failed; lacking:
+    sentences of what this scene cannot tell.
+    """
+
+    title: str
+    before: Side | None
+    after: Side | None
+    failed: tuple
+    lacking: tuple
+
+    def rows(self) -> list:
+        """(name, words, measure before, measure after) of what at least one run has; a measure may be None."""
+        sides = [one.measures if one is not None else {} for one in (self.before, self.after)]
+        return [(name, words, *(side.get(name) for side in sides)) for name, (words, _) in SHOWN.items()
+                if any(_there(side.get(name)) for side in sides)]
+
+
+def _there(measure: Measure | None) -> bool:
+    return measure is not None and measure.value is not None
+
+
+def pressed(before: Model, after: Model, title: str, say: Callable | None = None) -> Pressed:
+    """Run a model with the surface before in its gap and one with the surface after, all else alike.
+
+    A run that is refused or does not converge is told in `failed`; the other one is still there.
+    """
+    sides, failed = [], []
+    for name, model in (("before", before), ("after", after)):
+        try:
+            sides.append(_side(model, say))
+        except (PatchfemError, NotConverged) as error:
+            sides.append(None)
+            failed.append(f"the surface {name}: {error}")
+    known = {name for one in sides if one is not None for name, m in one.measures.items() if _there(m)}
+    lacking = tuple(f"{words}: the scene tells none; it wants {need}" for name, (words, need) in SHOWN.items()
+                    if name not in known) if any(sides) else ()
+    return Pressed(title, *sides, tuple(failed), lacking)
+
+
+def _side(model: Model, say) -> Side:
+    result = run(plan(model), say)
+    outcome = result.outcome
+    return Side(dict(result.measures), str(outcome), outcome.sentence, np.array(result.patch.x),
+                np.array(result.fields["normal_stress"][0]), list(result.warnings))
+
+
+def data_of(found: Pressed) -> dict:
+    """The runs as plain data in SI."""
+    def side(one: Measure | None):
+        return None if one is None else {"value": one.value, "error": one.error, "unit": one.unit}
+
+    out = {name: {"before": side(first), "after": side(second)} for name, _, first, second in found.rows()}
+    return {"scene": found.title, "measures": out, "failed": list(found.failed), "lacking": list(found.lacking),
+            "outcome": {name: None if one is None else one.outcome for name, one in
+                        (("before", found.before), ("after", found.after))},
+            "warnings": [f"{name}: {text}" for name, one in (("before", found.before), ("after", found.after))
+                         if one is not None for text in one.warnings]}

@@ -1,0 +1,74 @@
+"""The verb that sets two measured surfaces side by side, before and after."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .shared import Json, Out, Quiet, Refused, Sets, model_of, say, scene_of
+
+
+def compare(before: Path, after: Path, /, *other: Path, direction: str = "", units: str = "",
+            scene: Annotated[Path | None, Parameter(name="--scene")] = None, set_: Sets = (), out: Out = None,
+            json_: Json = False, quiet: Quiet = False):
+    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page in -o DIR.
+
+    --direction x or y says along what the traces run; two more files are the pair of the other direction, and an areal
+    scan has both. --scene SCENE presses the patch of a scene with each surface. --units "mm,um" names the units of x
+    and z where the files name none.
+    """
+    if direction not in ("", "x", "y"):
+        raise Refused(f"compare --direction {direction}: x or y is wanted")
+    if len(other) not in (0, 2):
+        raise Refused(f"compare: {2 + len(other)} files; two are wanted, or four: before and after along one direction,"
+                      " then before and after along the other")
+    from ..surface.areal import Areal
+    from ..surface.compare.compare import compared, directions_of
+    from ..surface.compare.verdict import verdicts
+    from ..surface.files.read import read_surface
+
+    named = tuple(word.strip() for word in units.split(",")) if units else None
+    files = [read_surface(path, named) for path in (before, after, *other)]
+    areal = [isinstance(one, Areal) for one in files]
+    if len(set(areal)) > 1 or (areal[0] and other):
+        raise Refused("compare: two or four traces are wanted, or two areal scans")
+    first = direction or ("x" if other or areal[0] else "")
+    pairs = [(files[0], files[1], first)]
+    if other or areal[0]:
+        pairs.append((*files[-2:], "y" if first == "x" else "x"))
+    parts = [compared(*one) for one in pairs]
+    directions = directions_of(parts)
+    found = verdicts(parts, directions)
+    target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"
+    target.mkdir(parents=True, exist_ok=True)
+    from ..export.surfaces import compare as paper
+
+    pressing = _pressed(scene, set_, parts[0], target, quiet) if scene is not None else None
+    data = paper.data_of(parts, found, directions, pressing)
+    paper.write_data(target / "compare.json", data)
+    paper.write_page(target / "report.html", parts, found, pressing)
+    for text in data["notes"]:
+        say(f"note: {text}")
+    if json_:
+        print(json.dumps(data, ensure_ascii=False, allow_nan=False))
+    else:
+        print("\n".join(paper.lines_of(parts, found, pressing)))
+        print(f"results: {target}")
+
+
+def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
+    """The scene with each surface as its profile; the traces are written beside the page."""
+    from ..campaigns.compare import pressed
+    from ..export.surfaces.compare import surfaces, write_trace
+    from ..surface.profile import Profile
+
+    if not isinstance(part.before, Profile):
+        raise Refused("compare --scene: a scene presses traces; write one row of each scan to a file")
+    if scene_of(scene, sets).contact is None:
+        raise Refused(f"compare --scene {scene}: no [contact] in it; a surface is pressed into a patch")
+    models = []
+    for name, trace in zip(("before", "after"), surfaces(part)):
+        path = write_trace(target / f"{name}.csv", trace).resolve()
+        models.append(model_of(scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")))
+    return pressed(*models, scene.name, None if quiet else say)

@@ -1,0 +1,257 @@
+"""Before and after on paper: lines of text, plain data, traces that a scene can press, a page that stands alone."""
+
+import json
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from ... import __version__
+from ...campaigns.compare import Pressed
+from ...campaigns.compare import data_of as pressed_data
+from ...surface.areal import level_plane
+from ...surface.compare.compare import Comparison
+from ...surface.compare.quantity import LEVEL, Quantity
+from ...surface.profile import Profile, level
+from ...surface.roughness.bearing import abbott
+from ...surface.roughness.filter import even
+from ...surface.roughness.parameters import Heights
+from ...surface.roughness.spectrum import BAND
+from ..drawing.pictures import LADDERS, step_of
+from ..report import CSS, pair, placed
+from . import compare_pictures as pictures
+
+WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",
+         "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
+         "slope_ratio": "slope ratio", "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
+NOTE = ("Interval: 95 %. Shift, depth and area: of this place, from the noise of the unworn heights. Ratios: of the "
+        "surface, as far as one trace before and one after can tell, for Gaussian heights that are alike everywhere; "
+        "traces of one place vary together, so theirs are narrower.")
+
+
+def shown(one: Quantity) -> tuple:
+    """Value, interval and unit as texts, in the unit that suits the largest of them."""
+    if one.value is None:
+        return "-", "", ""
+    unit, scale = ("", 1.0)
+    if one.unit != "1":
+        ladder = {**LADDERS, "m2": (("um^2", 1e12),)}[one.unit]
+        unit, scale = step_of(ladder, max(abs(one.low), abs(one.high)))
+    digits = _digits(one)
+    value, low, high = (_written(each * scale, digits) for each in (one.value, one.low, one.high))
+    return value, f"{low} .. {high}", unit
+
+
+def _written(value: float, digits: int) -> str:
+    """A number with so many digits, without a power of ten where it is below a million."""
+    if value == 0 or not 1 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
+
+
+def _digits(one: Quantity) -> int:
+    """Digits that show the interval with two of its own."""
+    width, size = one.high - one.low, max(abs(one.low), abs(one.high))
+    return int(np.clip(np.ceil(np.log10(size / width)) + 2, 3, 6)) if width > 0 and size > 0 else 4
+
+
+def lines_of(parts: list, found: tuple, pressing: Pressed | None = None) -> list:
+    """The answer as lines: the verdict, what proves it, a table for each direction, the scene before and after."""
+    headline, sentences = found
+    out = [f"{headline}", *(f"  {text}" for text in sentences), ""]
+    for one in parts:
+        name = f", along {one.direction}" if one.direction else ""
+        out.append(f"{one.before.source} -> {one.after.source}{name}")
+        out.append(f"  {'':<38} {'value':>10}  {'95 %':<22} unit")
+        for key, quantity in one.values.items():
+            value, interval, unit = shown(quantity)
+            out.append(f"  {WORDS[key]:<38} {value:>10}  {interval:<22} {unit:<5}".rstrip())
+    if pressing is not None:
+        out += ["", f"{pressing.title}, pressed with each surface"]
+        out.append(f"  {'':<38} {'before':>24} {'after':>24}")
+        for name, words, *sides in pressing.rows():
+            out.append(f"  {words:<38} " + " ".join(f"{_said(name, one):>24}" for one in sides))
+        out += [f"  {text}" for text in (*pressing.failed, *pressing.lacking)]
+    return out
+
+
+def _said(name: str, one) -> str:
+    if one is None or one.value is None:
+        return "-"
+    return pair(name, {"value": one.value, "error": one.error, "unit": one.unit})
+
+
+def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | None = None) -> dict:
+    """The answer as plain data in SI; the first direction stands at the top."""
+    def part(one: Comparison) -> dict:
+        return {"before": one.before.source, "after": one.after.source, "direction": one.direction or None,
+                "reference": one.reference or None, **{name: _plain(each) for name, each in one.values.items()}}
+
+    out = {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
+           "band": list(BAND), **part(parts[0]), "notes": [text for one in parts for text in one.notes]}
+    if len(parts) > 1:
+        out["directions"] = {one.direction: part(one) for one in parts}
+        out["anisotropy"] = {when: {"amplitude_ratio": _plain(amplitude), "slope_ratio": _plain(slope)}
+                             for when, amplitude, slope in directions}
+    if pressing is not None:
+        out["pressed"] = pressed_data(pressing)
+    return out
+
+
+def _plain(one: Quantity) -> dict:
+    out = {"value": one.value, "low": one.low, "high": one.high, "unit": one.unit}
+    return {**out, "reason": one.reason} if one.value is None else out
+
+
+def surfaces(one: Comparison) -> tuple:
+    """The traces (before, after) [Profile] that a scene presses: the common part where there is one, else each whole.
+
+    x counts from the middle, heights are levelled by least squares; the scene levels them in the same way.
+    """
+    found = one.registration
+    if found is not None:
+        pairs = [Profile(found.x, z, each.source) for z, each in
+                 ((found.first, one.before), (found.first - found.rest, one.after))]
+    else:
+        pairs = [one.before, one.after]
+    return tuple(level(even(each)) for each in pairs)
+
+
+def write_trace(path: Path, trace: Profile) -> Path:
+    """Write a trace as text that a scene reads with heights = "surface"."""
+    middle = (trace.x[0] + trace.x[-1]) / 2
+    rows = "\n".join(f"{x:.6f},{z:.6f}" for x, z in zip((trace.x - middle) * 1e6, trace.z * 1e6))
+    path.write_text(f"x [um],z [um]\n{rows}\n", encoding="utf-8")
+    return path
+
+
+def write_data(path: Path, data: dict) -> None:
+    """Write the answer as JSON."""
+    path.write_text(json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def write_page(path: Path, parts: list, found: tuple, pressing: Pressed | None = None) -> None:
+    """Write the page."""
+    path.write_text(page(parts, found, pressing), encoding="utf-8")
+
+
+def page(parts: list, found: tuple, pressing: Pressed | None = None) -> str:
+    """The page of a comparison, the verdict first, nothing fetched."""
+    headline, sentences = found
+    names = [Path(each.source).name for each in (parts[0].before, parts[0].after)]
+    title = f"{names[0]} and {names[1]}: before and after"
+    body = [f"<h1>{escape(title)}</h1><p class=soft>patchfem {escape(__version__)}</p>",
+            f"<div class=verdict><b>{escape(headline[0].upper() + headline[1:])}.</b>"
+            + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"]
+    told = [text for one in parts for text in one.notes]
+    if told:
+        body.append("<div class='verdict warn'>" + "".join(f"<p>{escape(text)}.</p>" for text in told) + "</div>")
+    for number, one in enumerate(parts):
+        if len(parts) > 1:
+            body.append(f"<h2>Along {escape(one.direction)}</h2>")
+        body += [_figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))]
+        body.append(_table(one))
+    body.append(f"<p class=soft>{escape(NOTE)}</p>")
+    if pressing is not None:
+        body.append(_pressing(pressing))
+    text = "\n".join(body)
+    return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width'>"
+            f"<title>{escape(title)}</title><style>{CSS}</style></head><body>{text}</body></html>\n")
+
+
+def figures(one: Comparison) -> list:
+    """Pictures [(svg, caption, alternative text)] of a comparison."""
+    out, found, flanks = [], one.registration, one.flanks
+    if found is not None:
+        second = found.first - found.rest
+        tilt = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
+        worn = np.where(found.rest > 3 * found.noise, found.rest, 0.0)
+        out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
+                    "The trace after, moved by shift, tilt and offset, on the trace before.",
+                    f"Both traces over each other: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
+        out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
+                    "Depth of the trace after below the trace before; blue: the unworn heights that shift, tilt and "
+                    "offset were fitted to.",
+                    f"Worn depth along the trace: largest {' '.join(shown(one.worn.largest)[::2])}"))
+    elif isinstance(one.before, Profile):
+        out.append((pictures.apart(one.before, one.after), "Both traces, each about its least-squares line. They show "
+                    "no common place.", "Traces before and after, one above the other"))
+    if flanks is not None:
+        out.append((pictures.difference(flanks.x, flanks.depth, None, None, (flanks.start, flanks.end)),
+                    "Depth of the trace after below the line through its flanks.",
+                    f"Depth of the wear track: largest {' '.join(shown(one.worn.largest)[::2])}"))
+    about = "each one's own least-squares line or plane" if found is None else "the line of the trace before"
+    curves = [_abbott(each) for each in (one.before, one.after)] if found is None else \
+        [_bearing(z - tilt) for z in (found.first, second)]
+    spectra = [each.spectrum for each in one.sizes]
+    if all(each.density.any() for each in spectra):
+        out.append((pictures.statistics(curves, spectra, BAND), f"Left: Abbott curves about {about}. Right: "
+                    "spectra with the band in which the true density lies with 95 % probability.",
+                    f"Abbott curves and spectra: amplitude ratio {shown(one.amplitude_ratio)[0]}"))
+    return out
+
+
+def _abbott(surface) -> tuple:
+    if isinstance(surface, Profile):
+        return _bearing(level(even(surface)).z)
+    known = level_plane(surface).z
+    return _bearing(known[~np.isnan(known)])
+
+
+def _bearing(z) -> tuple:
+    """Abbott curve of heights; their order along the surface does not count."""
+    return abbott(Heights(z, 1.0))
+
+
+def _closer(x, worn) -> tuple:
+    """Part [m] of the traces around the largest wear, a sixth of them or `FINE` samples."""
+    half = max((x[-1] - x[0]) / 12, pictures.FINE / 4 * (x[1] - x[0]))
+    half = min(half, (x[-1] - x[0]) / 2)
+    at = float(np.clip(x[int(np.argmax(worn))], x[0] + half, x[-1] - half))
+    return at - half, at + half
+
+
+def _figure(number: str, svg: str, caption: str, alternative: str) -> str:
+    svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
+    return placed(number, svg, caption)
+
+
+def _table(one: Comparison) -> str:
+    rows = []
+    for key, quantity in one.values.items():
+        value, interval, unit = shown(quantity)
+        cells = f"<td class=n>{escape(value)}</td><td class=n>{escape(interval)}</td><td>{escape(unit)}</td>" \
+            if quantity.value is not None else "<td class=n>&ndash;</td><td></td><td></td>"
+        text = quantity.text if quantity.value is not None else f"{quantity.text}: not available"
+        rows.append(f"<tr><td>{escape(WORDS[key])}</td>{cells}<td class=soft>{escape(text)}</td></tr>")
+    return ("<table><tr><th>quantity<th class=n>value<th class=n>95 %<th>unit<th>meaning</tr>"
+            f"{''.join(rows)}</table>")
+
+
+def _pressing(found: Pressed) -> str:
+    parts = [f"<h2>{escape(found.title)}, pressed with each surface</h2>"]
+    told = [*found.failed, *(f"{name}: {text}" for name, one in (("before", found.before), ("after", found.after))
+                             if one is not None for text in one.warnings)]
+    if told:
+        parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(text)}</p>" for text in told) + "</div>")
+    sides = [(one.x, one.stress, name) for name, one in (("before", found.before), ("after", found.after))
+             if one is not None]
+    if sides:
+        peaks = ", ".join(f"{name} {_said('pressure_peak', one.measures.get('pressure_peak'))}" for name, one in
+                          (("before", found.before), ("after", found.after)) if one is not None)
+        parts.append(_figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all else in the "
+                             "scene is the same.", f"Pressure along the patch, largest: {peaks}"))
+        rows = ""
+        for name, words, *measures in found.rows():
+            cells = "".join(f"<td class=n>{escape(_said(name, one))}</td>" for one in measures)
+            rows += f"<tr><td>{escape(words)}</td>{cells}<td class=n>{_times(*measures)}</td></tr>"
+        parts.append("<table><tr><th>measure<th class=n>before<th class=n>after<th class=n>after / before</tr>"
+                     f"{rows}</table>")
+    parts += [f"<p class=soft>{escape(text)}.</p>" for text in found.lacking]
+    return "\n".join(parts)
+
+
+def _times(first, second) -> str:
+    if any(one is None or one.value is None for one in (first, second)) or not first.value:
+        return ""
+    return f"{second.value / first.value:#.3g}"

@@ -1,0 +1,115 @@
+"""Worn depth of a trace: from its registration on the first one, from unworn flanks, or a guess from valley tails."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..profile import Profile, level
+from ..roughness.filter import even
+from ..roughness.intervals import made_traces
+from ..roughness.parameters import Heights
+from ..roughness.spectrum import spectrum_of
+from .flanks import Flanks
+from .quantity import LEVEL, Quantity, around, refused
+from .registration import REACH, Registration
+
+MAX, MEAN, AREA = ("largest worn depth", "mean worn depth over the common length",
+                   "worn area of the section, that is worn volume per width")
+TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
+DEPOSIT = 4.0  # noises above the trace before from which a height is a deposit, not noise
+SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
+DRAWS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Worn:
+    """Worn depth of a trace: three `Quantity`, and the area [m2] that stands above the first trace (deposits)."""
+
+    largest: Quantity
+    mean: Quantity
+    area: Quantity
+    deposited: float = 0.0
+
+
+def of_registration(found: Registration) -> Worn:
+    """Worn depth over the common part of two registered traces.
+
+    All depths are added up, so that noise of both signs cancels on the unworn heights, but not what stands more than 4
+    noises above the first trace: that is deposited. The interval of the sums has the noise of the worn heights, the
+    uncertainty of shift, tilt and offset with what the deeper half of the unworn heights doubts of them, and the wear
+    that hides in the noise: as many heights as are worn by 2.5 to 5 noises, by half a noise each. The largest of noisy
+    depths is too large: the mean excess of `DRAWS` draws with the noise added once more is taken off; its interval has
+    the noise of a single height.
+    """
+    width = _widths(found.x)
+    length, rest = float(width.sum()), found.rest
+    deposit = rest < -DEPOSIT * found.noise
+    weight = np.where(deposit, 0.0, width)
+    area = float(weight @ rest)
+    far = ~found.used & ~deposit
+    pull = (weight[far] @ found.gradient[far])
+    off = np.abs(rest[far])
+    scatter = np.where(off < DEPOSIT * found.noise, np.maximum(off, found.noise), found.noise)  # or the tail of noise
+    moved = max(float(weight @ found.gradient @ found.doubt) ** 2 - 4 * float(pull @ found.covariance @ pull), 0.0)
+    error = float(np.sqrt(pull @ found.covariance @ pull + moved + ((width[far] * scatter) ** 2).sum()))
+    slight = ((rest > REACH * found.noise) & (rest < 2 * REACH * found.noise)).sum() / found.used.sum()
+    error = float(np.hypot(error, SLIGHT * slight * found.noise * length))
+    error = max(error, 0.1 * found.noise * float(np.sqrt((width**2).sum())))  # digits, where no height is worn
+    area = area if abs(area) > 1e-6 * found.noise * length else 0.0
+    return Worn(_largest(found), around(area / length, error / length, "m", MEAN, 0.0),
+                around(area, error, "m2", AREA, 0.0), float(-(width[deposit] @ rest[deposit])))
+
+
+def _widths(x) -> np.ndarray:
+    """Share of the length that each sample stands for [m]."""
+    edges = np.concatenate([[1.5 * x[0] - x[1] / 2], (x[1:] + x[:-1]) / 2, [1.5 * x[-1] - x[-2] / 2]])
+    return np.diff(edges)
+
+
+def _largest(found: Registration) -> Quantity:
+    rest, noise = found.rest, found.noise
+    top = float(rest.max())
+    near = np.flatnonzero(rest > top - 8 * noise)
+    drawn = rest[near] + noise * np.random.default_rng(0).standard_normal((DRAWS, near.size))
+    excess = float(drawn.max(axis=1).mean()) - top
+    at = found.gradient[int(np.argmax(rest))]
+    error = float(np.hypot(noise, found.error(at)))
+    if top <= 4.5 * noise:  # the largest of the noise of the whole trace
+        return Quantity(0.0, 0.0, max(top, 0.0) + noise, "m", MAX)
+    return around(top - excess, error, "m", MAX, 0.0)
+
+
+def of_flanks(found: Flanks) -> Worn:
+    """Worn depth below the unworn flanks of a trace, over the width of the track."""
+    mean = "mean worn depth over the track"
+    return Worn(Quantity(*found.largest, "m", MAX), Quantity(*(one / found.width for one in found.area), "m", mean),
+                Quantity(*found.area, "m2", AREA))
+
+
+def nowhere(reason: str) -> Worn:
+    """No worn depth, and why."""
+    return Worn(refused("m", MAX, reason), refused("m", MEAN, reason), refused("m2", AREA, reason))
+
+
+def abbott_estimate(before: Profile, after: Profile) -> Quantity:
+    """Mean worn depth from two traces of different places: the valley tails of both Abbott curves laid on each other.
+
+    Both traces are levelled by least squares; the mean of the second then stands lower over its valleys, by the mean
+    worn depth. The interval is that of traces of this length made with the spectrum of the first one, of which none is
+    worn. It takes the surface for alike everywhere and its deepest valleys, a quarter of the length, for unworn.
+    """
+    one, other = (level(even(each)) for each in (before, after))
+    share = np.linspace(*TAIL, 24)
+    found = float((np.quantile(other.z, share) - np.quantile(one.z, share)).mean())
+    spectrum = spectrum_of(one.z, one.length / (one.x.size - 1))
+    text = "mean worn depth guessed from the valley tails of both Abbott curves"
+    if not spectrum.density.any():
+        return refused("m", text, "the trace before is flat")
+    tails = []
+    for each, half in ((one, 0), (other, 1)):
+        heights = Heights(each.z, each.length / (each.x.size - 1))
+        made = made_traces(spectrum, heights, True)[half::2]
+        tails.append(np.array([np.quantile(m.z, share).mean() * np.sqrt(min(1.0, m.length / heights.length))
+                               for m in made]))
+    low, high = np.quantile(tails[1] - tails[0], ((1 - LEVEL) / 2, (1 + LEVEL) / 2))
+    return Quantity(found, found - float(high), found - float(low), "m", text)

@@ -1,0 +1,136 @@
+"""Ratio of two amplitudes or slopes with the interval that single traces allow."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ..areal import Areal, level_plane
+from ..profile import Profile, level, say
+from ..roughness.filter import even
+from ..roughness.intervals import Intervals
+from ..roughness.parameters import Heights
+from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spectrum_of
+from .quantity import LEVEL, Quantity, refused
+
+
+class Size(NamedTuple):
+    """Amplitude of the band [m] and root mean square of the slope [1], their degrees of freedom, and the spectrum."""
+
+    amplitude: float
+    slope: float
+    freedom: tuple
+    spectrum: Spectrum
+
+
+def size_of(trace: Profile, step: float, band: tuple = BAND) -> Size:
+    """Amplitude and slope of a trace, read at a step [m] so that slopes of several traces compare.
+
+    PatchfemError where the trace cannot show the band.
+    """
+    z, step = at_step(trace, step)
+    refuse_band(trace.source, *band, step * (z.size - 1), step)
+    return _size(z, step, band)
+
+
+def _size(z, step: float, band: tuple) -> Size:
+    found = spectrum_of(z, step)
+    heights = Heights(z, step)
+    inner = Intervals(heights, True, found, band)
+    freedom = (inner.freedom("band"), inner.freedom("slope")) if found.density.any() else (1.0, 1.0)
+    return Size(amplitude_of(found, *band), float(np.sqrt(np.mean(np.diff(z) ** 2))) / step, freedom, found)
+
+
+def at_step(trace: Profile, step: float) -> tuple:
+    """Levelled heights (n,) [m] of a trace near a step [m] that is no finer than its own, and that step."""
+    flat = level(even(trace))
+    own = flat.length / (flat.x.size - 1)
+    if step < own * 1.01:
+        return flat.z, own
+    count = int(flat.length / step * (1 + 1e-9)) + 1
+    x = flat.x[0] + step * np.arange(count)
+    flat = level(Profile(frozen_array(x), frozen_array(np.interp(x, flat.x, flat.z)), flat.source))
+    return flat.z, step
+
+
+def size_along(scan: Areal, direction: str, band: tuple = BAND) -> Size:
+    """Amplitude and slope of all traces of a scan in one direction, rows for x and columns for y.
+
+    Mean squares are averaged. Neighbouring traces tell nearly the same: the degrees of freedom of one trace count as
+    often as traces are independent, by the correlation of their mean squares across the scan. PatchfemError where no
+    whole trace is left, or the traces cannot show the band.
+    """
+    flat = level_plane(scan)
+    z, x = (flat.z, flat.x) if direction == "x" else (flat.z.T, flat.y)
+    z = z[~np.isnan(z).any(axis=1)]
+    if not len(z):
+        raise PatchfemError(f"{scan.source}: no trace along {direction} without missing heights")
+    step = float(x[-1] - x[0]) / (x.size - 1)
+    refuse_band(scan.source, *band, step * (x.size - 1), step)
+    sizes = [_size(level(Profile(x, row, scan.source)).z, step, band) for row in z]
+    squares = np.array([(one.amplitude**2, one.slope**2) for one in sizes])
+    mean = np.sqrt(squares.mean(axis=0))
+    freedom = np.mean([one.freedom for one in sizes], axis=0)
+    freedom = tuple(float(f * _independent(column)) for f, column in zip(freedom, squares.T))
+    density = np.mean([one.spectrum.density for one in sizes], axis=0)
+    found = Spectrum(sizes[0].spectrum.frequency, frozen_array(density), sizes[0].spectrum.tapers,
+                     sizes[0].spectrum.length)
+    return Size(float(mean[0]), float(mean[1]), freedom, found)
+
+
+def _independent(values) -> float:
+    """How many of neighbouring values are independent: n / (1 + 2 sum of their correlations up to the first zero)."""
+    off = values - values.mean()
+    power, total = float(off @ off), 1.0
+    if power == 0:
+        return 1.0
+    for lag in range(1, values.size):
+        found = float(off[lag:] @ off[:-lag]) / power
+        if found <= 0:
+            break
+        total += 2 * found
+    return max(values.size / total, 1.0)
+
+
+def ratio(part: str, text: str, over: Size, under: Size, alike: float = 0.0) -> Quantity:
+    """Ratio of the amplitudes or slopes of two traces, part "amplitude" or "slope".
+
+    alike: correlation of the two. Mean squares of traces from different places are independent chi-squares, and the
+    interval is that of F; those of one place before and after vary together, and the interval is Pitman's for two
+    correlated variances (Biometrika 31 (1939) 9), by Student's t with the fewer degrees of freedom.
+    """
+    from scipy.stats import f as fisher
+    from scipy.stats import t as student
+
+    place = ("amplitude", "slope").index(part)
+    one, other = over[place], under[place]
+    if other <= 0:
+        return refused("1", text, f"the {part} before is zero")
+    value, (first, second) = one / other, (over.freedom[place], under.freedom[place])
+    tail = (1 - LEVEL) / 2
+    if alike <= 0:
+        low, high = (1 / fisher.ppf(p, first, second) for p in (1 - tail, tail))
+    else:
+        freedom = max(min(first, second) - 1, 1.0)
+        k = 2 * (1 - min(alike, 1.0) ** 2) * student.ppf(1 - tail, freedom) ** 2 / freedom
+        high = 1 + k + np.sqrt(k * (2 + k))
+        low = 1 / high
+    return Quantity(value, value * float(np.sqrt(low)), value * float(np.sqrt(high)), "1", text)
+
+
+def likeness(first, second, step: float, band: tuple = BAND) -> tuple:
+    """Correlation of two registered traces (n,) [m] every `step` [m]: that of their band and that of their slopes."""
+    window = np.hanning(first.size)
+    one, other = (np.fft.rfft((z - z.mean()) * window) for z in (first, second))
+    wave = np.fft.rfftfreq(first.size, step)
+    inside = (wave >= 1 / band[1]) & (wave <= 1 / band[0])
+    out = []
+    for a, b in ((one[inside], other[inside]), (np.diff(first), np.diff(second))):
+        size = float(np.sqrt(np.vdot(a, a).real * np.vdot(b, b).real))
+        out.append(float(np.clip(np.vdot(a, b).real / size, 0.0, 1.0)) if size > 0 else 0.0)
+    return tuple(out)
+
+
+def band_text(band: tuple) -> str:
+    """The band in words."""
+    return f"waves of {say(band[0])} to {say(band[1])}"

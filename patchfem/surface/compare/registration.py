@@ -1,0 +1,242 @@
+"""Registration of two traces of the same place: shift, tilt and offset from the heights that no wear has moved.
+
+The second trace is z_b(x - shift) - w(x) + offset + slope x + noise with a worn depth w >= 0 that is zero in the
+valleys. Only heights within the noise of w = 0 enter the fit; a least-squares line through all of them would take the
+mean of the worn depth away with the tilt.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ..profile import Profile, level
+from ..roughness.filter import even
+from ..roughness.levelling import one_sided_line
+
+REACH = 2.5  # standard deviations of the noise within which a height counts as unworn
+TRIMMED = 1.10  # variance of a fit to normal noise cut off at REACH, over that of least squares
+KEPT = 0.911  # share of the variance that normal noise cut off at REACH has
+LOWEST = 1 / 3  # share of the first trace, its lowest heights, that the fit starts from
+FEWEST = 12  # unworn heights
+BESIDE = 1  # samples next to a worn one that do not count: the wear runs out in them
+NOISY, MOST = 0.05, 51  # share of noise in a slope, and samples of a parabola
+WIDER = 1.15  # the interval of the stretch, without it, holds 92 of 100
+ROUNDS = 100
+DIGITS = 1e-5  # of the height: least noise that is counted with
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """How a second trace lies on a first one.
+
+    shift [m]: a place at x of the first stands at x + shift of the second; slope [rad] and offset [m] (at the middle
+    of the common part) of the second against the first; noise [m] of a height difference; x (n,) [m]: samples of the
+    second that lie on the first; first (n,) [m]: the first trace there; rest (n,) [m]: depth of the second below the
+    first, moved by slope and offset: worn depth plus noise; used (n,): the unworn heights of the fit; gradient (n, 3)
+    of rest by offset, slope and shift, (n, 4) where the stretch was fitted too; covariance of these; stretch: length of
+    the second over that of the first, less one, its standard deviation, and whether it was taken out of rest; doubt:
+    change of offset, slope and shift where the deeper half of the unworn heights alone makes the fit, as slight wear of
+    the higher half would bring it about.
+    """
+
+    shift: float
+    slope: float
+    offset: float
+    noise: float
+    x: np.ndarray
+    first: np.ndarray
+    rest: np.ndarray
+    used: np.ndarray
+    gradient: np.ndarray
+    covariance: np.ndarray
+    stretch: tuple
+    doubt: np.ndarray
+
+    @property
+    def errors(self) -> tuple:
+        """Standard deviations of offset [m], slope [rad] and shift [m], with what the deeper half doubts."""
+        return tuple(self.error(row) for row in np.eye(self.doubt.size)[:3])
+
+    def error(self, pull: np.ndarray) -> float:
+        """Standard deviation of pull @ (offset, slope, shift): that of the noise, and a doubt beyond twice as much."""
+        noise = float(pull @ self.covariance @ pull)
+        return float(np.sqrt(noise + max((pull @ self.doubt) ** 2 - 4 * noise, 0.0)))
+
+    @property
+    def middle(self) -> float:
+        """Place [m] in the second trace at which the offset holds."""
+        return float(self.x[0] + self.x[-1]) / 2
+
+
+def register(before: Profile, after: Profile, shift: float) -> Registration:
+    """Register `after` on `before` from a first guess of the shift [m], right within a quarter of a wave (`place`).
+
+    Between its samples the first trace is a cubic spline. The fit starts from the one-sided line over the lowest third
+    of the first trace. The noise is 1.4826 times the median of the depths below zero, which no wear makes; heights
+    within 2.5 of it make the next offset, slope and shift, until they stay the same; the first rounds count with the
+    noise of half a step of shift, halved from round to round. Slopes come from
+    parabolas as long as the noise wants. A second fit lets the second trace
+    be longer or shorter by a factor; where that halves the noise, the heights are compared with the factor taken out.
+    PatchfemError where fewer than 12 heights are unworn.
+    """
+    fit = _Fit(even(before), after, shift)
+    state, used = fit.start(shift)
+    first = _settled(fit, state, used, 4)
+    if first is not None:
+        fit.smooth_slope(fit.noise(first))
+    free = _settled(fit, state, used, 4)
+    held = _settled(fit, state, used, 3)
+    if held is None and free is None:
+        raise PatchfemError(f"{after.source}: fewer than {FEWEST} of its heights lie on the valleys of "
+                            f"{before.source}; no common reference")
+    if free is None:
+        return fit.found(held, (float("nan"), float("nan"), False))
+    error = WIDER * fit.found(free, (0.0, 0.0, False), 4).covariance[3, 3] ** 0.5
+    noise = [fit.noise(one) if one is not None else np.inf for one in (free, held)]
+    out = held is None or noise[0] < 0.5 * noise[1]
+    return fit.found(free if out else held, (float(free[3]), float(error), bool(out)), 4 if out else 3)
+
+
+def _settled(fit, state, used, free: int):
+    """State of the fit of the first `free` numbers once its unworn heights stay the same, None where too few are."""
+    for turn in range(ROUNDS):
+        rest, least = fit.rest(state)[0], max(fit.least, fit.blur * 0.5**turn)
+        noise, now = _unworn(rest, least)
+        if now.sum() < FEWEST:
+            return None
+        same = used.size == now.size and bool((used == now).all())
+        new, used = fit.improved(state, now, free), now
+        small = np.abs(new - state) <= 1e-9 * fit.scales
+        state = new
+        if same and small.all() and (noise > least or least == fit.least):
+            break
+    return state
+
+
+def _unworn(rest, least: float) -> tuple:
+    """Noise [m] and which heights count as unworn."""
+    below = -rest[rest < 0]
+    noise = max(1.4826 * float(np.median(below)) if below.size > 3 else 0.0, least)
+    deep = rest > REACH * noise
+    beside = np.convolve(deep, np.ones(2 * BESIDE + 1), "same") > 0.5
+    return noise, (np.abs(rest) <= REACH * noise) & ~beside
+
+
+class _Fit:
+    """The two traces and the state of the second: offset, height of its slope at the end, shift, stretch."""
+
+    def __init__(self, one: Profile, after: Profile, shift: float):
+        from scipy.interpolate import CubicSpline
+
+        there = ~after.missing
+        self.one, self.x, self.z, self.source = one, after.x[there], after.z[there], after.source
+        self.spline = CubicSpline(one.x, one.z)
+        self.slope = self.spline.derivative()
+        self.flat, self.half = level(one).z, one.length / 2
+        height, step = float(self.flat.std()), one.length / (one.x.size - 1)
+        self.least = max(DIGITS * height, 1e-13 * float(np.abs(self.z).max(initial=0.0)), 1e-300)
+        tilt = max(height, 1e-12)
+        self.scales = np.array([tilt, tilt, step, step / self.half])
+        inside = self.inside(np.array([0.0, 0.0, shift, 0.0]), 0.0)
+        if inside.sum() < FEWEST:
+            raise PatchfemError(f"{self.source}: {inside.sum()} samples lie on {one.source}; {FEWEST} at least are "
+                                "wanted")
+        self.centre = float(self.x[inside][0] + self.x[inside][-1]) / 2
+
+    def inside(self, state, centre=None):
+        at, edge = self.at(state, centre), 1e-9 * self.half
+        return (at >= self.one.x[0] - edge) & (at <= self.one.x[-1] + edge)
+
+    def at(self, state, centre=None):
+        """Places in the first trace of the samples of the second."""
+        centre = self.centre if centre is None else centre
+        return centre + (self.x - centre) / (1 + state[3]) - state[2]
+
+    def rest(self, state) -> tuple:
+        """Depth below the first trace, its gradient (n, 4), and which samples of the second these are."""
+        inside = self.inside(state)
+        along = (self.x[inside] - self.centre) / self.half
+        at = self.at(state)[inside]
+        fall = -self.slope(at)
+        rest = self.spline(at) - self.z[inside] + state[0] + state[1] * along
+        return rest, np.column_stack([np.ones(at.size), along, fall, fall * along * self.half]), inside
+
+    def smooth_slope(self, noise: float) -> None:
+        """Take slopes from parabolas through so many samples that the noise [m] leaves 5 % in them, three at least.
+
+        A slope between noisy neighbours errs together with their heights and would draw the shift to places between
+        samples.
+        """
+        from scipy.signal import savgol_filter
+
+        step = self.scales[2]
+        slope = float(np.std(savgol_filter(self.one.z, 5, 2, 1, delta=step)))
+        wanted = (6 * (noise / (step * NOISY * max(slope, 1e-300))) ** 2) ** (1 / 3)
+        count = int(np.clip(2 * np.ceil(wanted / 2) + 1, 3, MOST))
+        smooth = savgol_filter(self.one.z, min(count, self.one.z.size // 2 * 2 - 1), 2, 1, delta=step)
+        self.slope = lambda at: np.interp(at, self.one.x, smooth)
+
+    def noise(self, state) -> float:
+        return _unworn(self.rest(state)[0], self.least)[0]
+
+    def start(self, shift: float) -> tuple:
+        """State and the unworn heights of the one-sided line over the lowest third."""
+        state = np.array([0.0, 0.0, shift, 0.0])
+        rest, gradient, inside = self.rest(state)
+        x = self.x[inside]
+        low = np.interp(x - shift, self.one.x, self.flat)
+        low = low <= np.quantile(low, LOWEST)
+        self.blur = float(np.std(gradient[:, 2])) * self.scales[2] / 2  # half a step of shift left open
+        line = one_sided_line(x[low], rest[low], "above", self.blur)
+        state[:2] = -line.at(self.centre), -line.slope * self.half
+        used = np.zeros(x.size, bool)
+        used[np.flatnonzero(low)[line.used]] = True
+        for _ in range(8):  # the shift of these heights alone, before others come in
+            state = self.improved(state, used, 3) if used.size == self.rest(state)[0].size else state
+        return state, used
+
+    def improved(self, state, used, free: int) -> np.ndarray:
+        rest, gradient, _ = self.rest(state)
+        step = np.linalg.lstsq(gradient[used, :free], -rest[used], rcond=1e-10)[0]
+        most = 4 * self.scales[2:free]
+        step[2:] = np.clip(step[2:], -most, most)
+        new = state.copy()
+        new[:free] += step
+        return new
+
+    def found(self, state, stretch: tuple, free: int = 3) -> Registration:
+        rest, gradient, inside = self.rest(state)
+        noise, used = _unworn(rest, self.least)
+        part = gradient[used, :free]
+        inverse = np.linalg.pinv(part.T @ part, rcond=1e-14, hermitian=True)
+        spread = float(np.mean(rest[used] ** 2)) / KEPT
+        covariance = inverse * max(spread, self.least**2 / 100) * TRIMMED * _together(rest, used)
+        turn = np.array([1.0, 1 / self.half, 1.0, 1.0])[:free]  # slope [rad] from the height at the end
+        x, at = self.x[inside], self.at(state)[inside]
+        slope = float(state[1] / self.half)
+        offset = float(state[0]) + slope * (float(x[0] + x[-1]) / 2 - self.centre)
+        first = self.spline(at)
+        height = first - np.polyval(np.polyfit(x, first, 1), x)
+        deep = used & (height <= np.median(height[used]))
+        doubt = np.linalg.lstsq(gradient[deep, :free], -rest[deep], rcond=1e-10)[0]
+        return Registration(
+            float(state[2]), slope, offset, noise, frozen_array(x),
+            frozen_array(first), frozen_array(rest), used, frozen_array(gradient[:, :free] / turn),
+            frozen_array(covariance * np.outer(turn, turn)), stretch, frozen_array(doubt * turn))
+
+
+def _together(rest, used) -> float:
+    """How many neighbouring heights err alike: 1 + 2 sum of the correlations of unworn neighbours, 1 at least."""
+    total, power = 1.0, float(np.mean(rest[used] ** 2))
+    if power == 0:
+        return 1.0
+    for lag in range(1, min(200, rest.size // 4)):
+        both = used[lag:] & used[:-lag]
+        if both.sum() < FEWEST:
+            break
+        found = float(np.mean(rest[lag:][both] * rest[:-lag][both])) / power
+        if found < 2 / np.sqrt(both.sum()):
+            break
+        total += 2 * found
+    return total

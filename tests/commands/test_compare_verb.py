@@ -1,0 +1,156 @@
+"""patchfem compare: verdict, table, JSON of the contract, page, a scene pressed with both, refusals."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import ALWAYS, MODULES, cli, loaded
+from pairs import UM, pair
+
+from patchfem.surface.profile import Profile
+from patchfem.surface.synthetic import report_area
+
+NAMES = ("shift", "worn_depth_max", "worn_depth_mean", "worn_area", "amplitude_ratio", "slope_ratio")
+SCENE = """
+[contact]
+length = "0.9 mm"
+width = "0.9 mm"
+height = "0.5 mm"
+load = "20 N"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.profile]
+file = "before.csv"
+heights = "surface"
+[contact.asperities]
+law = "linear"
+normal_stiffness = "1e13 Pa/m"
+"""
+
+
+def written(path: Path, trace: Profile) -> Path:
+    """A trace as an instrument exports it, rounded to what it prints."""
+    path.write_text("x [um],z [um]\n" + "".join(f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(trace.x, trace.z)))
+    return path
+
+
+@pytest.fixture
+def files(tmp_path) -> tuple:
+    """Before, after with half of it worn, and the pair."""
+    p = pair(30077, share=0.5)
+    return written(tmp_path / "before.csv", p.before), written(tmp_path / "after.csv", p.after), p
+
+
+def test_exact_the_answer_in_one_command(files, tmp_path):
+    before, after, p = files
+    out = tmp_path / "out"
+    answer = cli("compare", before, after, "--direction", "x", "-o", out)
+    assert answer.code == 0 and answer.out.splitlines()[0] == "reduced"
+    assert answer.out.splitlines()[-1] == f"results: {out}"
+    found = json.loads((out / "compare.json").read_text())
+    assert found["reference"] == "place" and found["direction"] == "x"
+    for name in NAMES:
+        assert set(found[name]) == {"value", "low", "high", "unit"}
+        assert found[name]["low"] <= found[name]["value"] <= found[name]["high"]
+    assert [found[name]["unit"] for name in NAMES] == ["m", "m", "m", "m2", "1", "1"]
+    assert found["shift"]["value"] == pytest.approx(p.shift, abs=0.02 * UM)
+    assert found["worn_depth_max"]["value"] == pytest.approx(p.worn.max(), abs=0.1 * UM)
+    page = (out / "report.html").read_text()
+    assert page.index("Reduced.") < page.index("<figure>")
+    assert page.count("<figure>") == 3 == page.count('role="img" aria-label="')
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_exact_json_says_why_there_is_no_depth(files, tmp_path):
+    other = written(tmp_path / "elsewhere.csv", pair(50001, share=0.3).after)
+    found = json.loads(cli("compare", files[0], other, "--json", "-o", tmp_path / "out").out)
+    for name in NAMES[:4]:
+        assert found[name]["value"] is None and "no common place" in found[name]["reason"]
+    guess = found["worn_depth_mean_from_abbott"]
+    assert guess["low"] < guess["value"] < guess["high"] and guess["high"] - guess["low"] > UM
+    assert found["amplitude_ratio"]["value"] > 0
+
+
+def test_exact_identical_traces_show_no_change(files, tmp_path):
+    found = json.loads(cli("compare", files[0], files[0], "--json", "-o", tmp_path / "out").out)
+    assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] == 0.0
+    assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_always_a_scene_is_pressed_with_both(files, tmp_path):
+    (tmp_path / "patch.toml").write_text(SCENE)
+    out = tmp_path / "out"
+    answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", out)
+    assert answer.code == 0, answer.err
+    found = json.loads((out / "compare.json").read_text())["pressed"]
+    for name in ("pressure_peak", "contact_fraction", "normal_stiffness"):
+        assert {"value", "error", "unit"} == set(found["measures"][name]["before"])
+    peak, share = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
+    assert peak["after"]["value"] < 0.6 * peak["before"]["value"]  # worn plateaus carry more of the load
+    assert share["after"]["value"] > share["before"]["value"]
+    assert any(text.startswith("energy of the friction loop per cycle: the scene tells none") for text in
+               found["lacking"])
+    page = (out / "report.html").read_text()
+    assert page.count("<figure>") == 4 and "Pressure along the patch" in page
+    alone = cli("run", tmp_path / "patch.toml", "--set", f"contact.profile.file={out / 'after.csv'}", "--json", "-o",
+                tmp_path / "alone")
+    assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(peak["after"]["value"],
+                                                                                      rel=1e-12)
+
+
+def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
+    (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm"))
+    answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", tmp_path / "out")
+    assert answer.code in (0, 2) and "long, the patch 12.7 mm" in answer.out + answer.err
+
+
+def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
+    p = pair(30078, share=0.0)
+    across = written(tmp_path / "by.csv", p.before), written(tmp_path / "ay.csv", p.after)
+    found = json.loads(cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out)
+    assert found["verdict"] == "reduced along x, no change shown along y"
+    assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {"before", "after"}
+    x, y, z = report_area((64, 64), 4 * UM, 1)
+    scan = tmp_path / "scan.csv"
+    scan.write_text("x [um],y [um],z [um]\n" + "".join(
+        f"{a / UM:.1f},{b / UM:.1f},{z[k, i] / UM:.5f}\n" for k, b in enumerate(y) for i, a in enumerate(x)))
+    found = json.loads(cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
+    assert found["verdict"] == "no change shown" and "one row" in found["worn_depth_max"]["reason"]
+
+
+def test_refuses_a_scene_without_a_patch(files, tmp_path):
+    (tmp_path / "point.toml").write_text('[normal]\nload = "10 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\n'
+                                         'kind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n')
+    answer = cli("compare", *files[:2], "--scene", tmp_path / "point.toml", "-o", tmp_path / "out")
+    assert answer.code == 2 and "no [contact] in it" in answer.err
+
+
+@pytest.mark.parametrize("words, says", [
+    (("--direction", "z"), "compare --direction z: x or y is wanted"),
+    (("third.csv",), "compare: 3 files; two are wanted, or four"),
+])
+def test_refuses_with_exit_code_2(files, words, says):
+    answer = cli("compare", *files[:2], *words)
+    assert answer.code == 2 and says in answer.err and answer.out == ""
+
+
+def test_refuses_traces_too_short_for_the_band(tmp_path):
+    p = pair(1)
+    short = written(tmp_path / "short.csv", Profile(p.before.x[:150], p.before.z[:150], ""))
+    answer = cli("compare", short, short, "-o", tmp_path / "out")
+    assert answer.code == 2 and "not the band 60 um to 110 um" in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_exact_neither_meshes_nor_compiled_code_are_imported(files, tmp_path):
+    modules = loaded(f"import sys\nfrom patchfem.__main__ import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit "
+                     f"as end:\n    assert not end.code\n{MODULES}", "compare", *files[:2], "-o", tmp_path / "out")
+    assert not modules & {*ALWAYS, "skfem"}
+
+
+def test_exact_the_pages_are_the_same_bytes(files, tmp_path):
+    pages = []
+    for name in ("one", "two"):
+        cli("compare", *files[:2], "-o", tmp_path / name)
+        pages.append((tmp_path / name / "report.html").read_bytes())
+    assert pages[0] == pages[1] and np.all([len(page) > 50000 for page in pages])

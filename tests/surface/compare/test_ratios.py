@@ -1,0 +1,101 @@
+"""Ratios of amplitude and slope with their intervals, and the words that they carry."""
+
+import numpy as np
+import pytest
+from pairs import UM, pair
+
+from patchfem.core import PatchfemError, frozen_array
+from patchfem.surface.areal import Areal
+from patchfem.surface.compare.compare import compared, directions_of
+from patchfem.surface.compare.quantity import Quantity
+from patchfem.surface.compare.ratios import Size, ratio, size_of
+from patchfem.surface.compare.verdict import changed, confidence, verdicts
+from patchfem.surface.profile import Profile
+from patchfem.surface.synthetic import report_area
+
+
+def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most():
+    sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in range(70000, 70040)]
+    found = [ratio("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
+    words = [changed(one) for one in found]
+    assert words.count("reduced") <= 4 and words.count("increased") <= 4  # of 80; 5 % and less
+    values = np.quantile([one.value for one in found], (0.05, 0.95))
+    assert values == pytest.approx((0.64, 1.57), rel=0.15)  # measured on the report's surface, 1 mm
+
+
+def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_cases_at_most():
+    words, widths = [], []
+    for seed in range(30100, 30140):
+        p = pair(seed, share=0.0)
+        one = compared(p.before, p.after)
+        words.append(changed(one.amplitude_ratio))
+        widths.append(one.amplitude_ratio.high / one.amplitude_ratio.low)
+    assert words.count("reduced") <= 4 and np.median(widths) < 1.01  # 5 or more of 40 at 2.5 %: one in 300
+
+
+def test_exact_intervals_of_fisher_and_of_pitman():
+    """Both by other functions: quantiles of F by drawing chi-squares; Pitman's bounds as roots of his statistic."""
+    one, other = Size(2.0, 0.4, (14.0, 60.0), None), Size(1.0, 0.4, (9.0, 60.0), None)
+    found = ratio("amplitude", "", one, other)
+    random = np.random.default_rng(0)
+    drawn = np.sqrt(random.chisquare(14, 400000) / 14 / (random.chisquare(9, 400000) / 9))
+    low, high = 2 / np.quantile(drawn, (0.975, 0.025))
+    assert (found.low, found.high) == pytest.approx((low, high), rel=0.01)
+    found = ratio("amplitude", "", one, other, 0.8)
+    for bound in (found.low, found.high):  # at the bound, sums and differences of scaled traces just correlate
+        f = (found.value / bound) ** 2
+        r = (f - 1) / np.sqrt((f + 1) ** 2 - 4 * 0.8**2 * f)
+        t = abs(r) * np.sqrt(8 / (1 - r**2))
+        assert t == pytest.approx(2.306, abs=2e-3)  # Student, 8 degrees of freedom, 97.5 %
+
+
+def test_exact_confidence_of_an_interval_that_just_reaches_one():
+    assert confidence(Quantity(0.5, 0.25, 1.0, "1", "")) == pytest.approx(0.95, abs=1e-6)
+    assert changed(Quantity(0.5, 0.25, 1.0, "1", "")) == "no change shown"
+
+
+def test_always_wear_of_peaks_is_called_reduced():
+    p = pair(30077, share=0.5)
+    headline, sentences = verdicts([compared(p.before, p.after, "x")])
+    assert headline == "reduced" and "along x" in sentences[0] and "confidence" in sentences[0]
+
+
+def scan(seed: int, squeeze: int = 1) -> Areal:
+    """An isotropic scan, or one whose waves along y are longer by a factor."""
+    x, y, z = report_area((256, 256), 4 * UM, seed)
+    return Areal(x, y, frozen_array(np.repeat(z[:256 // squeeze], squeeze, axis=0)), f"scan {seed}")
+
+
+def test_always_an_areal_scan_shows_which_direction_is_smoother():
+    before, after = scan(3), scan(3, 4)
+    parts = [compared(before, after, direction) for direction in "xy"]
+    found = directions_of(parts)
+    assert [changed(one[1]) for one in found] == ["no change shown", "increased"]
+    text = verdicts(parts, found)[1]
+    assert text[-2].startswith("Before: no anisotropy shown") and text[-1].startswith("After: anisotropic")
+    assert "larger along x" in text[-1] and parts[0].worn.mean.value is None
+
+
+def test_always_two_pairs_are_compared_across():
+    parts = [compared(pair(seed).before, pair(seed).after, name) for seed, name in ((30001, "x"), (30002, "y"))]
+    found = directions_of(parts)
+    assert [one[0] for one in found] == ["before", "after"]
+    assert found[0][1].low < 1 < found[0][1].high
+
+
+def test_always_a_coarser_trace_is_compared_at_its_own_step():
+    p = pair(30003)
+    fine = compared(p.before, p.after)
+    coarse = compared(p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse"))
+    assert any("every 2 um" in text for text in coarse.notes)
+    assert coarse.amplitude_ratio.value == pytest.approx(fine.amplitude_ratio.value, rel=0.01)
+    assert coarse.worn.mean.value == pytest.approx(fine.worn.mean.value, abs=0.01 * UM)
+
+
+def test_refuses_a_trace_beside_a_scan_and_a_trace_too_short_for_the_band():
+    p = pair(1)
+    with pytest.raises(PatchfemError, match="two of a kind"):
+        compared(p.before, scan(1))
+    short = Profile(p.before.x[:150], p.before.z[:150], "short")
+    with pytest.raises(PatchfemError, match="not the band"):
+        compared(short, short)
