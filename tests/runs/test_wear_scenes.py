@@ -59,6 +59,29 @@ def test_exact_energy_form_is_archard_with_coefficient_times_friction():
         assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
 
 
+@pytest.mark.parametrize("beside", [
+    '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n',
+    '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e10 1/m^2"\nheight_deviation = "0.5 um"\n',
+    '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n',
+    '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n',
+    '[contact.crown]\nradius = "1 m"\n',
+], ids=["exponential", "hertz", "linear", "holder", "crown"])
+def test_exact_every_skin_and_shape_wears_by_its_load(beside):
+    found = ran(TILTED + beside + COULOMB + SINE + WEAR)
+    assert found.measures["worn_volume"].value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
+
+
+@pytest.mark.parametrize("slide, path", [
+    ('kind = "constant"\nspeed = "5 mm/s"\ndistance = "50 um"', 50e-6),
+    ('kind = "dwell"\nspeed = "5 mm/s"\ndistance = "50 um"\nhold = "0.1 s"\ndistance_after = "20 um"', 70e-6),
+    ('kind = "triangle"\nspeed = "5 mm/s"\namplitude = "3 um"\ndistance = "2 um"\ncycles = 3', 12e-6),
+], ids=["constant", "dwell", "triangle"])
+def test_exact_a_slide_that_does_not_repeat_is_one_cycle(slide, path):
+    for contact in (TILTED, TILTED + SHEAR):
+        found = ran(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
+        assert found.value == pytest.approx(KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06)
+
+
 @pytest.mark.parametrize("law", ['law = "elastic-plastic"', 'law = "nonlocal"'])
 def test_exact_short_bonds_wear_as_coulomb_friction(law):
     """Energy form: the friction work of a law with memory goes to that of Coulomb as its bond length goes to zero."""

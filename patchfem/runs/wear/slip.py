@@ -52,7 +52,7 @@ def rubbed(model, patch, frames: int) -> Rubbed:
 
 
 def _bench(model, patch, frames: int) -> Rubbed:
-    cycles = max(1, round(model.slide.cycles))
+    cycles = max(1, round(model.slide.cycles or 1))
     steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
     shaped = patch is not None and not even(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
