@@ -11,10 +11,11 @@ from ..runs.plan import plan
 from ..runs.results.patch_rows import TABLE
 from ..runs.run import run
 
-KNOBS = ("element_size", "steps_per_cycle", "shear_modes")
+KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 LEVELS = 5  # values of a knob, each twice as fine as the one before
 MOST_CELLS = 1600  # columns of the finest mesh
 MOST_STEPS = 12800
+JUMPS = 8  # of wear, the middle of its curve
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -34,7 +35,8 @@ class Cost:
 
 
 def knobs_of(model: Model) -> list:
-    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps and its shear modes."""
+    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
+    jumps over cycles of wear."""
     out = ["element_size"] if model.patch is not None else []
     if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
         engine = plan(model).engine
@@ -42,6 +44,8 @@ def knobs_of(model: Model) -> list:
             out.append("steps_per_cycle")
             if model.soft and has(model.friction.law, "bonds"):
                 out.append("shear_modes")
+    if model.wear is not None and model.patch is not None:
+        out.append("jumps")
     return out
 
 
@@ -94,6 +98,11 @@ def _turned(model: Model, knob: str):
             cells = round(middle * 2.0**power)
             if 8 <= cells <= MOST_CELLS:
                 yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(model, length / cells), 0)
+        return
+    if knob == "jumps":
+        for power in range(-2, LEVELS - 2):
+            value = max(1, round((model.wear.jumps or JUMPS) * 2.0**power))
+            yield str(value), float(value), (replace(model, wear=replace(model.wear, jumps=value)), 0)
         return
     from ..runs.rig.numerics import choose
 

@@ -9,14 +9,16 @@ from cyclopts import Parameter
 from ..effects import unbuilt
 from .shared import Json, NotReached, Out, Quiet, Refused, Sets, model_of, progress_bar, say, scene_of
 
-MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak",
-        "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
+MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area",
+        "friction_force_peak", "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness",
+        "tangential_stiffness")
 
 
 def cost(scene: Path, /, *, over: str = "", out: Out = None,
          set_: Sets = (), json_: Json = False,
          quiet: Quiet = False):
-    """Error against time of SCENE for a knob (--over element_size, steps_per_cycle, shear_modes), or for all it has."""
+    """Error against time of SCENE for a knob, or for all it has (--over element_size, steps_per_cycle, shear_modes,
+    jumps)."""
     from ..campaigns import cost as campaign
 
     found = model_of(scene, set_)

@@ -59,6 +59,26 @@ def test_exact_energy_form_is_archard_with_coefficient_times_friction():
         assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
 
 
+def test_always_few_jumps_say_how_wrong_they_are():
+    """A contact edge that moves far in a jump leaves a peak behind it; the errors of all measures hold the truth."""
+    text = TILTED.replace("0.5 mm", "0.1 mm") + COULOMB + SINE + WEAR.replace("135723", "2e6")
+    many = ran(text + "jumps = 256\n").measures
+    for jumps in (2, 4, 16, 64):
+        some = ran(text + f"jumps = {jumps}\n").measures
+        for name in ("worn_depth_max", "pressure_peak", "approach", "contact_fraction", "normal_stiffness"):
+            assert abs(some[name].value - many[name].value) <= some[name].error + many[name].error, (jumps, name)
+
+
+def test_exact_the_cost_of_jumps_is_a_curve(tmp_path):
+    scene = tmp_path / "worn.toml"
+    scene.write_text(TILTED + COULOMB + SINE + WEAR)
+    answer = cli("cost", scene, "--over", "jumps", "-o", tmp_path / "cost", "-q", "--json")
+    assert answer.code == 0, answer.err
+    runs = json.loads(answer.out)["jumps"]["runs"]
+    errors = [one["errors"]["worn_depth_max"] for one in runs[:-1]]
+    assert [one["label"] for one in runs] == ["2", "4", "8", "16", "32"] and errors[0] > 3 * errors[2]
+
+
 @pytest.mark.parametrize("beside", [
     '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n',
     '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e10 1/m^2"\nheight_deviation = "0.5 um"\n',

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Measure
+from ...core import Measure, frozen_array
 from ..patch.measures import remainder
+from ..patch.press import pressed
+from ..patch.values import values
 from ..results.patch_rows import TABLE
 from .slip import rubbed
 
@@ -26,9 +28,23 @@ def worn(result, found, estimate: bool = True):
     period = period_of(model, result)
     fields = frames(found, result.fields, period)
     shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
-    return replace(result, measures=result.measures | of_patch(found, result.measures, estimate), fields=fields,
-                   seconds=seconds, warnings=[*warnings, *_deep(model, found)],
+    static = jumped(model, found, result.measures) if estimate else {}
+    lost = of_patch(found, result.measures, estimate)
+    return replace(result, measures=result.measures | static | lost, fields=fields, seconds=seconds,
+                   warnings=[*warnings, *_deep(model, found)],
                    extra=result.extra | {"wear": history(found), "wear_shown": shown})
+
+
+def jumped(model, found, measures: dict) -> dict:
+    """Measures of the worn patch with what the length of the jumps adds to their errors.
+
+    That is twice the change to the depth by the same jumps undivided: in a long jump a moving contact edge leaves the
+    nodes it has just taken too high, on both.
+    """
+    rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
+    here = values(found.patch)
+    return {name: replace(m, error=m.error + 2 * abs(here[name] - rough[name])) for name, m in measures.items()
+            if name in here and m.error is not None}
 
 
 def period_of(model, result) -> float:
@@ -66,16 +82,16 @@ def of_patch(found, motion: dict, estimate: bool = True) -> dict:
     """worn_volume and worn_depth_max of an `Evolved`; motion: measures of the run on the worn patch."""
     state, area = found.state, found.patch.pieces.interface.weight
     share = found.miss + slip_miss(motion)
-    values, *others = [{"worn_volume": float(depth @ weight), "worn_depth_max": float(depth.max(initial=0.0))}
+    mine, *others = [{"worn_volume": float(depth @ weight), "worn_depth_max": float(depth.max(initial=0.0))}
                        for depth, weight in [(state.depth, area), *((depth, one.pieces.interface.weight)
                                              for one, depth in zip(found.coarse, found.depths))]]
     jumps = {"worn_volume": float(np.abs(state.depth - state.rough) @ area) + state.strayed * float(area.sum()),
              "worn_depth_max": state.error}
     out = {}
-    for name, value in values.items():
+    for name, value in mine.items():
         error = None
         if others and estimate:
-            steps = [one[name] - two[name] for one, two in zip([values, *others], others)]
+            steps = [one[name] - two[name] for one, two in zip([mine, *others], others)]
             error = jumps[name] + share * value + 3 * remainder(*(*steps, 0.0)[:2]) + 1e-12 * value
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
     return out
