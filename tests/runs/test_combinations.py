@@ -111,7 +111,7 @@ def walked(name: str, law: str, every: int = 1) -> None:
 @pytest.mark.parametrize("name", RUNS)
 def test_always_a_share_of_what_check_lets_through_runs(monkeypatch, name, law):
     monkeypatch.setattr(march, "warm_up", reached)
-    walked(name, law, 5)
+    walked(name, law, 9)
 
 
 @pytest.mark.slow
