@@ -127,7 +127,7 @@ class Balance:
         return other
 
     def plant(self, omega: float, harmonics: int) -> Plant:
-        """`plant` at omega [rad/s], kept for the last eight frequencies."""
+        """`plant` at omega [rad/s], kept for up to nine frequencies, then all forgotten."""
         key = (omega, harmonics)
         if key not in self._plants:
             if len(self._plants) > 8:
