@@ -72,7 +72,7 @@ def run_into(what, target: Path, say=None, progress=None, fresh: bool = False, r
     goes on with `resume`; PatchfemError where there is none.
     """
     with Folder(target, resume) as folder:
-        kept = Kept(folder.path / STATE, resume) if what.model.wear is not None else None
+        kept = Kept(folder.path / STATE, __version__, resume) if what.model.wear is not None else None
         result = run(what, say, progress, fresh=fresh, kept=kept)
         return write(result, folder.path)
 

@@ -18,9 +18,10 @@ KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "ri
 
 
 class Kept(NamedTuple):
-    """Where the state of a long run is kept, and whether to go on from it."""
+    """Where the state of a long run is kept, by which version of the program, and whether to go on from it."""
 
     path: Path
+    version: str
     resume: bool
 
 

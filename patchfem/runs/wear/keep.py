@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import __version__
 from ...core import PatchfemError
 from ...wear.jumps import Worn
 from .evolve import Evolved, Moment, evolve
@@ -16,18 +15,20 @@ MOMENT = ("cycle", "depth", "used", "pressure", "gap")
 
 
 def evolved_with(kept, model, patch, coarse, progress=None) -> Evolved:
-    """`evolve` with its state kept after every jump; kept: (path, resume), None keeps nothing."""
+    """`evolve` with its state kept after every jump; kept: where, None keeps nothing."""
     if kept is None:
         return evolve(model, patch, coarse, progress)
-    key = key_of(model, patch)
+    key = key_of(model, patch, kept.version)
     begin = load(kept.path, key) if kept.resume else None
     return evolve(model, patch, coarse, progress, begin, lambda state, moments: save(kept.path, key, state, moments))
 
 
-def key_of(model, patch) -> str:
-    """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, the version of the program."""
-    text = "\n".join((__version__, model.source.resolved)).encode()
-    return hashlib.sha256(text + patch.x.tobytes() + np.asarray(patch.gap).tobytes()).hexdigest()
+def key_of(model, patch, version: str) -> str:
+    """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
+    corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
+    parts = (f"{version}\n{model.source.resolved}".encode(), patch.x, patch.gap, *corners)
+    return hashlib.sha256(b"".join(one if isinstance(one, bytes) else np.asarray(one).tobytes()
+                                   for one in parts)).hexdigest()
 
 
 def save(path: Path, key: str, state: Worn, moments: tuple) -> None:
