@@ -102,17 +102,15 @@ def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) 
     """(state after a jump in two halves along a given slip path, its error over what the tolerance allows)."""
     rate = rates(asked.coefficient, path, asked.area)
     if asked.explicit:
-        depth, force = explicit_jump(asked.press, state.depth, rate, length)
-        rough, _ = explicit_jump(asked.press, state.rough, rate, length / 2)
-        rough, _ = explicit_jump(asked.press, rough, rate, length / 2)
-        return replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough,
-                       used=path), 0.0
+        depth, _ = explicit_jump(asked.press, state.depth, rate, length / 2)
+        depth, force = explicit_jump(asked.press, depth, rate, length / 2)
+        rough, _ = explicit_jump(asked.press, state.rough, rate, length)
+        return replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path), 0.0
     once, least = jump(asked.press, state.depth, rate, length)
     half, _ = jump(asked.press, state.depth, rate, length / 2)
     depth, force = jump(asked.press, half, rate, length / 2)
     rough, _ = jump(asked.press, state.rough, rate, length) if state.rough is not state.depth else (once, least)
-    found = replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough,
-                    used=path)
+    found = replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path)
     scale, load = 2**ORDER - 1, float(force.sum())
     miss = float(np.abs(depth - once).max()) / scale / _allowed(found, tolerance)
     return found, max(miss, float(np.abs(force - least).sum()) / scale / (tolerance * load) if load > 0 else 0.0)

@@ -1,6 +1,5 @@
 """What was worn, as measures with their errors, and its way there as arrays over the cycles."""
 
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from ..patch.measures import remainder
 from ..patch.press import pressed
 from ..patch.values import values
 from ..results.patch_rows import TABLE
-from .slip import rubbed
+from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
 HOLDER = {"closing": "approach", "rotation": "rotation"}
@@ -19,8 +18,10 @@ HOLDER = {"closing": "approach", "rotation": "rotation"}
 def worn(result, found, estimate: bool = True):
     """The Result of a run on the worn patch with what was worn; found: the `Evolved`, None for one point."""
     model = result.plan.model
+    if found is None and result.outcome in UNBOUNDED:
+        return replace(result, warnings=[*result.warnings, f"nothing was worn: {result.outcome.sentence}"])
     if found is None:
-        return replace(result, measures=result.measures | of_point(model, result.measures, estimate))
+        return replace(result, measures=result.measures | volume_of_point(model, result, estimate))
     seconds = result.seconds | {"wear": found.seconds}
     warnings = [*result.warnings, *([found.stopped] if found.stopped else [])]
     if found.state is None:
@@ -81,7 +82,7 @@ def slip_miss(measures: dict) -> float:
 def of_patch(found, motion: dict, estimate: bool = True) -> dict:
     """worn_volume and worn_depth_max of an `Evolved`; motion: measures of the run on the worn patch."""
     state, area = found.state, found.patch.pieces.interface.weight
-    share = found.miss + slip_miss(motion)
+    share = found.miss + slip_miss(motion) + _coarser(found, motion)
     mine, *others = [{"worn_volume": float(depth @ weight), "worn_depth_max": float(depth.max(initial=0.0))}
                        for depth, weight in [(state.depth, area), *((depth, one.pieces.interface.weight)
                                              for one, depth in zip(found.coarse, found.depths))]]
@@ -97,11 +98,17 @@ def of_patch(found, motion: dict, estimate: bool = True) -> dict:
     return out
 
 
-def of_point(model, measures: dict, estimate: bool = True) -> dict:
-    """worn_volume of one point under [normal]: coefficient times load times slip path, over all cycles."""
-    found, wear = rubbed(model, None, 0), model.wear
-    value = wear.coefficient * model.point.load * float(found.path[0]) * wear.cycles
-    error = (slip_miss(measures) + 1e-12) * value if estimate else None
+def _coarser(found, motion: dict) -> float:
+    """Relative difference between the slip of the last cycle that wore the patch and that of the run on the worn patch,
+    whose steps may have been halved for its tolerance."""
+    used, last = found.moments[-1].values.get("slip_amplitude"), motion.get("slip_amplitude")
+    return abs(used / last.value - 1) if used is not None and last is not None and last.value else 0.0
+
+
+def volume_of_point(model, result, estimate: bool = True) -> dict:
+    """worn_volume of one point under [normal]: coefficient times load times slip path, over all cycles of wear."""
+    value = model.wear.coefficient * model.point.load * of_point(model, result.window) * model.wear.cycles
+    error = (slip_miss(result.measures) + 1e-12) * value if estimate else None
     return {"worn_volume": Measure(value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor)}
 
 

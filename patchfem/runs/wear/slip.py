@@ -44,17 +44,14 @@ def even(model, per_point: bool = False) -> bool:
 
 
 def rubbed(model, patch, frames: int) -> Rubbed:
-    """One converged cycle of a model on a patch; frames: how many of the interface it is read from.
-
-    patch None: one point under [normal], whose path is weighted with its load where that changes.
-    """
+    """One converged cycle of a model on a patch; frames: how many of the interface it is read from."""
     return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
 
 
 def _bench(model, patch, frames: int) -> Rubbed:
     cycles = max(1, round(model.slide.cycles or 1))
     steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
-    shaped = patch is not None and not even(model)
+    shaped = not even(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
     if shaped:
         last = found.frames >= found.first
@@ -68,7 +65,7 @@ def _bench(model, patch, frames: int) -> Rubbed:
 
 def _rig(model, patch, frames: int) -> Rubbed:
     numerics = choose(model)
-    shaped = patch is not None and not even(model, numerics.per_point)
+    shaped = not even(model, numerics.per_point)
     found = ENGINES[numerics.engine].run(model, numerics, patch, frames if shaped else 0, None, None)
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     ended, _ = settle(found, {"relative_displacement_amplitude": amplitude}, model.accuracy.tolerance, model.rig.drive)
@@ -76,10 +73,25 @@ def _rig(model, patch, frames: int) -> Rubbed:
     if shaped:
         fields = rig_fields(model, numerics, patch, found)
         return _read(model, patch, fields["slip"][1:], fields["shear_stress"][1:], True, found.values, outcome)
-    window = found.window
+    return _alike(model, patch, *_last_cycle(model, found.window, patch.pressure.load), found.values, outcome)
+
+
+def of_point(model, window) -> float:
+    """Slip path [m] of one cycle of one point under [normal], from the last cycles of its run.
+
+    It is weighted with the load where that changes. window: histories of a bench or a rig.
+    """
+    if model.rig is not None:
+        slip, force, load = _last_cycle(model, window, model.point.load)
+    else:
+        slip, force, load = (part[window.first:] for part in (window.slip, window.force, window.load))
+    return float(_alike(model, None, slip, force, load, {}, None).path[0])
+
+
+def _last_cycle(model, window, load: float) -> tuple:
+    """Slip [m], force [N] and load [N] (k,) of the last cycle of a rig."""
     last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
-    load = np.full(window.time.size, patch.pressure.load if patch is not None else model.point.load)
-    return _alike(model, patch, window.slip[last], window.force[last], load[last], found.values, outcome)
+    return window.slip[last], window.force[last], np.full(int(last.sum()), load)
 
 
 def _alike(model, patch, slip, force, load, values: dict, outcome) -> Rubbed:
