@@ -145,7 +145,7 @@ def _reach(stroke: float, step: float, points: int) -> int:
     return reach
 
 
-def band_amplitude(z: np.ndarray, step: float, axis: int, low: float = 60e-6, high: float = 110e-6) -> np.ndarray:
+def periodic_amplitude(z: np.ndarray, step: float, axis: int, low: float = 60e-6, high: float = 110e-6) -> np.ndarray:
     """Amplitude [m] of the sine with the mean square of the waves from `low` to `high` [m] long, of every trace.
 
     z: heights (m, n) [m], periodic; axis: 1 for the m traces along x, 0 for the n traces along y. Over whole periods no
@@ -161,11 +161,11 @@ def band_amplitude(z: np.ndarray, step: float, axis: int, low: float = 60e-6, hi
 def anisotropy(z: np.ndarray, step: float) -> dict:
     """Ratios x over y [1] of a periodic area (m, n) [m], and its skewness: "band", "rq", "slope", "ssk".
 
-    band: of the `band_amplitude`, root mean square over all traces; rq: of the mean root mean square height of a trace
-    about its own mean; slope: of the root mean square of central differences; ssk: skewness of the area.
+    band: of the `periodic_amplitude`, root mean square over all traces; rq: of the mean root mean square height of a
+    trace about its own mean; slope: of the root mean square of central differences; ssk: skewness of the area.
     """
     def along(axis):
-        band = np.sqrt((band_amplitude(z, step, axis) ** 2).mean())
+        band = np.sqrt((periodic_amplitude(z, step, axis) ** 2).mean())
         return band, z.std(axis=axis).mean(), np.sqrt(((np.roll(z, -1, axis) - np.roll(z, 1, axis)) ** 2).mean())
 
     ratios = [float(x / y) for x, y in zip(along(1), along(0))]

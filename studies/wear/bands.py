@@ -28,7 +28,7 @@ from drawing import drawing
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.surface.synthetic import report_area
-from patchfem.wear.asperities import band_amplitude, rub
+from patchfem.wear.asperities import periodic_amplitude, rub
 
 HERE = Path(__file__).parent
 STEP, POINTS, UM = 3.2e-6, 320, 1e-6
@@ -55,7 +55,7 @@ class Row(NamedTuple):
 
 def amplitudes(areas) -> np.ndarray:
     """Band amplitude (2, k, traces) [m] of every eighth trace along x and along y of k areas."""
-    return np.array([[band_amplitude(z, STEP, axis)[::8] for z in areas] for axis in (1, 0)])
+    return np.array([[periodic_amplitude(z, STEP, axis)[::8] for z in areas] for axis in (1, 0)])
 
 
 def whole(traces) -> np.ndarray:

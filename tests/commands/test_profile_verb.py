@@ -60,7 +60,12 @@ def test_exact_json_in_si(trace, scan):
     assert first["measures"]["Pq"]["value"] == pytest.approx(5 * UM / np.sqrt(2), rel=0.01)
     assert set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"} and first["measures"]["Pq"]["unit"] == "m"
     assert first["cutoff"] is None and first["length"] == pytest.approx(4e-3)
-    assert second["measures"]["Sq"]["value"] == pytest.approx(1e-9, rel=0.2) and second["shape"] == [12, 16]
+    rows = np.random.default_rng(1).normal(0, 1, (12, 16))  # those of `scan`
+    across, down = np.meshgrid(np.arange(16.0), np.arange(12.0))
+    plane = np.column_stack([np.ones(rows.size), across.ravel(), down.ravel()])
+    rest = rows.ravel() - plane @ np.linalg.lstsq(plane, rows.ravel(), rcond=None)[0]
+    assert second["measures"]["Sq"]["value"] == pytest.approx(1e-9 * np.sqrt((rest**2).mean()), rel=1e-9)
+    assert second["shape"] == [12, 16]
     window = json.loads(cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)["profiles"][0]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
     assert {"RzDin", "MaxDev", "ASH"} <= set(window["measures"])

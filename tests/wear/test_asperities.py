@@ -9,7 +9,7 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.surface.synthetic import SIGMA, report_area
-from patchfem.wear.asperities import anisotropy, band_amplitude, overlap_of, rub
+from patchfem.wear.asperities import anisotropy, overlap_of, periodic_amplitude, rub
 
 STEP = 3.2e-6
 UM = 1e-6
@@ -190,7 +190,7 @@ def test_exact_band_of_a_sine():
     x = STEP * np.arange(320)
     wave, long = 2 * np.pi * x * 13 / (320 * STEP), 2 * np.pi * x * 2 / (320 * STEP)
     z = np.tile(2 * UM * np.sin(wave + 0.3) + UM * np.cos(long), (5, 1))
-    assert band_amplitude(z, STEP, 1) == pytest.approx(2 * UM, rel=1e-12)
+    assert periodic_amplitude(z, STEP, 1) == pytest.approx(2 * UM, rel=1e-12)
 
 
 @pytest.mark.parametrize("change, message", [
