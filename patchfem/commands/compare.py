@@ -41,13 +41,15 @@ def compare(before: Path, after: Path, /, *other: Path, direction: str = "", uni
     directions = directions_of(parts)
     found = verdicts(parts, directions)
     target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"
-    target.mkdir(parents=True, exist_ok=True)
+    from ..export.results import Folder
+    from ..export.summary import write_json
     from ..export.surfaces import compare as paper
 
-    pressing = _pressed(scene, set_, parts[0], target, quiet) if scene is not None else None
-    data = paper.data_of(parts, found, directions, pressing)
-    paper.write_data(target / "compare.json", data)
-    paper.write_page(target / "report.html", parts, found, pressing)
+    with Folder(target) as folder:
+        pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None
+        data = paper.data_of(parts, found, directions, pressing)
+        write_json(data, folder.path / "compare.json")
+        paper.write_page(folder.path / "report.html", parts, found, pressing)
     for text in data["notes"]:
         say(f"note: {text}")
     if json_:
@@ -69,6 +71,6 @@ def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
         raise Refused(f"compare --scene {scene}: no [contact] in it; a surface is pressed into a patch")
     models = []
     for name, trace in zip(("before", "after"), surfaces(part)):
-        path = write_trace(target / f"{name}.csv", trace).resolve()
+        path = write_trace(target / f"surface_{name}.csv", trace).resolve()
         models.append(model_of(scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")))
     return pressed(*models, scene.name, None if quiet else say)

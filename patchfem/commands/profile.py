@@ -36,21 +36,20 @@ def profile(file: Path, /, *more: Path, cutoff: Length = "", window: Length = ""
             print("\n".join(lines_of(report, verbose)))
         for text in report.notes:
             say(f"note: {text}")
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        write_page(out / "report.html", reports)
-        (out / "profile.json").write_text(_as_json(reports, data_of) + "\n", encoding="utf-8")
-    if json_:
-        print(_as_json(reports, data_of))
-    elif out is not None:
-        print(f"results: {out}")
-
-
-def _as_json(reports: list, data_of) -> str:
     from .. import __version__
 
-    return json.dumps({"patchfem": __version__, "profiles": [data_of(one) for one in reports]}, ensure_ascii=False,
-                      allow_nan=False)
+    answer = {"patchfem": __version__, "profiles": [data_of(one) for one in reports]}
+    if out is not None:
+        from ..export.results import Folder
+        from ..export.summary import write_json
+
+        with Folder(out) as folder:
+            write_page(folder.path / "report.html", reports)
+            write_json(answer, folder.path / "profile.json")
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
+    elif out is not None:
+        print(f"results: {out}")
 
 
 def _length(name: str, text: str) -> float:

@@ -10,7 +10,8 @@ from pathlib import Path
 from ..core import Missing, PatchfemError
 
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml", "fields.pvd",
-         "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz")
+         "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
+         "compare.json", "surface_before.csv", "surface_after.csv", "profile.json")
 LOCK = ".writer"
 STATE = "wear.npz"  # of an interrupted run, from which it goes on
 

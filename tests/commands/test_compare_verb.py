@@ -92,7 +92,7 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
                found["lacking"])
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
-    alone = cli("run", tmp_path / "patch.toml", "--set", f"contact.profile.file={out / 'after.csv'}", "--json", "-o",
+    alone = cli("run", tmp_path / "patch.toml", "--set", f"contact.profile.file={out / 'surface_after.csv'}", "--json", "-o",
                 tmp_path / "alone")
     assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(peak["after"]["value"],
                                                                                       rel=1e-12)
@@ -154,3 +154,16 @@ def test_exact_the_pages_are_the_same_bytes(files, tmp_path):
         cli("compare", *files[:2], "-o", tmp_path / name)
         pages.append((tmp_path / name / "report.html").read_bytes())
     assert pages[0] == pages[1] and np.all([len(page) > 50000 for page in pages])
+
+
+@pytest.mark.parametrize("verb", ["compare", "profile"])
+def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
+    """Not even the measured files that lie there are touched."""
+    rows = "x [um],z [um]\n" + "".join(f"{k},{np.sin(k / 9):.4f}\n" for k in range(2000))
+    for name in ("before.csv", "after.csv"):
+        (tmp_path / "data" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "data" / name).write_text(rows)
+    files = [tmp_path / "data" / name for name in ("before.csv", "after.csv")]
+    answer = cli(verb, *files, "-o", tmp_path / "data")
+    assert answer.code == 2 and "not patchfem results" in answer.err
+    assert all(path.read_text() == rows for path in files) and len(list((tmp_path / "data").iterdir())) == 2

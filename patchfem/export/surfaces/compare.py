@@ -1,6 +1,5 @@
 """Before and after on paper: lines of text, plain data, traces that a scene can press, a page that stands alone."""
 
-import json
 from html import escape
 from pathlib import Path
 
@@ -123,11 +122,6 @@ def write_trace(path: Path, trace: Profile) -> Path:
     rows = "\n".join(f"{x:.6f},{z:.6f}" for x, z in zip((trace.x - middle) * 1e6, trace.z * 1e6))
     path.write_text(f"x [um],z [um]\n{rows}\n", encoding="utf-8")
     return path
-
-
-def write_data(path: Path, data: dict) -> None:
-    """Write the answer as JSON."""
-    path.write_text(json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def write_page(path: Path, parts: list, found: tuple, pressing: Pressed | None = None) -> None:
