@@ -92,8 +92,8 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
                found["lacking"])
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
-    alone = cli("run", tmp_path / "patch.toml", "--set", f"contact.profile.file={out / 'surface_after.csv'}", "--json", "-o",
-                tmp_path / "alone")
+    profile = f"contact.profile.file={out / 'surface_after.csv'}"
+    alone = cli("run", tmp_path / "patch.toml", "--set", profile, "--json", "-o", tmp_path / "alone")
     assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(peak["after"]["value"],
                                                                                       rel=1e-12)
 
