@@ -225,7 +225,8 @@ class BaseSine:
 class Measure:
     """One number with its unit, its numerical error (half-width; None where none is estimated) and what it means.
 
-    `str` of it is the value and its error, both rounded by the error: ``1.4808e-05 ± 4.4e-08 m``.
+    `str` of it is the value and its error, both rounded by the error: ``1.4808e-05 ± 4.4e-08 m``. reason: why there is
+    no value, where it is None.
     """
 
     value: float | None
@@ -233,8 +234,11 @@ class Measure:
     error: float | None = None
     floor: float = 0.0
     text: str = ""
+    reason: str = ""
 
     def __str__(self) -> str:
+        if self.value is None and self.reason:
+            return self.reason
         value, error = rounded(self.value, self.error)
         return " ".join([value, *(["±", error] if error else []), *([self.unit] if self.unit != "1" else [])])
 

@@ -116,7 +116,7 @@ def _turned(model: Model, knob: str):
 
 
 def _sized(model: Model, size: float | None) -> Model:
-    return replace(model, patch=model.patch.sized(size, model.kind))
+    return replace(model, patch=model.patch.sized(size))
 
 
 def _timed(turned, label: str, value, say, estimate: bool = False):

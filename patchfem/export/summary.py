@@ -6,12 +6,16 @@ from pathlib import Path
 
 
 def measure_object(measure) -> dict:
-    """The object {"value", "unit", "error", "floor"} of a Measure; a value that is not finite becomes null."""
+    """The object {"value", "unit", "error", "floor"} of a Measure; a value that is not finite becomes null.
+
+    A measure without a value has its "reason" beside it.
+    """
     def clean(number):
         return None if number is None or not math.isfinite(number) else float(number)
 
-    return {"value": clean(measure.value), "unit": measure.unit, "error": clean(measure.error),
-            "floor": float(measure.floor)}
+    out = {"value": clean(measure.value), "unit": measure.unit, "error": clean(measure.error),
+           "floor": float(measure.floor)}
+    return {**out, "reason": measure.reason} if measure.reason else out
 
 
 def summary(version: str, title: str, kind: str, outcome: str, measures: dict, effects: list, absent: list,

@@ -1,6 +1,7 @@
-"""Columns of a piece graded towards the places where the pressure ends or a corner is loaded."""
+"""Columns and rows of a piece graded towards the places where the pressure or the stress changes fastest."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -9,16 +10,16 @@ from ..core import frozen_array
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Layout:
-    """Wanted cell lengths along the interface of `length` [m], 0 in the middle.
+    """Wanted cell lengths on the stretch from `start` to `stop` [m].
 
-    A cell is `least` [m] at each of the `places` (p,) and grows by `slope` per distance from them, up to `inside` [m]
-    within the loaded `span` (from, to) [m] and `largest` [m] away from it.
+    bands: (from, to, least) [m] each: a cell is `least` long within the band and grows by `slope` per distance from it,
+    up to `inside` [m] within the loaded `span` (from, to) [m] and `largest` [m] away from it.
     """
 
-    length: float
-    places: tuple
+    start: float
+    stop: float
+    bands: tuple
     span: tuple
-    least: float
     inside: float
     largest: float
     slope: float
@@ -27,30 +28,61 @@ class Layout:
         """Wanted cell length (k,) [m] of the layout at x (k,) [m]."""
         x = np.asarray(x, float)
         out = np.full(x.shape, self.largest)
-        for place in self.places:
-            out = np.minimum(out, self.least + self.slope * np.abs(x - place))
-        beside = np.maximum(0.0, np.maximum(self.span[0] - x, x - self.span[1]))
-        return np.minimum(out, self.inside + self.slope * beside)
+        for low, high, least in self.bands:
+            out = np.minimum(out, least + self.slope * _beside(x, low, high))
+        return np.minimum(out, self.inside + self.slope * _beside(x, *self.span))
 
     def times(self, share: float) -> "Layout":
         """The layout whose cells are `share` [1] as long everywhere; its slope is taken with it."""
-        return replace(self, least=self.least * share, inside=self.inside * share, largest=self.largest * share,
+        bands = tuple((low, high, least * share) for low, high, least in self.bands)
+        return replace(self, bands=bands, inside=self.inside * share, largest=self.largest * share,
                        slope=self.slope * share)
 
 
-def columns(layout: Layout, times: int = 1) -> np.ndarray:
-    """Columns (k,) [m] of a layout, each of its cells split into `times`; an even number of cells.
+def _beside(x, low: float, high: float) -> np.ndarray:
+    return np.maximum(0.0, np.maximum(low - x, x - high))
 
-    Columns stand at equal steps of the integral of 1/size, so neighbouring cells differ by about the slope at most.
+
+def levels(layout: Layout, even: bool = False, least: int = 1) -> np.ndarray:
+    """Places (k,) [m] that cut the stretch of a layout into its cells, both ends included.
+
+    They stand at equal steps of the integral of 1/size, so neighbouring cells differ by about the slope at most. even:
+    an even number of cells; least: fewest cells.
     """
-    half, ends = layout.length / 2, 400
-    reach = np.concatenate([[0.0], np.geomspace(layout.least / 16, layout.length, ends)])
-    near = [place + side * reach for place in layout.places for side in (-1, 1)]
-    # points of the integral: geometric about every place, where 1/size is steep
-    s = np.unique(np.clip(np.concatenate([np.linspace(-half, half, 2001), *near]), -half, half))
+    long = layout.stop - layout.start
+    near = []
+    for low, high, size in layout.bands:
+        reach = np.concatenate([[0.0], np.geomspace(size / 16, max(long, size), 400)])
+        near += [low - reach, high + reach]
+    # points of the integral: geometric about every band, where 1/size is steep
+    s = np.unique(np.clip(np.concatenate([np.linspace(layout.start, layout.stop, 2001), *near]), layout.start,
+                          layout.stop))
     rate = 1 / layout.size(s)
     count = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(s))])
-    cells = max(4, 2 * int(np.ceil(count[-1] / 2 - 1e-6))) * times
+    cells = max(least, int(np.ceil(count[-1] - 1e-6)))
+    if even:
+        cells = 2 * int(np.ceil(max(least, count[-1] - 1e-6) / 2))
     x = np.interp(np.linspace(0, count[-1], cells + 1), count, s)
-    x[0], x[-1] = -half, half
+    x[0], x[-1] = layout.start, layout.stop
     return frozen_array(x)
+
+
+def columns(layout: Layout, through=()) -> np.ndarray:
+    """Columns (k,) [m] of a layout: an even number of cells, four at least, with a column at each place `through`."""
+    inner = sorted(place for place in through if layout.start < place < layout.stop)
+    cuts = [layout.start, *inner, layout.stop]
+    parts = [levels(replace(layout, start=low, stop=high), True, 2 if inner else 4) for low, high in pairwise(cuts)]
+    return frozen_array(np.concatenate([parts[0], *(part[1:] for part in parts[1:])]))
+
+
+def rows(layout: Layout, coating: float) -> tuple:
+    """Depths (k,) [m] of a layout from the interface to the far face, and the number of rows in the coating.
+
+    coating [m]: a row ends at this depth; two rows at least lie in the coating, three below it.
+    """
+    parts, coated = [], 0
+    if coating > 0:
+        parts = [levels(replace(layout, stop=layout.start + coating), least=2)[:-1]]
+        coated = parts[0].size
+    under = levels(replace(layout, start=layout.start + coating), least=3)
+    return frozen_array(np.concatenate([*parts, under])), coated

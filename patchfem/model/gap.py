@@ -36,6 +36,11 @@ class Gap:
         """Angle [rad] at which a tilted upper piece is held."""
         return next((part.angle for name, part in self.shapes if name == "tilt" and part.on == "upper"), 0.0)
 
+    @property
+    def jumps(self) -> tuple:
+        """Places [m] where the gap jumps, at the edge of a step."""
+        return tuple(part.at for name, part in self.shapes if name == "step")
+
     def at(self, x) -> tuple:
         """Gap of the unloaded surfaces (m,) [m] at x (m,) [m], with notes for the user and seconds by shape."""
         gap, seconds, notes = np.zeros(x.size), {}, ()

@@ -142,11 +142,9 @@ def _law(scene: Scene) -> tuple:
 def resolved(scene: Scene, model: Model) -> str:
     """The scene as TOML in SI with every default written out.
 
-    Those that follow from other keys take part: the element size of an automatic mesh and the floor of the speed.
+    Those that follow from other keys take part: the floor of the speed.
     """
-    contact, friction = scene.contact, scene.friction
-    if contact is not None and (contact.element_size, contact.mesh) == (None, None) and not model.patch.chosen:
-        contact = contact.model_copy(update={"element_size": model.patch.size})
+    friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
         friction = friction.model_copy(update={"rest_speed": model.bonds.rest_speed})
-    return replace(scene, contact=contact, friction=friction).resolved()
+    return replace(scene, friction=friction).resolved()

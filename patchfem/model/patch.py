@@ -7,8 +7,8 @@ from pathlib import Path
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from .gap import Gap, gap_asked
 
-CHOSEN_POINTS = 300  # about what a static patch takes at the default tolerance
-AUTOMATIC_CELLS = 200  # along the interface where neither the scene nor the tolerance decides
+CHOSEN_POINTS = 160  # about what a patch takes at the default tolerance
+AUTOMATIC_CELLS = 200  # along the interface: down to this length a profile stands for content
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,8 @@ class PatchModel:
 
     length, width, height [m], the last of a piece that names none; pairs: equal patches that share the load; plane:
     "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface; None lets
-    the tolerance choose where `chosen`, else length/AUTOMATIC_CELLS; mesh: file of the two pieces. load [N] or approach
+    the tolerance choose; mesh: file of the two pieces; still: nothing of the patch moves, so that all the time there is
+    may be spent on it. load [N] or approach
     [m], the other None. offset [m] and line_moment [N m] of a load line; rotates: the upper piece is free to turn;
     spring [N m/rad] and slide_spring [N/m, None: rigid] of the holder. skin: asperities; strips: (count, roll [rad]);
     shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by part, as the
@@ -51,7 +52,7 @@ class PatchModel:
     upper: OnePiece
     gap: Gap
     element_size: float | None
-    chosen: bool
+    still: bool
     mesh: Path | None
     load: float | None
     approach: float | None
@@ -71,6 +72,11 @@ class PatchModel:
         return self.lower == self.upper
 
     @property
+    def chosen(self) -> bool:
+        """Whether the tolerance chooses the mesh."""
+        return self.element_size is None and self.mesh is None
+
+    @property
     def size(self) -> float:
         """Element size [m] of an even interface: that of the scene, or the automatic one."""
         return self.element_size or self.length / AUTOMATIC_CELLS
@@ -82,13 +88,9 @@ class PatchModel:
             return self.load
         return self.approach / bars(self, lambda m: (1 - m.poisson**2) / m.young)
 
-    def sized(self, size: float | None, kind: str = "") -> "PatchModel":
-        """The patch with another element size [m].
-
-        None: that of the tolerance in a run of kind "patch" without a mesh file or a profile, else the automatic one.
-        """
-        chosen = size is None and kind == "patch" and self.mesh is None and self.gap.profile is None
-        found = replace(self, element_size=size, chosen=chosen)
+    def sized(self, size: float | None) -> "PatchModel":
+        """The patch with another element size [m]; None: the mesh that the tolerance chooses."""
+        found = replace(self, element_size=size)
         profile = None if self.mesh is not None else found.size
         return replace(found, gap=replace(self.gap, profile_size=profile))
 
@@ -104,11 +106,10 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
     """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names."""
     size = None if contact.mesh is not None else contact.element_size or contact.length / AUTOMATIC_CELLS
     line, holder, strips = contact.load_line, contact.holder, contact.strips
-    chosen = kind == "patch" and (contact.element_size, contact.mesh, contact.profile) == (None, None, None)
     return PatchModel(
         contact.length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate,
         _piece(contact, contact.lower),
-        _piece(contact, contact.upper), gap_asked(contact, size, beside), contact.element_size, chosen,
+        _piece(contact, contact.upper), gap_asked(contact, size, beside), contact.element_size, kind == "patch",
         beside(contact.mesh) if contact.mesh is not None else None, contact.load,
         contact.approach.distance if contact.approach is not None else None,
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,

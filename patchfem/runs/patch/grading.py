@@ -1,143 +1,108 @@
-"""The mesh that a static patch needs: graded to where its own pressure ends, as fine as its tolerance asks for."""
+"""The mesh that a patch needs: graded to where its own pressure ends, to its corners and its coating.
+
+The coarsest grid follows from the patch alone. Every next one splits all its cells in two, so the meshes of a tighter
+tolerance are those of a wider one and more. How far the ladder is climbed is decided in `ladder`.
+"""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from ...core import Outcome, frozen_array
-from ...mesh.grading import Layout, columns
-from ...mesh.tensor import TensorGrid, finer, graded_depth
+from ...core import frozen_array
+from ...mesh.grading import Layout, columns, rows
+from ...mesh.tensor import TensorGrid
 from .condensed import condensed
-from .measures import measures, order
 from .press import Patch, pressed
+from .values import found_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
-MOST_COLUMNS = 400  # of the finest grid
-MOST_WORK = 1e11  # floating-point operations of condensing the finest grids, some five seconds
+MOST_COLUMNS = 120  # of the coarsest grid
+SLOPE = 0.5  # growth of the cells of the coarsest grid per distance
+EDGE = 20  # cells of the coarsest grid along the contact, at its edges
 LEAST = 4e-9  # of the length: the shortest cell of the coarsest grid, some tens of picometres
+JUMP = 8  # cells at a step of the gap in one cell at an edge
 MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay even
-GROWTH = 1.25  # of the rows on the coarsest grid
-DECISIVE = ("pressure_peak", "contact_fraction", "normal_stiffness", "rotation")
+SEARCHES = 8  # of the contact, each on columns graded to what the one before found
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Base:
-    """Recipe of the coarsest grids of a patch: the layout of their columns and the growth of their rows."""
+class Found:
+    """What a search finds of a contact.
 
-    layout: Layout
-    growth: float = GROWTH
-
-    def shrunk(self, share: float) -> "Base":
-        """The base whose cells are `share` as long in both directions."""
-        return Base(self.layout.times(share), self.growth**share)
-
-
-def solve_graded(asked, tolerance: float, fresh: bool = False) -> tuple:
-    """Press a patch on a mesh whose decisive measures have the tolerance, and on two coarser ones.
-
-    Returns the Patch on that mesh, with cells twice as long and four times as long. Three meshes tell by how much their
-    cells must shrink. They are halved, or all three are made anew where less is enough. A measure that the largest
-    affordable mesh would not bring to the tolerance, such as the singular peak of a step, asks for nothing; a warning
-    of the run names it.
+    span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface or a step lies;
+    corners: ends of the interface that bear; cell: longest cell [m] in which it ends.
     """
-    base = _affordable(asked, _base(asked, tolerance))
-    series = _series(asked, base, fresh)
-    while True:
-        share = _share(tolerance, series)
-        if share >= 1 or max(share, 0.5) < _reach(_own(series[0])):
-            return series
-        if share > 0.55:
-            base = base.shrunk(share)
-            series = _series(asked, base, fresh)
-        else:
-            base = base.shrunk(0.5)
-            series = (_finer(asked, series[0], fresh), *series[:2])
+
+    span: tuple
+    places: tuple
+    corners: tuple
+    cell: float
+
+    @property
+    def wide(self) -> float:
+        """Length of the loaded stretch [m]."""
+        return self.span[1] - self.span[0]
 
 
-def _series(asked, base: Base, fresh: bool) -> tuple:
-    out = [_on(asked, _grids(asked, columns(base.layout), base.growth), fresh)]
-    for _ in range(2):
-        out.append(_finer(asked, out[-1], fresh))
-    return tuple(out[::-1])
+def base_grids(asked, sweep=()) -> list:
+    """The coarsest grids of a `PatchModel`, one where its pieces are alike, graded to the contact that they find.
 
-
-def _finer(asked, patch: Patch, fresh: bool) -> Patch:
-    return _on(asked, [finer(grid) for grid in _own(patch)], fresh)
-
-
-def _own(patch: Patch) -> tuple:
-    """The grids of a patch, one where the pieces are alike."""
-    low, high = patch.pair.grid, patch.pair.upper_grid
-    return (low,) if high is low else (low, high)
-
-
-def _on(asked, grids, fresh: bool = False) -> Patch:
-    return pressed(asked, condensed(asked, *grids, fresh=fresh))
-
-
-def _share(tolerance: float, series) -> float:
-    """Factor by which the cells must shrink for the decisive measures that can get the tolerance; 1 where none asks."""
-    if series[0].pressure.outcome is Outcome.NO_CONTACT:
-        return 1.0
-    found, reach, out = measures(*series), _reach(_own(series[0])), 1.0
-    orders = order(*series)
-    for name in DECISIVE:
-        error, wanted = found[name].error, tolerance * abs(found[name].value) + 1e-12
-        share = 0.95 * (wanted / error)**(1 / orders[name]) if error > wanted else 1.0
-        if share >= reach:
-            out = min(out, share)
-    return out
-
-
-def _affordable(asked, base: Base) -> Base:
-    """The base, with longer cells where splitting them twice would already take too much work."""
-    grids = _grids(asked, columns(base.layout), base.growth)
-    return base.shrunk(max(1.0, 4 * _reach(grids)))
-
-
-def _reach(grids) -> float:
-    """Factor by which the cells of a patch can shrink at most before its grids grow too large.
-
-    The work of condensing falls on columns rows^3 and columns^2 rows^2, so it grows by the fourth power.
+    sweep: other patch models that the same grids shall serve, such as the extremes of a load that varies; the columns
+    are then fine over the band that each edge sweeps.
     """
-    work = sum(16.0 * g.x.size * g.depth.size**2 * (3 * g.depth.size + g.x.size) for g in grids)
-    return max(grids[0].x.size / MOST_COLUMNS, (work / MOST_WORK)**0.25)
-
-
-def _base(asked, tolerance: float) -> Base:
-    """The coarsest grids, their columns graded to the contact that they find."""
-    size = asked.length
-    layout = Layout(size, (), (-size / 2, size / 2), size / SEARCH_CELLS, size / SEARCH_CELLS, size / SEARCH_CELLS, 0.0)
-    for _ in range(8):
-        found = _loaded(_on(asked, _grids(asked, columns(layout), GROWTH)))
-        if found is None:
+    cell = asked.size if asked.gap.profile is not None else asked.length / SEARCH_CELLS
+    layout = Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
+    found = None
+    for _ in range(SEARCHES):
+        grids = _grids(asked, layout, found)
+        pair = condensed(asked, *grids)
+        seen = [one for one in (_loaded(pressed(each, pair)) for each in (asked, *sweep)) if one is not None]
+        if not seen:
             break
-        span, places, cell = found
-        layout = _layout(size, span, places, tolerance)
-        if cell <= (span[1] - span[0]) / 64:  # the places are known better than the coarsest cells there
+        found = seen[0]
+        layout = _layout(asked, seen)
+        if max(one.cell / one.wide for one in seen) <= 1 / (EDGE - 1):
             break
-    return Base(layout)
+    return _grids(asked, layout, found)
 
 
-def _layout(length: float, span, places, tolerance: float) -> Layout:
-    """Layout of the coarsest columns, with the finest cells where the contact ends.
+def _layout(asked, seen: list) -> Layout:
+    """Layout of the coarsest columns for the contacts `seen`, finest where one ends."""
+    half, span = asked.length / 2, (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
+    wide, thick = min(one.wide for one in seen), _coating(asked)
+    # the third mesh has cells no longer than what a profile may hold
+    most = asked.length / 12 if asked.gap.profile is None else 4 * asked.size
+    if max(len(one.places) for one in seen) > MOST_PLACES:
+        return Layout(-half, half, (), span, *(2 * [min(asked.length / 64, most)]), 0.0)
+    inside = min(wide / 6, asked.length / 24, most)
+    least = max(min(wide / EDGE, thick / 4 if thick else np.inf), LEAST * asked.length)
+    bands = _bands([one.places for one in seen], least)
+    # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
+    bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
+    corner = max(min(thick / 8 if thick else np.inf, wide / EDGE), LEAST * asked.length)
+    ends = {place for one in seen for place in one.corners}
+    bands += tuple((place, place, corner) for place in sorted(ends))
+    # the far corners, where a free side meets the holder
+    bands += tuple((side * half, side * half, min(asked.height, asked.length) / 20) for side in (-1, 1))
+    return Layout(-half, half, bands, span, max(inside, least), most, SLOPE)
 
-    An edge of the contact is known to about half a cell of the finest mesh, which is a quarter as long.
-    """
-    wide = span[1] - span[0]
-    if len(places) > MOST_PLACES:
-        return Layout(length, (), span, length / 64, length / 64, length / 64, 0.0)
-    inside = min(wide / 6, length / 24)
-    least = max(min(inside / 64, tolerance * wide), inside / 800, LEAST * length)
-    return Layout(length, tuple(places), tuple(span), least, max(inside, least), length / 12, 0.6)
+
+def _bands(places: list, least: float) -> tuple:
+    """Bands of the edges: each spans what it sweeps from one contact to the next, where their number stays."""
+    if len({len(each) for each in places}) == 1:
+        return tuple((min(sweep), max(sweep), least) for sweep in zip(*places, strict=True))
+    return tuple((place, place, least) for each in places for place in each)
 
 
-def _loaded(patch: Patch) -> tuple | None:
-    """Extent of the loaded interval: (its span, places where it ends or a corner is loaded, largest cell at such an
-    end).
+def _coating(asked) -> float:
+    """Thickness [m] of the thinner coating, 0 where neither piece has one."""
+    return min((piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0)
 
-    None where nothing touches. Of a smooth skin the part that bears a thousandth of the largest pressure counts.
+
+def _loaded(patch: Patch) -> Found | None:
+    """Extent of the contact of a patch; None where nothing touches.
+
+    Of a smooth skin the part that bears a thousandth of the largest pressure counts.
     """
     x, sigma = patch.x, patch.pressure.sigma_n
     if not (sigma > 0).any():
@@ -145,28 +110,38 @@ def _loaded(patch: Patch) -> tuple | None:
     strips = patch.strips.pressure if patch.strips is not None else sigma[None]
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
+    low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
     if index.size < 4 and index.size < x.size:  # a point of contact between a few nodes: look closer around it
-        low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
-        return (float(low), float(high)), x[index].tolist(), np.inf
+        return Found((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
-    ends, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]
-    corners = [x[at] for at in (0, -1) if bears[:, at].any()]
-    low, high = (x[k] if k in (0, x.size - 1) else place for k, place in ((index[0], ends[:1]), (index[-1], ends[-1:])))
-    return (float(np.squeeze(low)), float(np.squeeze(high))), [*corners, *ends.tolist()], float(cells.max(initial=0.0))
+    places, cells = (x[changes] + x[changes + 1]) / 2, np.diff(x)[changes]
+    found = found_ends(patch)
+    if len(found) == changes.size:
+        places = np.array([end.place for end in found])
+    corners = tuple(float(x[at]) for at in (0, -1) if bears[:, at].any())
+    low = places[0] if index[0] else x[0]
+    high = places[-1] if index[-1] < x.size - 1 else x[-1]
+    return Found((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)))
 
 
-def _grids(asked, x, growth: float) -> list:
+def _grids(asked, layout: Layout, found: Found | None) -> list:
     pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
-    return [_grid(asked, x, piece, growth) for piece in pieces]
+    x = columns(layout, asked.gap.jumps)
+    while x.size > MOST_COLUMNS + 1 and layout.bands:
+        layout = layout.times(x.size / MOST_COLUMNS)
+        x = columns(layout, asked.gap.jumps)
+    return [_grid(asked, x, piece, found) for piece in pieces]
 
 
-def _grid(asked, x, piece, growth: float) -> TensorGrid:
-    depth, rows = graded_depth(piece.height, float(np.diff(x).min()), piece.thickness, growth, 2)
-    most = max(asked.length / 4, piece.height / 24) * np.log(growth) / np.log(GROWTH)
-    return TensorGrid(frozen_array(x), _no_taller(depth, most), rows)
-
-
-def _no_taller(depth, most: float) -> np.ndarray:
-    """Depths whose rows below the coating are split evenly where taller than `most` [m]: a tall piece bends."""
-    parts = [np.linspace(a, b, max(1, int(np.ceil((b - a) / most - 1e-9))) + 1)[1:] for a, b in pairwise(depth)]
-    return frozen_array(np.concatenate([depth[:1], *parts]))
+def _grid(asked, x, piece, found: Found | None) -> TensorGrid:
+    """Grid of one piece: rows as fine as the columns at the interface, at the coating's own face and at the holder."""
+    thick, height = piece.thickness, piece.height
+    top = float(np.diff(x).min())
+    # a tall piece bends: a row stays below a twenty-fourth of its height
+    cap = min(max(asked.length / 10, height / 24), height / 6)
+    bands = [(0.0, 0.0, top), (height, height, min(height, asked.length) / 60)]
+    if thick:
+        bands.append((thick, thick, max(thick / 4, top)))
+    layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE)
+    depth, coated = rows(layout, thick)
+    return TensorGrid(frozen_array(x), depth, coated)

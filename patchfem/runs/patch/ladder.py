@@ -1,10 +1,16 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
+from ...core import Outcome
 from ...mesh.tensor import TensorGrid, coarser, finer
 from ...model.pieces import bodies_of
-from .grading import solve_graded
-from .press import solve
+from .condensed import condensed
+from .grading import base_grids
+from .measures import measures, met
+from .press import pressed, solve
 from .values import values
+
+LEAST_LEVELS = 3  # nested meshes that show an order
+MOST_WORK = {True: 6e9, False: 1.5e9}  # flop of the finest mesh: of a static patch, of one that moves
 
 
 def solve_split(asked, level: int) -> tuple:
@@ -24,14 +30,14 @@ def _halved(body):
 
 
 def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """A patch on its mesh and on meshes twice and four times as coarse, None for those that are not wanted.
+    """A patch on its mesh and on coarser ones, fine to coarse; two of them at least, None where one is not wanted.
 
-    A static patch whose element size is neither pinned nor decided by a profile gets the mesh that `tolerance` asks
-    for. A mesh of any cells has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense
-    anew, whatever is kept on disk.
+    A patch whose element size is not pinned climbs a ladder of nested meshes to its `tolerance`. A mesh of any cells
+    has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense anew, whatever is kept
+    on disk.
     """
-    if estimate and asked.chosen:
-        return solve_graded(asked, tolerance, fresh)
+    if asked.chosen:
+        return climbed(asked, tolerance, estimate, fresh)
     low, high = bodies_of(asked)
     out = [solve(asked, low, high, fresh), None, None]
     if not estimate or low.x.size <= 8:
@@ -44,3 +50,29 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
             low, high = coarser(low), coarser(high) if high is not None else None
             out[k] = solve(asked, low, high, fresh)
     return tuple(out)
+
+
+def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+    """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
+
+    The climb ends where the next mesh would take more than the work that is spent on a patch. Without an estimate it is
+    the third mesh, and nothing is solved on the others.
+    """
+    grids, out = base_grids(asked), []
+    while True:
+        if estimate or len(out) == LEAST_LEVELS - 1:
+            out.insert(0, pressed(asked, condensed(asked, *grids, fresh=fresh)))
+        else:
+            out.insert(0, None)
+        grids = [finer(grid) for grid in grids]
+        if len(out) < LEAST_LEVELS:
+            continue
+        nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
+        if not estimate or nothing or work(grids) > MOST_WORK[asked.still] or met(measures(*out, tolerance=tolerance),
+                                                                                  tolerance):
+            return tuple(out)
+
+
+def work(grids) -> float:
+    """About how many floating-point operations it takes to condense the grids of a patch."""
+    return sum(60.0 * (grid.x.size * grid.depth.size)**1.5 for grid in grids)

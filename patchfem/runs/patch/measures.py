@@ -8,13 +8,17 @@ import numpy as np
 from ...core import Measure
 from ...mesh.tensor import TensorGrid
 from ..results.patch_rows import TABLE
+from .limits import limit
 from .press import Patch, pressed, solve
 from .values import edge_cells, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
-GROWING, SLOWEST, DOUBTFUL, SECOND, LUCKY = 1.3, 1.5, 2.5, 4.0, 6.0  # ratios of successive changes that are believed
-FEW = 3  # nodes of a contact that no mesh of these cells resolves
+FEW = 12  # nodes of a contact below which their number is felt
+POINT = 3  # nodes of a contact that no mesh of these cells resolves
 ROUND = 5e-12  # round-off, relative
+ALIKE = 1e-9  # relative error that nobody asks to be below
+DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
+OFFSET = 0.03  # cells by which an edge found between nodes lies off on cells that are not square
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
@@ -53,90 +57,69 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     return {name: replace(m, error=m.error + abs(here[name] - half[name])) for name, m in found.items()}
 
 
-def remainder(last: float, before: float, nested: bool = False) -> float:
-    """Rest of a converging series: what is still to come after the changes `before` and `last` under two halvings of
-    the mesh.
-
-    The series is geometric. Its ratio is taken from the changes, no worse than 1.5 (1.3 where the changes grow) and no
-    better than 2.5. Second order, a ratio of 4, is believed where every cell was halved (`nested`), the changes have
-    one sign and their ratio is below 6. A last change may be small by chance, its parts against one another; it counts
-    as what the first one leaves.
-    """
-    best = SECOND if nested and last * before > 0 and abs(before) < LUCKY * abs(last) else DOUBTFUL
-    before = abs(before)
-    last = max(abs(last), before / best)
-    ratio = min(max(before / last, SLOWEST if before > last else GROWING), best) if last > 0 else best
-    return last / (ratio - 1)
-
-
-def measures(fine: Patch, coarse: Patch | None, coarsest: Patch | None = None) -> dict:
+def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
     """Static measures of a patch by name, each with its error.
 
-    The error is three times what the changes between the three meshes leave to come (`remainder`) and what the snapping
-    of the contact edges to nodes costs; it is at least what no change between meshes shows.
+    coarse: the patch on coarser meshes, the finest of them first; None without one. A value is that of the finest mesh,
+    and its error what the change from mesh to mesh leaves to come (`limits`) with what no change of the mesh shows.
+    tolerance: of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
     """
-    mine = values(fine)
-    floors = _floors(fine)
-    if coarse is None:
-        return {name: Measure(value, TABLE[name].unit, None, floors[name]) for name, value in mine.items()}
-    nested = coarsest is not None and _halved(fine, coarse) and _halved(coarse, coarsest)
-    snap, least, out = _snap(fine, mine), _least(fine, mine), {}
-    for name, (last, before) in _changes(fine, coarse, coarsest).items():
-        error = 3 * remainder(last, before, nested) + snap.get(name, 0.0)
-        error = max(error, least.get(name, 0.0), 1e-12 * abs(mine[name])) if mine["normal_load"] > 0 else 0.0
-        out[name] = Measure(mine[name], TABLE[name].unit, float(error), floors[name])
+    series, mine, floors = [one for one in coarse if one is not None], values(fine), _floors()
+    if not series:
+        return _bounded(fine, {name: Measure(value, TABLE[name].unit, None, floors[name])
+                               for name, value in mine.items()})
+    found, least, out = [values(one) for one in reversed(series)], _least(fine, mine), {}
+    nested = all(_halved(a, b) for a, b in pairwise((fine, *series)))
+    for name, value in mine.items():
+        if not mine["normal_load"] > 0:
+            out[name] = Measure(value, TABLE[name].unit, 0.0, floors[name])
+            continue
+        seen = limit([*(one[name] for one in found), value], nested)
+        wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
+        best, error = seen.best(wanted)
+        error = max(error, least.get(name, 0.0), ALIKE * abs(value))
+        out[name] = Measure(float(best), TABLE[name].unit, float(error), floors[name])
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
-    return out
+    return _bounded(fine, out)
+
+
+def met(found: dict, tolerance: float) -> bool:
+    """Whether the decisive measures of a patch have errors within the tolerance; a measure without a value has."""
+    return all(found[name].value is None or found[name].error <= tolerance * abs(found[name].value) + found[name].floor
+               for name in DECISIVE)
+
+
+def _bounded(fine: Patch, found: dict) -> dict:
+    """The measures without the numbers that no mesh bounds: the peak beside a step that bears, or at a free corner."""
+    why = _unbounded(fine)
+    if not why:
+        return found
+    return found | {name: replace(found[name], value=None, error=None, reason=why)
+                    for name in ("pressure_peak", "loaded_fraction") if name in found}
+
+
+def _unbounded(patch: Patch) -> str:
+    """Why the pressure of a patch has no bound, "" where it has one.
+
+    A pressure that ends at the edge of a step is that of a punch with a sharp corner, and across a step that is closed
+    it is worse. A skin yields at its peaks, so behind one the pressure stays bounded.
+    """
+    if patch.pieces is not patch.pair.compliance or patch.skin is not None:
+        return ""
+    x, cells = patch.x, np.diff(patch.x)
+    bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active
+    for place in patch.jumps:
+        beside = np.abs(x - place) <= 1.5 * cells[np.clip(np.searchsorted(x, place), 1, cells.size) - 1]
+        if bears[beside].any():
+            return f"unbounded: the contact reaches the edge of the step at {place:.4g} m, a sharp corner"
+    return ""
 
 
 def _of_peak(fraction: Measure, peak: Measure) -> Measure:
     """The loaded fraction with at least the relative error of the peak that it is divided by."""
     share = peak.error / peak.value
     return replace(fraction, error=max(fraction.error, fraction.value * share / (1 - min(share, 0.5))))
-
-
-def order(fine: Patch, coarse: Patch, coarsest: Patch) -> dict:
-    """Power of the cell length with which the error of each measure falls, by name, from 1/2 to 2; 1 where unknown.
-
-    fine, coarse, coarsest: the patch on three meshes, each of cells about twice as long as the one before.
-    """
-    changes = {name: np.abs(pair) for name, pair in _changes(fine, coarse, coarsest).items()}
-    return {name: float(np.clip(np.log2(before / last), 0.5, 2.0)) if last > 0 and before > 0 else 1.0
-            for name, (last, before) in changes.items()}
-
-
-def _changes(fine: Patch, coarse: Patch, coarsest: Patch | None) -> dict:
-    """Changes of each measure, by name: from the coarse mesh to the fine one and from the coarsest to the coarse one.
-
-    They are taken less a quarter of what the contact edges leave open on both meshes; the second is 0 without a
-    coarsest mesh.
-    """
-    found = [values(patch) for patch in (fine, coarse, coarsest) if patch is not None]
-    snaps = [_snap(patch, value) for patch, value in zip((fine, coarse, coarsest), found, strict=False)]
-    out = {}
-    for name in found[0]:
-        steps = [a[name] - b[name] for a, b in pairwise(found)]
-        noise = [(a.get(name, 0.0) + b.get(name, 0.0)) / 4 for a, b in pairwise(snaps)]
-        left = [float(np.sign(step) * max(0.0, abs(step) - cut)) for step, cut in zip(steps, noise, strict=True)]
-        out[name] = (*left, 0.0)[:2]
-    return out
-
-
-def _snap(patch: Patch, mine: dict) -> dict:
-    """Uncertainty of the measures that count nodes: what a contact edge between two nodes leaves open.
-
-    There is none for a smooth skin, whose pressure has no edge.
-    """
-    cell, length = _cell(patch), patch.pieces.interface.length
-    if not cell or patch.skin is not None:
-        return {}
-    few = cell * (1 + 2 / max(patch.active.sum(), 1))
-    share = few / max(2 * cell, mine["contact_fraction"] * length)
-    return {"contact_fraction": 2.5 * few / length, "contact_half_width": 1.25 * few,
-            "normal_stiffness": share * mine["normal_stiffness"],
-            "tangential_stiffness": share / 2 * mine["tangential_stiffness"],
-            "rotational_stiffness": 3 * share / 2 * mine["rotational_stiffness"]}
 
 
 def _halved(fine: Patch, coarse: Patch) -> bool:
@@ -152,10 +135,9 @@ def _cell(patch: Patch) -> float:
     return float(max(cells.max(), cells.sum() / 2)) if cells.size else 0.0
 
 
-def _floors(fine: Patch) -> dict:
-    """Floor of the error of each measure, by name: that of its row, one cell of the mesh for the share in contact."""
-    cell = max(_cell(fine), np.diff(fine.x).min()) / fine.pieces.interface.length
-    return {name: row.floor for name, row in TABLE.items()} | {"contact_fraction": cell}
+def _floors() -> dict:
+    """Floor of the error of each measure, by name."""
+    return {name: row.floor for name, row in TABLE.items()}
 
 
 def _least(patch: Patch, mine: dict) -> dict:
@@ -166,15 +148,17 @@ def _least(patch: Patch, mine: dict) -> dict:
     """
     length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
     count = max(int(patch.active.sum()), 1)
-    aside = cell / (2 * count**2) if count <= FEW else 0.0
+    aside = cell / (2 * count**2) if count <= POINT else 1e-3 * cell
     turns = "moment_balance" in patch.pressure.residuals
-    peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell else 0.0)
-    if count <= FEW and cell:
+    peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
+    if count <= POINT and cell:
         peak = max(peak, _wedge(patch))
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
-    return {"normal_load": 1e-10 * load, "pressure_peak": peak, "loaded_fraction": peak * fullness,
+    off = OFFSET * edge_cells(patch.x, patch.active).sum() * (1 + (count <= POINT)) if patch.skin is None else 0.0
+    return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
+            "contact_half_width": off / 2, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
             "rotation": turned / length, "approach": ROUND * (np.ptp(patch.gap) + moved)}
 

@@ -33,6 +33,7 @@ class Patch:
     skin: object
     strips: object
     tangential_ratio: float | None
+    jumps: tuple
     notes: tuple
     seconds: dict
 
@@ -78,7 +79,8 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
         notes = (*notes, strips.note)
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
         notes = (*notes, f"contact.mesh: {pair.joint.reason}")
-    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, notes, pair.seconds | seconds)
+    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, asked.gap.jumps, notes,
+                 pair.seconds | seconds)
 
 
 def presser(asked, pair: Pair):

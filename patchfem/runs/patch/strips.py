@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...contact import edges
 from ...contact.skin_laws import LinearSkin
 from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from ...contact.strips_solve import smooth
@@ -40,17 +41,16 @@ def skin_of(asked):
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
-    """Rotational stiffness -dM/d(rotation) [N m/rad] of all strips at fixed approach and contact set.
+    """Rotational stiffness -dM/d(rotation) [N m/rad] of all strips behind a smooth skin, at fixed approach.
 
     c: (m, m) [m/N] and weight: (m,) [m2] of one strip.
     """
     out = 0.0
-    for strip, force in enumerate(state.force):
-        stiff = None if state.stiffness is None else state.stiffness[strip] * weight
-        active = force > 0 if stiff is None else stiff > 1e-12 * (state.stiffness.max() * weight.max())
+    for rate in state.stiffness:
+        stiff = rate * weight
+        active = stiff > 1e-12 * (state.stiffness.max() * weight.max())
         if active.any():
-            skin = 0.0 if stiff is None else np.diag(1 / np.where(active, stiff, 1.0))
-            out += shear_modes.rotational_stiffness(c + skin, x, active)
+            out += shear_modes.rotational_stiffness(c + np.diag(1 / np.where(active, stiff, 1.0)), x, active)
     return out
 
 
@@ -60,20 +60,45 @@ def strip_values(patch, peak_of) -> dict:
     These are the peak of any strip, the share of the area, the stiffnesses, and the lateral place of the pressure with
     its roll moment. peak_of: largest pressure of one strip from (x, pressure).
     """
-    state, pieces = patch.strips, patch.pair.compliance
-    count = len(state.offsets)
-    weight = pieces.interface.weight / count
-    pressed = borne(state.pressure) if smooth(patch.skin) else state.pressure
-    fraction = float((pressed > 0).mean(axis=0) @ weight / weight.sum())
-    out = {"contact_fraction": fraction, "pressure_centre_lateral": state.centre_y,
-           "roll_moment": state.roll_moment}
-    out["pressure_peak"] = max(peak_of(patch.x, row) for row in state.pressure)
+    state, count = patch.strips, len(patch.strips.offsets)
+    weight = patch.pair.compliance.interface.weight / count
+    out = {"contact_fraction": 0.0, "pressure_centre_lateral": state.centre_y, "roll_moment": state.roll_moment,
+           "pressure_peak": max(peak_of(patch.x, row) for row in state.pressure), "loaded_fraction": 0.0,
+           "normal_stiffness": 0.0, "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
     if not state.load > 0:
-        return out | {"loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0,
-                      "rotational_stiffness": 0.0}
+        return out
     out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])
+    return out | (_behind_skin if smooth(patch.skin) else _between_nodes)(patch, weight)
+
+
+def _behind_skin(patch, weight) -> dict:
+    state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
-    out["normal_stiffness"] = strips_tangent(pieces.normal * count, weight, state)
-    out["rotational_stiffness"] = rotational_stiffness(state, pieces.normal * count, patch.x, weight)
-    out["tangential_stiffness"] = strips_tangent(pieces.tangential * count, weight, state, ratio)
-    return out
+    return {"contact_fraction": float((borne(state.pressure) > 0).mean(axis=0) @ weight / weight.sum()),
+            "normal_stiffness": strips_tangent(pieces.normal * count, weight, state),
+            "rotational_stiffness": rotational_stiffness(state, pieces.normal * count, patch.x, weight),
+            "tangential_stiffness": strips_tangent(pieces.tangential * count, weight, state, ratio)}
+
+
+def _between_nodes(patch, weight) -> dict:
+    """Share of the area, extent and stiffnesses of strips whose contact ends between nodes (`contact.edges`)."""
+    state, pieces, x, count = patch.strips, patch.pair.compliance, patch.x, len(patch.strips.offsets)
+    normal, tangential, softness = pieces.normal * count, pieces.tangential * count, None
+    if state.stiffness is not None:
+        softness = 1 / (state.stiffness.max() * weight)
+        normal = normal + np.diag(softness)
+        if patch.tangential_ratio is not None:
+            tangential = tangential + np.diag(softness / patch.tangential_ratio)
+    sums, length, low, high = np.zeros(3), 0.0, x[-1], x[0]
+    for force, gap in zip(state.force, state.gap, strict=True):
+        if not force.any():
+            continue
+        found = edges.ends(normal, x, force, gap, softness)
+        stretches, one = edges.intervals(x, force, found), np.ones(x.size)
+        length += np.diff(stretches).sum()
+        low, high = min(low, stretches[0, 0]), max(high, stretches[-1, 1])
+        sums += [edges.stiffness(c, force > 0, motion, found)
+                 for c, motion in ((normal, one), (tangential, one), (normal, x))]
+    names = ("normal_stiffness", "tangential_stiffness", "rotational_stiffness")
+    return {"contact_fraction": float(length / (count * np.ptp(x))), "contact_half_width": float(high - low) / 2,
+            **dict(zip(names, map(float, sums), strict=True))}

@@ -1,53 +1,26 @@
-"""Values read off a pressed patch: peak, edge, half-width, stiffnesses."""
+"""Values read off a pressed patch: peak, edges, half-width, stiffnesses."""
 
 import numpy as np
 
+from ...contact import edges
 from ...core import Outcome
-from ...slip.shear_modes import normal_stiffness, rotational_stiffness, tangential_stiffness
+from ...elasticity.threads import one_thread
 from .press import Patch
-
-
-def half_width(x, sigma) -> float:
-    """Half the contact length [m], soft edges found between nodes.
-
-    sigma^2 is linear towards an edge of smooth contact (and exactly quadratic for Hertz), so an edge is the root of a
-    cubic fitted to sigma^2 over the loaded nodes from 10 to 80 % of the contact length behind it; the nodes nearest to
-    the edge carry its discretisation error and are left out. A root farther than a cell from the border of the contact
-    set is not believed: a coating bends sigma^2 within its own thickness of the edge.
-    """
-    index = np.flatnonzero(sigma > 0)
-    if index.size == 0:
-        return 0.0
-    ends = []
-    for side in (-1, 1):
-        outer = index[-1] if side > 0 else index[0]
-        if outer in (0, x.size - 1):
-            ends.append(float(x[outer]))
-            continue
-        ordered = index[::-1] if side > 0 else index
-        behind = side * (x[outer] - x[ordered]) / max(x[index[-1]] - x[index[0]], 1e-300)
-        pick = ordered[(behind >= 0.1) & (behind <= 0.8)] if index.size >= 12 else ordered[2:7]
-        ends.append(_edge(x, sigma, pick, outer, side))
-    return (ends[1] - ends[0]) / 2
-
-
-def _edge(x, sigma, pick, outer, side) -> float:
-    cell = abs(x[outer + side] - x[outer])
-    guess = float(x[outer]) + side * cell / 2
-    degree = 3 if pick.size >= 8 else 2
-    if pick.size < degree + 1:
-        return guess
-    s = (x[pick] - x[outer]) / cell
-    roots = np.roots(np.polyfit(s, sigma[pick]**2, degree))
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    real = real[np.abs(real - side / 2) <= 1.0] * cell + x[outer]
-    return float(real[np.argmin(np.abs(real - guess))]) if real.size else guess
+from .skin import BEARING
 
 
 def peak_pressure(x, sigma) -> float:
-    """Largest pressure [Pa]: the vertex of the parabola through the largest inner node and its neighbours."""
+    """Largest pressure [Pa] of the nodal means sigma (m,) [Pa] at x (m,) [m].
+
+    Inside it is the vertex of the parabola through the largest node and its neighbours, at a border of the interface
+    the end of the curve whose means over the nodes' own cells are theirs.
+    """
     top = int(np.argmax(sigma))
-    if top in (0, x.size - 1) or sigma[top - 1] <= 0 or sigma[top + 1] <= 0:
+    if top == 0:
+        return _at_border(x, sigma)
+    if top == x.size - 1:
+        return _at_border(-x[::-1], sigma[::-1])
+    if sigma[top - 1] <= 0 or sigma[top + 1] <= 0:
         return float(sigma[top])
     left, right = x[top] - x[top - 1], x[top + 1] - x[top]
     before, after = (sigma[top] - sigma[top - 1]) / left, (sigma[top + 1] - sigma[top]) / right
@@ -56,20 +29,29 @@ def peak_pressure(x, sigma) -> float:
     return float(sigma[top] - slope**2 / (4 * bend)) if bend < 0 else float(sigma[top])
 
 
+def _at_border(x, sigma) -> float:
+    """Pressure [Pa] at the first node: a parabola, of fewer loaded nodes a line, by its means over their cells."""
+    count = min(3, int(np.argmin(np.append(sigma, 0.0) > 0)), x.size - 1)
+    if count < 2:
+        return float(sigma[0])
+    cuts = np.concatenate([[0.0], (x[1:count + 1] + x[:count]) / 2 - x[0]]) / (x[1] - x[0])
+    power = np.arange(1, count + 1)
+    means = np.diff(cuts[:, None]**power, axis=0) / power / np.diff(cuts)[:, None]
+    return float(np.linalg.solve(means, sigma[:count])[0])
+
+
 def values(patch: Patch) -> dict:
     """Value of every static measure of a pressed patch by name, in SI; `rows` has their meanings."""
-    x, weight, p = patch.x, patch.pieces.interface.weight, patch.pressure
-    area = weight.sum()
-    peak = peak_pressure(x, p.sigma_n)
-    out = {"normal_load": p.load, "contact_fraction": float(weight[p.sigma_n > 0].sum() / area),
-           "pressure_peak": peak, "moment": p.moment, "rotation": p.rotation,
-           "approach": p.approach, "contact_half_width": half_width(x, p.sigma_n)}
-    out["pressure_centre"] = p.moment / p.load if p.load > 0 else 0.0
-    touching = p.outcome is not Outcome.NO_CONTACT
-    out["loaded_fraction"] = p.load / (area * peak) if touching else 0.0
-    out["normal_stiffness"] = normal_stiffness(patch.pieces.normal, patch.active) if touching else 0.0
-    out["tangential_stiffness"] = shear_stiffness(patch) if touching else 0.0
-    out["rotational_stiffness"] = rotational_stiffness(patch.pieces.normal, x, patch.active) if touching else 0.0
+    p, interface = patch.pressure, patch.pieces.interface
+    area, peak = interface.weight.sum(), peak_pressure(patch.x, p.sigma_n)
+    out = {"normal_load": p.load, "contact_fraction": 0.0, "pressure_peak": peak, "moment": p.moment,
+           "rotation": p.rotation, "approach": p.approach, "contact_half_width": 0.0,
+           "pressure_centre": p.moment / p.load if p.load > 0 else 0.0, "loaded_fraction": 0.0, "normal_stiffness": 0.0,
+           "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
+    if p.outcome is not Outcome.NO_CONTACT:
+        out["loaded_fraction"] = p.load / (area * peak)
+        with one_thread():
+            out |= _on_edges(patch)
     if patch.strips is not None:
         from .strips import strip_values
 
@@ -77,17 +59,50 @@ def values(patch: Patch) -> dict:
     return out
 
 
-def shear_stiffness(patch: Patch) -> float:
-    """Tangential stiffness dT/d(slide) [N/m] in stick at held approach and rotation.
+def _on_edges(patch: Patch) -> dict:
+    """The values that hang on where the contact ends."""
+    x, normal, force = patch.x, patch.pieces.normal, patch.pressure.sigma_n * patch.pieces.interface.weight
+    found, active = found_ends(patch), patch.active
+    stretches = edges.intervals(x, force, found)
+    return {"contact_fraction": float(np.diff(stretches).sum() / np.ptp(x)),
+            "contact_half_width": float(stretches[-1, 1] - stretches[0, 0]) / 2,
+            "normal_stiffness": edges.stiffness(normal, active, np.ones(x.size), found),
+            "tangential_stiffness": shear_stiffness(patch, found),
+            "rotational_stiffness": edges.stiffness(normal, active, x, found)}
+
+
+def found_ends(patch: Patch) -> list:
+    """Ends of the contact set between the nodes, as a list of `contact.edges.End`; of the means over strips none."""
+    if patch.strips is not None:
+        return []
+    if patch.skin is not None:
+        return edges.faded(patch.x, patch.skin.pressure, BEARING)
+    own, bare = patch.pieces.normal, patch.pair.compliance.normal
+    softness = None if own is bare else np.diag(own) - np.diag(bare)
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    return edges.ends(own, patch.x, force, patch.pressure.gap, softness)
+
+
+def shear_stiffness(patch: Patch, found: list) -> float:
+    """Tangential stiffness dT/d(slide) [N/m] in stick at held approach and rotation, edges at the ends `found`.
 
     That of unlike pieces includes the closing that shear causes.
     """
     if not patch.pair.closing.any():
-        return tangential_stiffness(patch.pieces.tangential, patch.active)
+        return edges.stiffness(patch.pieces.tangential, patch.active, np.ones(patch.x.size), found)
     from ...slip import tangent
 
     operators = tangent.operators_of(patch.pieces, patch.pair.closing)
-    return tangent.operating_tangent(operators, patch.active).tangential
+
+    def of(active) -> float:
+        return tangent.operating_tangent(operators, active).tangential
+
+    whole = out = of(patch.active)
+    for end in found if patch.active.sum() > 2 else ():
+        more, less = patch.active.copy(), patch.active.copy()
+        more[end.node + end.side], less[end.node] = True, False
+        out += edges.parabola(end.share - 0.5, of(more) - whole, whole - of(less))
+    return float(out)
 
 
 def edge_cells(x, active) -> np.ndarray:
