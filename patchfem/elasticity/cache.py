@@ -25,7 +25,7 @@ def folder() -> Path:
     return Path(base) / "patchfem" / "operators"
 
 
-GRID_SOURCE = ("elasticity.py", "stiffness.py", "condense.py")
+GRID_SOURCE = ("elasticity.py", "tensor_stiffness.py", "condense.py", "grid_fronts.py")
 MESH_SOURCE = ("elasticity.py", "stiffness.py", "dissect.py", "factor.py", "fronts.py", "substructure.py")
 
 

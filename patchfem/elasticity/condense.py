@@ -1,111 +1,184 @@
-"""Static condensation of a column-by-column numbered piece to its interface by a block-tridiagonal sweep.
+"""Static condensation of a grid to its interface: the compliance, and displacements inside from the same factors.
 
-With blocks D_j on the diagonal and E_j between columns j and j+1, the right and left Schur complements
-
-    T_j = D_j - E_j T_{j+1}^-1 E_j^T,    S_j = D_j - E_{j-1}^T S_{j-1}^-1 E_{j-1}
-
-give the diagonal blocks of the inverse, G_jj = (S_j + T_j - D_j)^-1, and the propagators P_j = -T_{j+1}^-1 E_j^T the
-rest, G_{j+1,i} = P_j G_{j,i} for i <= j. Normal and tangential compliance come out together.
+With the inside i eliminated (`grid_fronts`), the Schur complement S = K_ss - K_si K_ii^-1 K_is of the interface s gives
+its compliance S^-1. A piece that is its own mirror image moves in two kinds that do not mix: even inward and odd along
+x, and the other way round. Both are motions of its right half, and the inside of that half is eliminated once for both.
 """
 
-import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_matrix
+from dataclasses import dataclass
 
+import numpy as np
+from scipy.linalg.blas import dtrsm
+from scipy.linalg.lapack import dpotrf, dpotri
+
+from ..core import NotConverged
+from .grid_fronts import GridFactor, eliminate
+from .tensor_stiffness import applied
 from .threads import one_thread
 
-
-def _blocks(matrix: csr_matrix, columns: int) -> tuple:
-    size = matrix.shape[0] // columns
-    block = matrix.tobsr(blocksize=(size, size))
-    block.sort_indices()
-    diagonal = np.empty((columns, size, size))
-    upper = np.empty((columns - 1, size, size))
-    for j in range(columns):
-        for k in range(block.indptr[j], block.indptr[j + 1]):
-            if block.indices[k] == j:
-                diagonal[j] = block.data[k]
-            elif block.indices[k] == j + 1:
-                upper[j] = block.data[k]
-    return diagonal, upper
+RESIDUAL = 1e-8  # of a solve with random forces, relative to the forces, beyond which solutions are refined
+CORRECTION = 1e-6  # of the displacements by one step of refinement, relative, beyond which the factors are refused
+PARITY = np.array([-1.0, 1.0])  # of (along x, inward) in even motion
 
 
-def sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
-    """Interface block (2 nx, 2 nx) of the inverse of `matrix`, unknowns (x, inward) column by column.
+@dataclass(frozen=True, eq=False, slots=True)
+class Kept:
+    """Stiffness of the kept nodes in one kind of motion, factorised.
 
-    matrix: symmetric positive definite, (columns * size) square, its first two unknowns of a column at the interface.
-    Cost about columns^2 * size^2 * 2 flop. LinAlgError when the matrix is not positive definite.
+    unknown: (k,) kept unknowns that move, the interface last; low: (k, k) Cholesky factor L; size: interface unknowns.
     """
-    return _swept(*_blocks(matrix, columns))
+
+    unknown: np.ndarray
+    low: np.ndarray
+    size: int
+
+    def compliance(self) -> np.ndarray:
+        """Last diagonal block (size, size) of the inverse."""
+        both, _ = dpotri(np.asfortranarray(self.low[-self.size:, -self.size:]), lower=1)
+        return np.tril(both) + np.tril(both, -1).T
+
+    def solve(self, load) -> np.ndarray:
+        """Displacements (n, 2, r) of the kept nodes under loads (n, 2, r); zero where nothing moves."""
+        out = np.zeros_like(load).reshape(-1, load.shape[-1])
+        right = load.reshape(out.shape)[self.unknown]
+        out[self.unknown] = dtrsm(1.0, self.low, dtrsm(1.0, self.low, right, lower=1), lower=1, trans_a=1)
+        return out.reshape(load.shape)
 
 
-def mirrored_sweep(matrix: csr_matrix, columns: int) -> np.ndarray:
-    """Interface block of the inverse as `sweep` finds it, at half the cost, for a piece that is its own mirror image.
+@dataclass(frozen=True, eq=False, slots=True)
+class Condensed:
+    """A grid condensed to its first row.
 
-    Two kinds of motion do not mix: those that are even inward and odd along x, and those the other way round. Each is
-    the motion of the right half. Where a column stands in the middle, its forbidden unknowns are held; else the left
-    neighbour of the first column is its own image. A force on the right is half the sum of its even and its odd pair.
+    stencil: of the whole grid (`tensor_stiffness`); inside: factors of the grid, or of its right half where `mirrored`;
+    kinds: what is kept, once per kind of motion; refined: whether solutions take one step of iterative refinement.
     """
-    diagonal, upper = _blocks(matrix, columns)
-    middle = columns // 2
-    sign = np.tile([-1.0, 1.0], columns - middle)  # parity of (along x, inward) in even motion
-    halves = [_half(diagonal[middle:], upper[middle:], None if columns % 2 else upper[middle - 1], held)
-              for held in (0, 1)]
-    same, across = halves[0] + halves[1], sign[:, None] * (halves[0] - halves[1])
-    right = slice(2 * middle, None)
-    out = np.empty((2 * columns, 2 * columns))
-    out[right, right] = same
-    flip = (np.arange(columns)[::-1, None] * 2 + [0, 1]).ravel()
-    left = flip[right]
-    out[np.ix_(left, np.arange(2 * columns)[right])] = across
-    out[np.ix_(np.arange(2 * columns)[right], left)] = across.T
-    out[np.ix_(left, left)] = sign[:, None] * same * sign
-    return out
+
+    stencil: np.ndarray
+    inside: GridFactor
+    kinds: tuple
+    mirrored: bool
+    refined: bool = False
+
+    def compliance(self) -> np.ndarray:
+        """Motions (2 nx, 2 nx) [m2/N] of the interface per force on it, unknowns (along x, inward) node by node."""
+        with one_thread():
+            found = [kind.compliance() for kind in self.kinds]
+        return _unfolded(self.kinds, found, self.stencil.shape[0]) if self.mirrored else found[0]
+
+    def displacement(self, load) -> np.ndarray:
+        """Displacements (nx, rows, 2, r) [m] under forces (nx, 2, r) [N/m] on the interface, (along x, inward)."""
+        whole = np.zeros((*self.stencil.shape[:2], *load.shape[1:]))
+        whole[:, 0] = load
+        with one_thread():
+            u = self._solved(whole, False)
+            return u + self._solved(whole - applied(self.stencil, u), True) if self.refined else u
+
+    def _solved(self, load, inside: bool) -> np.ndarray:
+        """Displacements under loads (nx, rows, 2, r); inside: some act below the interface."""
+        if not self.mirrored:
+            return self._kept(load, inside)
+        half, frames = (load.shape[0] + 1) // 2, load.shape[-1]
+        parity = PARITY[:, None]
+        right, left = load[-half:], load[:half][::-1] * parity
+        both = np.concatenate([right + left, right - left], axis=-1) / 2
+        if load.shape[0] % 2:
+            both[0] /= 2  # the middle column belongs to both halves
+        u = self._kept(both, inside)
+        even, odd = u[..., :frames], u[..., frames:]
+        return np.concatenate([((even - odd) * parity)[::-1][:load.shape[0] - half], even + odd])
+
+    def _kept(self, load, inside: bool) -> np.ndarray:
+        nodes = load.reshape(-1, *load.shape[2:])
+        nodes = self.inside.forward(nodes) if inside else nodes.copy()
+        ring, frames = self.inside.ring, load.shape[-1] // len(self.kinds)
+        for k, kind in enumerate(self.kinds):
+            some = slice(k * frames, (k + 1) * frames)
+            nodes[ring, :, some] = kind.solve(nodes[ring, :, some])
+        return self.inside.backward(nodes, inside).reshape(load.shape)
 
 
-def _half(diagonal, upper, bridge, held: int) -> np.ndarray:
-    """Half the compliance of the right half in one kind of motion: even (held 0: nothing moves along x in the middle)
-    or odd.
+def condense(stencil, mirrored: bool) -> Condensed:
+    """Condense a grid to its first row and check the factors with random forces on it.
 
-    bridge: the block between the two middle columns, None where one column stands in the middle.
+    stencil: (nx, rows, 3, 3, 2, 2) [N/m per m]; mirrored: whether the grid is its own mirror image in x. NotConverged
+    where the stiffness is not positive definite or one step of refinement changes a solution by more than 1e-6.
     """
-    size = diagonal.shape[1]
-    first, rest = diagonal[0].copy(), upper
-    if bridge is not None:
-        first += (1 - 2 * held) * np.tile([-1.0, 1.0], size // 2)[:, None] * bridge
-        return _swept(np.concatenate([first[None], diagonal[1:]]), upper) / 2
-    first /= 2
-    gone = np.arange(held, size, 2)
-    strength = np.abs(np.diag(first)).max()
-    first[gone], first[:, gone] = 0.0, 0.0
-    first[gone, gone] = strength
-    if len(upper):
-        rest = upper.copy()
-        rest[0][gone] = 0.0
-    half = _swept(np.concatenate([first[None], diagonal[1:]]), rest)
-    half[held], half[:, held] = 0.0, 0.0
-    return half / 2
-
-
-def _swept(diagonal, upper) -> np.ndarray:
-    columns, size = diagonal.shape[:2]
+    columns = stencil.shape[0]
+    mirrored = mirrored and columns > 3
     with one_thread():
-        right = np.empty_like(diagonal)
-        propagate = np.empty_like(upper)
-        right[-1] = diagonal[-1]
-        for j in range(columns - 2, -1, -1):
-            propagate[j] = -cho_solve(cho_factor(right[j + 1], lower=True), upper[j].T)
-            right[j] = diagonal[j] + upper[j] @ propagate[j]
-        out = np.empty((2 * columns, 2 * columns))
-        state = np.empty((size, 2 * columns))
-        left = diagonal[0]
-        two = np.eye(size, 2)
-        for j in range(columns):
-            if j:
-                left = diagonal[j] - upper[j - 1].T @ cho_solve(cho_factor(left, lower=True), upper[j - 1])
-                state[:, :2 * j] = propagate[j - 1] @ state[:, :2 * j]
-            here = cho_factor(left + right[j] - diagonal[j], lower=True)
-            state[:, 2 * j:2 * j + 2] = cho_solve(here, two)
-            out[2 * j:2 * j + 2, :2 * j + 2] = state[:2, :2 * j + 2]
-            out[:2 * j, 2 * j:2 * j + 2] = out[2 * j:2 * j + 2, :2 * j].T
+        if mirrored:
+            half = stencil[columns // 2:]
+            if columns % 2:
+                half = half.copy()
+                half[0, :, 1] /= 2
+            inside = eliminate(half, left=True)
+            kinds = tuple(_kind(stencil, inside, held) for held in (0, 1))
+        else:
+            inside = eliminate(stencil)
+            kinds = (_factorised(inside.schur, np.arange(2 * columns), 2 * columns),)
+    return _checked(Condensed(stencil, inside, kinds, mirrored))
+
+
+def _kind(stencil, inside: GridFactor, held: int) -> Kept:
+    """The kept nodes of the right half in even motion (held 0: nothing moves along x in the middle) or odd motion (1).
+
+    Where no column stands in the middle, the left neighbour of the first column is its own image.
+    """
+    columns, rows = stencil.shape[:2]
+    unknown = np.concatenate([np.arange(2, 2 * rows), [0, 1], np.arange(2 * rows, inside.schur.shape[0])])
+    size = inside.schur.shape[0] - 2 * (rows - 1)
+    if columns % 2:
+        free = (unknown % 2 != held) | (unknown >= 2 * rows)
+        return _factorised(inside.schur, unknown[free], size - 1)
+    schur = inside.schur.copy()
+    bridge = (1 - 2 * held) * stencil[columns // 2, :, 0] * PARITY
+    for step in (-1, 0, 1):
+        here = np.arange(max(0, -step), rows - max(0, step))
+        for a in (0, 1):
+            for b in (0, 1):
+                schur[2 * here + a, 2 * (here + step) + b] += bridge[here, 1 + step, a, b]
+    return _factorised(schur, unknown, size)
+
+
+def _factorised(matrix, unknown, size: int) -> Kept:
+    low, fault = dpotrf(np.asfortranarray(matrix[np.ix_(unknown, unknown)]), lower=1, clean=1, overwrite_a=1)
+    if fault:
+        raise NotConverged("the stiffness of the piece is not positive definite")
+    return Kept(unknown, low, size)
+
+
+def _unfolded(kinds, found, columns: int) -> np.ndarray:
+    """Compliance (2 nx, 2 nx) of a mirrored piece from those of its right half in even and in odd motion.
+
+    A force on the right is half the sum of its even and its odd pair.
+    """
+    middle = columns // 2
+    right = np.arange(2 * middle, 2 * columns)
+    halves = np.zeros((2, right.size, right.size))
+    for half, kind, part in zip(halves, kinds, found):
+        # unknowns of the interface: those of its first node, then those behind the kept column
+        place = kind.unknown[-kind.size:]
+        place = np.where(place < 2, place, place - place[-1] + right.size - 1)
+        half[np.ix_(place, place)] = part / 2
+    sign = np.tile(PARITY, columns - middle)
+    same, across = halves[0] + halves[1], sign[:, None] * (halves[0] - halves[1])
+    left = (np.arange(columns)[::-1, None] * 2 + [0, 1]).ravel()[right]
+    out = np.empty((2 * columns, 2 * columns))
+    out[np.ix_(right, right)], out[np.ix_(left, left)] = same, sign[:, None] * same * sign
+    out[np.ix_(left, right)], out[np.ix_(right, left)] = across, across.T
     return (out + out.T) / 2
+
+
+def _checked(found: Condensed) -> Condensed:
+    """The factors, with refinement where a solution misses its residual."""
+    load = np.random.default_rng(0).normal(size=(found.stencil.shape[0], 2, 1))
+    u = found.displacement(load)
+    rest = -applied(found.stencil, u)
+    rest[:, 0] += load
+    if np.abs(rest).max() <= RESIDUAL * np.abs(load).max():
+        return found
+    with one_thread():
+        change = np.abs(found._solved(rest, True)).max() / np.abs(u).max()
+    if not change <= CORRECTION:
+        raise NotConverged(f"the stiffness of the piece is solved to {change:.1e} only, wanted {CORRECTION:.0e}")
+    return Condensed(found.stencil, found.inside, found.kinds, found.mirrored, True)

@@ -1,18 +1,16 @@
-"""Plane elasticity of one piece on its tensor grid (bilinear quads, scikit-fem) and the recovery of its inside.
+"""Plane elasticity of one piece on its grid of bilinear quads, and the recovery of its inside.
 
 The unknowns of a node are (along x, into the piece), so both pieces of a pair obey the same matrix.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.linalg import splu
-from skfem import Basis, ElementQuad1, MeshQuad
 
-from ..core import frozen_array
-from .condense import mirrored_sweep, sweep
-from .stiffness import stiffness
+from ..core import NotConverged, frozen_array
+from .condense import Condensed, condense
+from .tensor_stiffness import matrix_of, tensor_stencil
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,66 +39,94 @@ def lame(young: float, poisson: float, plane: str) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """An assembled piece on its tensor grid.
+    """An assembled piece on a grid of columns and rows, factorised when first needed.
 
-    x: (nx,), depth: (ny,) [m]; matrix: free unknowns column by column, row by row, two per node (along x, inward),
-    without those of the far face; cells: (t, 4) node numbers column * ny + row; is_coating: (t,); layers: its Layers.
+    x: (nx,) [m] of the interface nodes; depth: (ny,) [m]; nodes: (nx * ny, 2) as x and depth [m], number column * ny +
+    row; stencil: (nx, ny - 1, 3, 3, 2, 2) stiffness per unit width [N/m per m] without the far face, as
+    `tensor_stiffness` describes it; cells: (t, 4) nodes, column by column; is_coating: (t,); layers: its Layers; made:
+    what has been computed.
     """
 
     x: np.ndarray
     depth: np.ndarray
-    matrix: csr_matrix
+    nodes: np.ndarray
+    stencil: np.ndarray
     cells: np.ndarray
     is_coating: np.ndarray
     layers: Layers
+    made: dict = field(default_factory=dict)
+
+    @property
+    def matrix(self) -> csr_matrix:
+        """Stiffness of the free unknowns, column by column, row by row, two per node (along x, inward)."""
+        if "matrix" not in self.made:
+            self.made["matrix"] = matrix_of(self.stencil)
+        return self.made["matrix"]
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the piece is its own mirror image in x, to round-off of its nodes."""
+        grid = self.nodes.reshape(self.x.size, -1, 2)
+        return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
+
+    @property
+    def factor(self) -> Condensed:
+        """The piece condensed to its interface, made once for compliance and fields.
+
+        NotConverged where the stiffness cannot be factorised, with what to change.
+        """
+        if "factor" not in self.made:
+            try:
+                self.made["factor"] = condense(self.stencil, self.mirrored)
+            except NotConverged as error:
+                raise NotConverged(f"{error}; {_remedy(self)}") from None
+        return self.made["factor"]
+
+
+def _remedy(piece: Piece) -> str:
+    """What to change where the stiffness of a piece cannot be factorised."""
+    ratio = piece.layers.coating[0] / piece.layers.substrate[0]
+    if piece.is_coating.any() and not 1e-3 < ratio < 1e3:
+        return (f"the Young's moduli of coating and substrate differ {max(ratio, 1 / ratio):.2g} times: bring them "
+                f"nearer, make the coating thicker, or leave it out")
+    least = min(np.diff(piece.x).min(), np.diff(piece.depth).min())
+    return (f"the shortest cell is {least:.2g} m in a piece of {np.ptp(piece.x):.2g} x {piece.depth[-1]:.2g} m: "
+            f"ask for longer cells (contact.element_size) or a larger tolerance")
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
     """Assemble one piece held at its far face, with bilinear quadrilaterals on its tensor grid.
 
     x: (nx,), depth: (ny,) [m]; coating_rows: rows of cells in the coating; layers: its Layers. The stiffness is per
-    unit width [N/m per m].
+    unit width [N/m per m], made from the matrices of its lines.
     """
-    nx, ny = x.size, depth.size
-    mesh = MeshQuad.init_tensor(np.asarray(x), np.asarray(depth))
-    middle = mesh.p[:, mesh.t].mean(axis=1)[1]
-    coat = middle < depth[coating_rows] if coating_rows else np.zeros(mesh.t.shape[1], bool)
-    lam, mu = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])[coat.astype(int)].T
-    basis = Basis(mesh, ElementQuad1(), intorder=2)
-    # scikit-fem numbers vertices its own way; ours is column by column, without the far face
-    column = np.searchsorted(x, mesh.p[0] - 1e-12 * np.ptp(x))  # round-off of the places
-    row = np.searchsorted(depth, mesh.p[1] - 1e-12 * depth[-1])
-    place = np.empty(nx * ny, dtype=np.int64)
-    place[basis.nodal_dofs[0]] = np.where(row < ny - 1, column * (ny - 1) + row, -1)
-    matrix = stiffness([(basis, lam, mu, place)], nx * (ny - 1))
-    cells = _counter_clockwise((column * ny + row)[mesh.t].T, ny)
-    column_by_column = np.argsort(cells[:, 0])
-    return Piece(x, depth, matrix, cells[column_by_column], coat[column_by_column], layers)
+    nodes = np.stack(np.broadcast_arrays(np.asarray(x)[:, None], depth), axis=-1).reshape(-1, 2)
+    cells, coat = grid_cells(x.size, depth.size, coating_rows)
+    pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
+    stencil = tensor_stencil(x, depth, *pairs[coat[:depth.size - 1].astype(int)].T)
+    return Piece(x, depth, nodes, stencil, cells, coat, layers)
 
 
-def _counter_clockwise(cells, ny: int) -> np.ndarray:
-    """Every quad as (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1) in depth coordinates."""
-    first = cells.min(axis=1)
-    return np.stack([first, first + ny, first + ny + 1, first + 1], axis=1)
+def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple:
+    """Cells (t, 4) of a grid of nodes column * rows + row, column by column, and which are coating (t,).
+
+    A cell is (column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1).
+    """
+    first = (np.arange(columns - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
+    return np.stack([first, first + rows, first + rows + 1, first + 1], axis=1), first % rows < coating_rows
 
 
 def displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Displacements of a piece under nodal interface forces per unit width [N/m].
 
     Returns (frames, nx*ny, 2) [m], along x and inward. shear, normal: (frames, nx) acting on the piece along +x and
-    inward. One sparse factorisation serves all frames.
+    inward. The factors of the piece are used again. NotConverged as `Piece.factor`.
     """
     nx, ny = piece.x.size, piece.depth.size
-    frames = np.atleast_2d(normal).shape[0]
-    load = np.zeros((nx, ny - 1, 2, frames))
-    load[:, 0, 0] = np.atleast_2d(shear).T
-    load[:, 0, 1] = np.atleast_2d(normal).T
-    factor = splu(piece.matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                  options={"SymmetricMode": True})
-    u = factor.solve(load.reshape(-1, frames)).reshape(nx, ny - 1, 2, frames)
-    out = np.zeros((frames, nx, ny, 2))
-    out[:, :, :-1] = np.moveaxis(u, 3, 0)
-    return out.reshape(frames, nx * ny, 2)
+    load = np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1).astype(float)
+    out = np.zeros((load.shape[-1], nx, ny, 2))
+    out[:, :, :-1] = np.moveaxis(piece.factor.displacement(load), 3, 0)
+    return out.reshape(-1, nx * ny, 2)
 
 
 def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
@@ -110,13 +136,14 @@ def cell_stress(piece: Piece, u: np.ndarray) -> tuple:
     axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a bilinear quad is its superconvergent
     point.
     """
-    corner = u[:, piece.cells]
-    nodes = np.stack([np.repeat(piece.x, piece.depth.size), np.tile(piece.depth, piece.x.size)], axis=1)[piece.cells]
-    dx = (nodes[:, 1, 0] - nodes[:, 0, 0])[:, None]
-    dy = (nodes[:, 3, 1] - nodes[:, 0, 1])[:, None]
-    along = (corner[:, :, 1] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 3]) / (2 * dx)
-    inward = (corner[:, :, 3] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 1]) / (2 * dy)
-    exx, eyy, exy = along[..., 0], inward[..., 1], (along[..., 1] + inward[..., 0]) / 2
+    corner, place = u[:, piece.cells], piece.nodes[piece.cells]
+    along, inward = (corner[:, :, 1] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 3],
+                     corner[:, :, 3] + corner[:, :, 2] - corner[:, :, 0] - corner[:, :, 1])
+    a, b = place[:, 1] + place[:, 2] - place[:, 0] - place[:, 3], place[:, 3] + place[:, 2] - place[:, 0] - place[:, 1]
+    area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[:, None]  # four times that of the cell
+    by_x = (along * b[:, 1, None] - inward * a[:, 1, None]) / area
+    by_y = (inward * a[:, 0, None] - along * b[:, 0, None]) / area
+    exx, eyy, exy = by_x[..., 0], by_y[..., 1], (by_x[..., 1] + by_y[..., 0]) / 2
     return hooke(exx, eyy, exy, piece.is_coating, piece.layers)
 
 
@@ -146,9 +173,7 @@ def interface_compliance(piece: Piece) -> tuple:
     """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (nx, nx) [m2/N], read-only.
 
     nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x. A
-    piece that is its own mirror image costs half (`condense.mirrored_sweep`). LinAlgError where the stiffness is not
-    positive definite.
+    piece that is its own mirror image costs half. NotConverged as `Piece.factor`.
     """
-    mirrored = np.abs(piece.x + piece.x[::-1]).max() <= 1e-13 * np.ptp(piece.x)  # round-off of x
-    both = (mirrored_sweep if mirrored else sweep)(piece.matrix, piece.x.size)
+    both = piece.factor.compliance()
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))

@@ -51,8 +51,7 @@ def cells_of(piece) -> Cells:
         mesh = piece.mesh
         blocks = tuple(block for block in (mesh.triangles, mesh.quads) if len(block))
         return Cells(mesh.points, blocks, mesh.is_coating, piece.layers)
-    points = np.stack([np.repeat(piece.x, piece.depth.size), np.tile(piece.depth, piece.x.size)], axis=1)
-    return Cells(points, (piece.cells,), piece.is_coating, piece.layers)
+    return Cells(piece.nodes, (piece.cells,), piece.is_coating, piece.layers)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

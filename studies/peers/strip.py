@@ -5,6 +5,8 @@ ever is the problem of a strip of half a wave, its two sides guided. The unknown
 of the assembled stiffness by a unit row, which leaves its columns alike in size, as the condensation wants them.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import diags
 
@@ -12,6 +14,7 @@ from patchfem import closed_forms as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Pressure, frozen_array
 from patchfem.elasticity.elasticity import Layers, Piece, assemble, displacement, interface_compliance
+from patchfem.elasticity.tensor_stiffness import stencil_of
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 EVEN = 0.1  # depth of even rows over the wave
@@ -42,7 +45,7 @@ def guided(grid: TensorGrid, layers: Layers) -> Piece:
     free = diags((~held.ravel()).astype(float))
     size = float(piece.matrix.diagonal().mean())
     matrix = (free @ piece.matrix @ free + diags(size * held.ravel())).tocsr()
-    return Piece(piece.x, piece.depth, matrix, piece.cells, piece.is_coating, piece.layers)
+    return replace(piece, stencil=stencil_of(matrix, grid.x.size), made={})
 
 
 def strip_compliance(grid: TensorGrid, layers: Layers) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The block-tridiagonal sweep against a dense inverse."""
+"""A grid condensed to its interface: against the dense inverse, whole against halves, refused by name."""
 
 from __future__ import annotations
 
@@ -6,12 +6,26 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pieces import COATED, COATING
-from scipy.sparse import csr_matrix
+from pieces import CARBIDE, COATED, TITANIUM
 
-from patchfem.elasticity.condense import mirrored_sweep, sweep
-from patchfem.elasticity.elasticity import assemble
-from patchfem.mesh.tensor import graded_grid
+from patchfem.core import NotConverged
+from patchfem.elasticity.condense import condense
+from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
+from patchfem.mesh.tensor import TensorGrid, graded_grid
+
+
+def piece_of(grid, layers=COATED):
+    return assemble(grid.x, grid.depth, grid.coating_rows, layers)
+
+
+def of_size(columns, rows, seed=None):
+    """A piece of uneven cells; its own mirror image where no seed shakes the columns."""
+    step = 1 + 0.3 * np.abs(np.arange(columns - 1) - (columns - 2) / 2)
+    if seed is not None:
+        step = np.random.default_rng(seed).uniform(0.3, 3.0, columns - 1)
+    x = np.append(0, np.cumsum(step))
+    x = (x - x[-1] / 2 if seed is not None else (x - x[::-1]) / 2) * 1e-4
+    return piece_of(TensorGrid(x, np.append(0, np.cumsum(1.1**np.arange(rows))) * 1e-4, min(rows - 1, 2)))
 
 
 def interface_block(inverse, columns):
@@ -21,42 +35,61 @@ def interface_block(inverse, columns):
     return inverse[np.ix_(index, index)]
 
 
-@pytest.mark.parametrize("cells", [2, 3, 24])
-def test_exact_sweep_of_a_piece_is_the_dense_inverse(cells):
-    grid = graded_grid(6e-3, 3e-3, 6e-3 / cells, COATING)
-    matrix = assemble(grid.x, grid.depth, grid.coating_rows, COATED).matrix
-    wanted = interface_block(np.linalg.inv(matrix.toarray()), cells + 1)
-    assert np.abs(sweep(matrix, cells + 1) - wanted).max() <= 1e-9 * np.abs(wanted).max()
-
-
-@pytest.mark.parametrize("cells", [2, 3, 4, 5, 30, 31])
-def test_exact_halves_of_a_mirrored_piece_give_the_whole(cells):
-    grid = graded_grid(6e-3, 3e-3, 6e-3 / cells, COATING)
-    matrix = assemble(grid.x, grid.depth, grid.coating_rows, COATED).matrix
-    whole, halves = sweep(matrix, cells + 1), mirrored_sweep(matrix, cells + 1)
-    assert np.abs(whole - halves).max() <= 1e-11 * np.abs(whole).max()
-    assert np.array_equal(halves, halves.T)
-
-
 @settings(max_examples=40, deadline=None)
-@given(columns=st.integers(1, 7), size=st.integers(2, 6), seed=st.integers(0, 2**32 - 1))
-def test_exact_sweep_of_any_positive_definite_chain_is_the_dense_inverse(columns, size, seed):
-    rng = np.random.default_rng(seed)
-    factor = np.zeros((columns * size, columns * size))
-    for j in range(columns):
-        here = slice(j * size, (j + 1) * size)
-        factor[here, here] = rng.normal(size=(size, size)) + 4 * np.eye(size)
-        if j:
-            factor[here, (j - 1) * size:j * size] = rng.normal(size=(size, size))
-    dense = factor @ factor.T
-    found = sweep(csr_matrix(dense), columns)
-    wanted = interface_block(np.linalg.inv(dense), columns)
-    assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max() * max(1, np.linalg.cond(dense) * 1e-7)
-    assert np.array_equal(found, found.T)
+@given(columns=st.integers(2, 22), rows=st.integers(1, 14), seed=st.none() | st.integers(0, 99))
+def test_exact_compliance_and_solution_of_a_grid_are_those_of_the_dense_inverse(columns, rows, seed):
+    piece = of_size(columns, rows, seed)
+    full = np.linalg.inv(piece.matrix.toarray())
+    wanted = interface_block(full, columns)
+    assert np.abs(piece.factor.compliance() - wanted).max() <= 1e-9 * np.abs(wanted).max()
+    load = np.random.default_rng(1).normal(size=(columns, 2, 3))
+    whole = np.zeros((columns, rows, 2, 3))
+    whole[:, 0] = load
+    found = piece.factor.displacement(load)
+    assert np.abs(found.reshape(-1, 3) - full @ whole.reshape(-1, 3)).max() <= 1e-9 * np.abs(found).max()
+    again = type(piece.factor)(*(getattr(piece.factor, name) for name in ("stencil", "inside", "kinds", "mirrored")),
+                               True).displacement(load)  # one step of refinement goes through loads inside
+    assert np.abs(again - found).max() <= 1e-9 * np.abs(found).max()
 
 
-def test_refuses_a_matrix_that_is_not_positive_definite():
+@pytest.mark.parametrize("columns", [4, 5, 30, 31])
+def test_exact_halves_of_a_mirrored_piece_give_the_whole(columns):
+    piece = of_size(columns, 17)
+    assert piece.mirrored
+    whole, halves = (condense(piece.stencil, mirrored) for mirrored in (False, True))
+    one, two = whole.compliance(), halves.compliance()
+    assert np.abs(one - two).max() <= 1e-11 * np.abs(one).max()
+    assert np.array_equal(two, two.T)
+    assert halves.inside.entries <= 0.7 * whole.inside.entries
+
+
+def test_exact_every_node_is_eliminated_once_but_those_kept():
+    piece = of_size(41, 29, seed=3)
+    gone = np.concatenate([stack.own.ravel() for stack in piece.factor.inside.stacks])
+    kept = piece.factor.inside.ring
+    assert np.array_equal(kept, np.arange(41) * 29)
+    assert np.array_equal(np.sort(np.concatenate([gone, kept])), np.arange(41 * 29))
+
+
+def test_order_fronts_of_a_square_grid_grow_as_n_log_n():
+    kept = []
+    for n in (33, 65, 129):
+        even = np.arange(n) * 1e-4
+        inside = piece_of(TensorGrid(even, even, 2)).factor.inside
+        kept.append(inside.entries / (4 * n * n * np.log2(n)))
+    assert max(kept) <= 1.7 * 31 / 4  # George 1973: 31/4 n^2 log2 n; here squares stand for triangles
+
+
+def test_refuses_a_stiffness_that_is_not_positive_definite():
     grid = graded_grid(6e-3, 3e-3, 1e-3)
-    matrix = assemble(grid.x, grid.depth, 0, COATED).matrix
-    with pytest.raises(np.linalg.LinAlgError):
-        sweep(-matrix, grid.x.size)
+    with pytest.raises(NotConverged, match="not positive definite"):
+        condense(-piece_of(grid).stencil, True)
+
+
+@pytest.mark.parametrize("ratio", [1e12, 1e17])
+def test_refuses_a_coating_that_is_beyond_the_arithmetic_or_solves_it(ratio):
+    """A stiff thin coating either is condensed with compliances that are positive, or is refused with a remedy."""
+    grid = graded_grid(6e-3, 3e-3, 1e-4, 1e-7)
+    layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
+    with pytest.raises(NotConverged, match=r"Young's moduli of coating and substrate differ .* leave it out"):
+        interface_compliance(piece_of(grid, layers))

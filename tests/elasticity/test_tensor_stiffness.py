@@ -1,0 +1,78 @@
+"""Stiffness from matrices of single lines: that of scikit-fem to round-off, as a stencil, a matrix and a product."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pieces import CARBIDE, COATED, TITANIUM
+from scipy.sparse import csr_matrix
+
+from patchfem.core import PatchfemError
+from patchfem.elasticity.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance
+from patchfem.elasticity.mapped import assemble_nodes
+from patchfem.elasticity.recovery import cells_of, indicator, recovery
+from patchfem.elasticity.substructure import assemble as assemble_mesh
+from patchfem.elasticity.substructure import cell_stress as mesh_stress
+from patchfem.elasticity.substructure import condense as condense_mesh
+from patchfem.elasticity.substructure import displacement as mesh_displacement
+from patchfem.elasticity.tensor_stiffness import applied, matrix_of, stencil_of
+from patchfem.mesh.anymesh import PieceMesh
+
+LINES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
+
+
+def grid_nodes(x, depth):
+    return np.stack(np.meshgrid(x, depth, indexing="ij"), axis=-1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(across=LINES, down=LINES, coating=st.integers(0, 9), plane=st.sampled_from(["strain", "stress"]))
+def test_exact_products_of_lines_are_the_stiffness_of_scikit_fem(across, down, coating, plane):
+    x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))
+    layers, coating = Layers(CARBIDE, TITANIUM, plane), min(coating, len(down))
+    mine, theirs = assemble(x, depth, coating, layers), assemble_nodes(grid_nodes(x, depth), coating, layers)
+    scale = np.abs(theirs.stencil).max()
+    assert np.abs(mine.stencil - theirs.stencil).max() <= 1e-14 * scale
+    assert np.array_equal(mine.cells, theirs.cells) and np.array_equal(mine.is_coating, theirs.is_coating)
+    u = np.random.default_rng(0).normal(size=(x.size, depth.size - 1, 2, 2))
+    wanted = mine.matrix @ u.reshape(-1, 2)
+    assert np.abs(applied(mine.stencil, u).reshape(-1, 2) - wanted).max() <= 1e-13 * scale
+    assert np.array_equal(matrix_of(stencil_of(mine.matrix, x.size)).toarray(), mine.matrix.toarray())
+
+
+def bent():
+    """Nodes (15, 9, 2) of a piece whose right end is chamfered and whose rows are bent."""
+    nodes = grid_nodes(np.linspace(-1e-3, 1e-3, 15), np.linspace(0, 1e-3, 9)**1.2)
+    x, depth = nodes[..., 0].copy(), nodes[..., 1].copy()
+    nodes[..., 1] += (1e-3 - depth) * 0.3 * np.maximum(0, x / 1e-3 - 0.5)
+    nodes[..., 0] += 1e-5 * np.sin(3e3 * x + 2e3 * depth)
+    return nodes
+
+
+def test_exact_a_bent_grid_is_the_same_piece_as_a_mesh_of_any_cells():
+    nodes = bent()
+    piece = assemble_nodes(nodes, 3, COATED)
+    flat, number = nodes.reshape(-1, 2), np.arange(135).reshape(15, 9)
+    mesh = PieceMesh(flat, np.empty((0, 3), int), piece.cells, piece.is_coating, number[:, 0], number[:, -1])
+    other = assemble_mesh(mesh, COATED)
+    for mine, theirs in zip(interface_compliance(piece), condense_mesh(other)):
+        assert np.abs(mine - theirs).max() <= 1e-11 * np.abs(theirs).max()
+    shear, normal = np.random.default_rng(0).normal(size=(2, 2, 15))
+    u, v = displacement(piece, shear, normal), mesh_displacement(other, shear, normal)
+    assert np.abs(u - v).max() <= 1e-11 * np.abs(v).max()
+    (stress, mises), wanted = cell_stress(piece, u), mesh_stress(other, u)
+    assert np.abs(stress - wanted[0]).max() <= 1e-11 * np.abs(stress).max()
+    assert np.abs(mises - wanted[1]).max() <= 1e-11 * mises.max()
+    cells = cells_of(piece)
+    assert np.isfinite(indicator(recovery(cells), u, stress).error).all()
+
+
+def test_refuses_a_folded_grid_and_a_matrix_that_is_no_grid():
+    nodes = bent()
+    nodes[3, 4] = nodes[4, 5]
+    with pytest.raises(PatchfemError, match=r"cells of the grid are folded, the first at x = "):
+        assemble_nodes(nodes, 0, COATED)
+    with pytest.raises(ValueError, match="not neighbours"):
+        stencil_of(csr_matrix(np.ones((12, 12))), 3)
