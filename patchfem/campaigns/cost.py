@@ -72,10 +72,10 @@ def _curve(model: Model, knob: str, say) -> list:
         chosen = _timed(_sized(model, None), "by tolerance", None, say, True)
         if chosen is not None:
             return [*(_beside(one, chosen) for one in runs), chosen]
-    from ..runs.patch.measures import remainder
+    from ..runs.patch.limits import limit
 
     fine, coarse, coarsest = runs[:-4:-1]
-    left = {name: remainder(abs(value - coarse.values[name]), abs(coarse.values[name] - coarsest.values[name]))
+    left = {name: limit([coarsest.values[name], coarse.values[name], value], False).error
             for name, value in fine.values.items() if name in coarse.values and name in coarsest.values}
     return [*(_beside(one, fine) for one in runs[:-1]), replace(fine, errors=left)]
 

@@ -54,15 +54,17 @@ def ends(normal, x, force, gap, softness=None) -> list:
     return out
 
 
-def faded(x, pressure, share: float) -> list:
-    """Ends of the nodes whose pressure exceeds `share` [1] of the largest, as a list of End by rising x.
+def faded(x, pressure, share: float, largest: float | None = None) -> list:
+    """Ends of the nodes whose pressure exceeds `share` [1] of the `largest` [Pa], as a list of End by rising x.
 
     For a pressure without an edge, (m,) [Pa] >= 0 at x (m,) [m]: between two nodes its logarithm is taken as straight.
+    Without `largest` it is the largest of this pressure.
     """
-    least = share * pressure.max()
+    most = pressure.max() if largest is None else largest
+    least = share * most
     active, out = pressure > least, []
     with np.errstate(divide="ignore"):
-        height = np.log(np.maximum(pressure, 1e-300 * pressure.max())) - np.log(least)
+        height = np.log(np.maximum(pressure, 1e-300 * most)) - np.log(least)
     for change in np.flatnonzero(active[1:] != active[:-1]):
         node, side = (change, 1) if active[change] else (change + 1, -1)
         part = height[node] / (height[node] - height[node + side])

@@ -17,7 +17,7 @@ from .tensor_stiffness import applied
 from .threads import one_thread
 
 RESIDUAL = 1e-8  # of a solve with random forces, relative to the forces, beyond which solutions are refined
-CORRECTION = 1e-6  # of the displacements by one step of refinement, relative, beyond which the factors are refused
+CORRECTION = 1e-5  # of the displacements by one step of refinement, relative, beyond which the factors are refused
 PARITY = np.array([-1.0, 1.0])  # of (along x, inward) in even motion
 
 

@@ -69,14 +69,14 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if model.wear is not None and patch is not None:
             from .wear.keep import evolved_with
 
-            evolved = evolved_with(kept, model, patch, coarse, progress)
+            evolved = evolved_with(kept, model, patch, coarse[:2], progress)
             patch, coarse = evolved.patch, evolved.coarse
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
         result = solve(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
-            result = replace(result, measures=of_patch.measures(patch, *coarse) | found)
+            result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
         if model.wear is not None:
             from .wear.measures import worn
 

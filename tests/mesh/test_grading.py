@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.mesh.grading import Layout, columns
+from patchfem.mesh.grading import Layout, columns, rows
 from patchfem.mesh.tensor import TensorGrid, coarser, finer, graded_depth, graded_grid
 
 
@@ -14,7 +14,7 @@ from patchfem.mesh.tensor import TensorGrid, coarser, finer, graded_depth, grade
 def test_always_cells_follow_the_layout(place, least, slope, wide):
     """Cells add up to the length, none is longer than wanted at its farther end, neighbours differ by the slope."""
     low = max(-0.5, place - wide)
-    layout = Layout(1.0, (place,), (low, place), least, max(least, 0.05), 0.1, slope)
+    layout = Layout(-0.5, 0.5, ((place, place, least),), (low, place), max(least, 0.05), 0.1, slope)
     x = columns(layout)
     cells = np.diff(x)
     assert x[0] == -0.5 and x[-1] == 0.5 and cells.min() > 0 and cells.size % 2 == 0
@@ -27,7 +27,7 @@ def test_always_cells_follow_the_layout(place, least, slope, wide):
 
 def test_exact_columns_of_a_linear_size_are_a_geometric_series():
     """At equal steps of the integral of dx/(least + slope x) the places grow by one factor."""
-    layout = Layout(1.0, (-0.5,), (-0.5, 0.5), 1e-3, 1.0, 1.0, 0.25)
+    layout = Layout(-0.5, 0.5, ((-0.5, -0.5, 1e-3),), (-0.5, 0.5), 1.0, 1.0, 0.25)
     x = columns(layout) + 0.5 + 1e-3 / 0.25
     ratio = x[1:] / x[:-1]
     assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=2e-4)
@@ -35,8 +35,26 @@ def test_exact_columns_of_a_linear_size_are_a_geometric_series():
 
 
 def test_exact_symmetric_layouts_give_symmetric_columns():
-    x = columns(Layout(2.0, (-0.3, 0.3), (-0.3, 0.3), 1e-4, 0.04, 0.1, 0.5))
+    x = columns(Layout(-1.0, 1.0, ((-0.3, -0.3, 1e-4), (0.3, 0.3, 1e-4)), (-0.3, 0.3), 0.04, 0.1, 0.5))
     assert np.abs(x + x[::-1]).max() <= 1e-12
+
+
+def test_exact_a_band_and_places_to_go_through_are_kept():
+    """Cells within a band are as long as asked; a column stands at each place, and there is an even number of cells."""
+    layout = Layout(-1.0, 1.0, ((-0.2, 0.1, 0.01),), (-1.0, 1.0), 0.1, 0.1, 0.5)
+    x = columns(layout, (0.37,))
+    cells, middle = np.diff(x), (x[1:] + x[:-1]) / 2
+    inside = (middle > -0.19) & (middle < 0.09)
+    assert 0.37 in x and cells.size % 2 == 0
+    assert cells[inside] == pytest.approx(np.full(inside.sum(), 0.01), rel=0.06)  # whole cells
+
+
+@pytest.mark.parametrize("coating", [0.0, 0.2])
+def test_exact_rows_end_at_the_coating(coating):
+    layout = Layout(0.0, 1.0, ((0.0, 0.0, 0.02), (coating, coating, 0.03)), (0.0, 1.0), 0.2, 0.2, 0.5)
+    depth, coated = rows(layout, coating)
+    assert depth[0] == 0 and depth[-1] == 1 and depth[coated] == coating and np.diff(depth).min() > 0
+    assert np.diff(depth)[coated] <= 0.03 * 1.6
 
 
 @pytest.mark.parametrize("coating", [0.0, 152.4e-6])

@@ -1,6 +1,6 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
-from ...core import Outcome
+from ...core import NotConverged, Outcome
 from ...mesh.tensor import TensorGrid, coarser, finer
 from ...model.pieces import bodies_of
 from .condensed import condensed
@@ -10,7 +10,7 @@ from .press import pressed, solve
 from .values import values
 
 LEAST_LEVELS = 3  # nested meshes that show an order
-MOST_WORK = {True: 6e9, False: 1.5e9}  # flop of the finest mesh: of a static patch, of one that moves
+MOST_WORK = {True: 1e10, False: 1.5e9}  # flop of condensing the finest mesh: of a static patch, of one that moves
 
 
 def solve_split(asked, level: int) -> tuple:
@@ -60,10 +60,13 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
     """
     grids, out = base_grids(asked), []
     while True:
-        if estimate or len(out) == LEAST_LEVELS - 1:
-            out.insert(0, pressed(asked, condensed(asked, *grids, fresh=fresh)))
-        else:
-            out.insert(0, None)
+        try:
+            wanted = estimate or len(out) == LEAST_LEVELS - 1
+            out.insert(0, pressed(asked, condensed(asked, *grids, fresh=fresh)) if wanted else None)
+        except NotConverged:  # cells too short for the digits there are: the meshes before stay
+            if not out or out[0] is None:
+                raise
+            return tuple(out) if len(out) > 1 else (*out, None)
         grids = [finer(grid) for grid in grids]
         if len(out) < LEAST_LEVELS:
             continue

@@ -105,7 +105,7 @@ def _unbounded(patch: Patch) -> str:
     A pressure that ends at the edge of a step is that of a punch with a sharp corner, and across a step that is closed
     it is worse. A skin yields at its peaks, so behind one the pressure stays bounded.
     """
-    if patch.pieces is not patch.pair.compliance or patch.skin is not None:
+    if patch.skinned:
         return ""
     x, cells = patch.x, np.diff(patch.x)
     bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active

@@ -33,6 +33,7 @@ class Patch:
     skin: object
     strips: object
     tangential_ratio: float | None
+    skinned: bool
     jumps: tuple
     notes: tuple
     seconds: dict
@@ -41,6 +42,17 @@ class Patch:
     def x(self) -> np.ndarray:
         """Places of the interface nodes (m,) [m]."""
         return self.pieces.interface.x
+
+    @property
+    def skin_share(self) -> np.ndarray | None:
+        """Share (m,) [1] of the asperities in the compliance of each node, None of bare pieces."""
+        if not self.skinned:
+            return None
+        bare = np.diag(self.pair.compliance.normal)
+        if self.strips is None:
+            return 1 - bare / np.diag(self.pieces.normal)
+        stiff = self.strips.stiffness.max(axis=0) * self.pieces.interface.weight
+        return 1 / (1 + bare * stiff)
 
     @property
     def active(self) -> np.ndarray:
@@ -79,8 +91,8 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
         notes = (*notes, strips.note)
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
         notes = (*notes, f"contact.mesh: {pair.joint.reason}")
-    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio, asked.gap.jumps, notes,
-                 pair.seconds | seconds)
+    return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio,
+                 asked.skin is not None, asked.gap.jumps, notes, pair.seconds | seconds)
 
 
 def presser(asked, pair: Pair):

@@ -8,7 +8,7 @@ from .ladder import solve_all
 from .measures import measures, plane_band, strip_error
 from .values import values
 
-__all__ = ["bodies", "measures", "probed", "solve_all", "static", "strained"]
+__all__ = ["bodies", "measured", "probed", "solve_all", "static", "strained"]
 
 
 def probed(model) -> dict:
@@ -27,6 +27,12 @@ def bodies(model) -> tuple:
         return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
 
 
+def measured(model, patch, coarse) -> dict:
+    """Static measures of the patch of a model; those of a mesh that the tolerance chose are extrapolated where they miss
+    it."""
+    return measures(patch, *coarse, tolerance=model.accuracy.tolerance if model.patch.chosen else None)
+
+
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     """Run a plan whose patch does not move, or a patch without contact; arguments as `run.run` has them."""
     p, extra = patch.pressure, {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
@@ -34,7 +40,7 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
     elif coarse[-1] is not None and what.kind == "patch":
         warnings = [*warnings, *plane_band(what.model.patch, coarse[0])]
-    found = measures(patch, *coarse)
+    found = measured(what.model, patch, coarse)
     if patch.strips is not None and coarse[0] is not None:
         found = strip_error(what.model.patch, coarse[0], found)
     return Result(what, p.outcome, found, None, None, patch, still(patch), seconds, warnings, extra)

@@ -8,7 +8,7 @@ from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tan
 from ...contact.strips_solve import smooth
 from ...core import Compliance, Pressure, frozen_array
 from ...slip import shear_modes
-from .skin import borne, skin_law
+from .skin import BEARING, borne, skin_law
 
 
 def in_strips(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
@@ -74,7 +74,12 @@ def strip_values(patch, peak_of) -> dict:
 def _behind_skin(patch, weight) -> dict:
     state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
-    return {"contact_fraction": float((borne(state.pressure) > 0).mean(axis=0) @ weight / weight.sum()),
+    x, bears = patch.x, state.pressure > BEARING * state.pressure.max()
+    stretches = [edges.intervals(x, bears[k], edges.faded(x, row, BEARING, state.pressure.max()))
+                 for k, row in enumerate(state.pressure) if bears[k].any()]
+    return {"contact_fraction": float(sum(np.diff(one).sum() for one in stretches) / (count * np.ptp(x))),
+            "contact_half_width": float(max(one[-1, 1] for one in stretches)
+                                        - min(one[0, 0] for one in stretches)) / 2,
             "normal_stiffness": strips_tangent(pieces.normal * count, weight, state),
             "rotational_stiffness": rotational_stiffness(state, pieces.normal * count, patch.x, weight),
             "tangential_stiffness": strips_tangent(pieces.tangential * count, weight, state, ratio)}

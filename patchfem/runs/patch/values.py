@@ -1,5 +1,7 @@
 """Values read off a pressed patch: peak, edges, half-width, stiffnesses."""
 
+from functools import partial
+
 import numpy as np
 
 from ...contact import edges
@@ -9,17 +11,18 @@ from .press import Patch
 from .skin import BEARING
 
 
-def peak_pressure(x, sigma) -> float:
-    """Largest pressure [Pa] of the nodal means sigma (m,) [Pa] at x (m,) [m].
+def peak_pressure(x, sigma, skin=None) -> float:
+    """Largest pressure [Pa] of the nodal pressures sigma (m,) [Pa] at x (m,) [m].
 
-    Inside it is the vertex of the parabola through the largest node and its neighbours, at a border of the interface
-    the end of the curve whose means over the nodes' own cells are theirs.
+    Inside it is the vertex of the parabola through the largest node and its neighbours. At a border of the interface
+    the nodal forces of bare pieces are means over half a cell, so it is the end of the curve that has these means; a
+    skin holds the pressure at the node. skin: (m,) [1] share of the skin in the compliance of a node, None without one.
     """
     top = int(np.argmax(sigma))
-    if top == 0:
-        return _at_border(x, sigma)
-    if top == x.size - 1:
-        return _at_border(-x[::-1], sigma[::-1])
+    if top in (0, x.size - 1):
+        bare = _at_border(x, sigma) if top == 0 else _at_border(-x[::-1], sigma[::-1])
+        share = 0.0 if skin is None else float(skin[top])
+        return share * float(sigma[top]) + (1 - share) * bare
     if sigma[top - 1] <= 0 or sigma[top + 1] <= 0:
         return float(sigma[top])
     left, right = x[top] - x[top - 1], x[top + 1] - x[top]
@@ -43,19 +46,20 @@ def _at_border(x, sigma) -> float:
 def values(patch: Patch) -> dict:
     """Value of every static measure of a pressed patch by name, in SI; `rows` has their meanings."""
     p, interface = patch.pressure, patch.pieces.interface
-    area, peak = interface.weight.sum(), peak_pressure(patch.x, p.sigma_n)
+    area, peak = interface.weight.sum(), peak_pressure(patch.x, p.sigma_n, patch.skin_share)
     out = {"normal_load": p.load, "contact_fraction": 0.0, "pressure_peak": peak, "moment": p.moment,
            "rotation": p.rotation, "approach": p.approach, "contact_half_width": 0.0,
            "pressure_centre": p.moment / p.load if p.load > 0 else 0.0, "loaded_fraction": 0.0, "normal_stiffness": 0.0,
            "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
     if p.outcome is not Outcome.NO_CONTACT:
         out["loaded_fraction"] = p.load / (area * peak)
-        with one_thread():
-            out |= _on_edges(patch)
+        if patch.strips is None:
+            with one_thread():
+                out |= _on_edges(patch)
     if patch.strips is not None:
         from .strips import strip_values
 
-        out |= strip_values(patch, peak_pressure)
+        out |= strip_values(patch, partial(peak_pressure, skin=patch.skin_share))
     return out
 
 

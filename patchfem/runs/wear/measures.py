@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Measure, frozen_array
-from ..patch.measures import remainder
+from ..patch.limits import limit
 from ..patch.press import pressed
 from ..patch.values import values
 from ..results.patch_rows import TABLE
@@ -92,8 +92,8 @@ def of_patch(found, motion: dict, estimate: bool = True) -> dict:
     for name, value in mine.items():
         error = None
         if others and estimate:
-            steps = [one[name] - two[name] for one, two in zip([mine, *others], others)]
-            error = jumps[name] + share * value + 3 * remainder(*(*steps, 0.0)[:2]) + 1e-12 * value
+            meshes = limit([*(one[name] for one in reversed(others)), value])
+            error = jumps[name] + share * value + meshes.error + 1e-12 * value
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
     return out
 
