@@ -1,0 +1,31 @@
+"""What a grid will cost: the sizes of its fronts are those of the factors, and more cells never cost less."""
+
+import numpy as np
+import pytest
+from pieces import COATED
+
+from patchfem.elasticity.condense import condense
+from patchfem.elasticity.elasticity import assemble
+from patchfem.elasticity.predicted import counts, predicted_bytes, predicted_seconds
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("nx, ny", [(2, 2), (5, 3), (16, 70), (41, 20), (90, 33)])
+def test_exact_counts_are_those_of_the_factors(nx, ny, mirrored):
+    piece = assemble(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1, COATED)
+    found = condense(piece.stencil, mirrored)
+    stacks = found.inside.stacks
+    shapes, fronts, entries, _, _ = counts(nx, ny, mirrored)
+    assert fronts >= sum(len(stack.own) for stack in stacks) and shapes >= len(stacks)  # some own nothing
+    kept = sum(kind.low.shape[0]**2 for kind in found.kinds)
+    whole = sum(stack.top.size + stack.side.size for stack in stacks)
+    assert whole + kept <= entries <= whole + 4 * kept  # half of a middle column is held
+    assert predicted_bytes(nx, ny, mirrored) >= 8 * entries
+
+
+def test_always_more_nodes_cost_more():
+    for predicted in (predicted_seconds, predicted_bytes):
+        for mirrored in (False, True):
+            steps = [predicted(nx, ny, mirrored) for nx, ny in ((10, 10), (30, 20), (60, 60), (61, 90), (200, 120))]
+            assert np.all(np.diff(steps) > 0)
+        assert predicted(101, 80, True) < predicted(101, 80, False)
