@@ -17,7 +17,7 @@ from .tensor_stiffness import applied
 from .threads import one_thread
 
 RESIDUAL = 1e-8  # of a solve with random forces, relative to the forces, beyond which solutions are refined
-CORRECTION = 1e-5  # of the displacements by one step of refinement, relative, beyond which the factors are refused
+CORRECTION = 1e-3  # of the displacements by one step of refinement, relative, beyond which the factors are refused
 PARITY = np.array([-1.0, 1.0])  # of (along x, inward) in even motion
 
 
@@ -50,14 +50,15 @@ class Condensed:
     """A grid condensed to its first row.
 
     stencil: of the whole grid (`tensor_stiffness`); inside: factors of the grid, or of its right half where `mirrored`;
-    kinds: what is kept, once per kind of motion; refined: whether solutions take one step of iterative refinement.
+    kinds: what is kept, once per kind of motion; rounding: relative error of the compliance by round-off, 0 where it is
+    not felt, else solutions take one step of iterative refinement.
     """
 
     stencil: np.ndarray
     inside: GridFactor
     kinds: tuple
     mirrored: bool
-    refined: bool = False
+    rounding: float = 0.0
 
     def compliance(self) -> np.ndarray:
         """Motions (2 nx, 2 nx) [m2/N] of the interface per force on it, unknowns (along x, inward) node by node."""
@@ -71,7 +72,7 @@ class Condensed:
         whole[:, 0] = load
         with one_thread():
             u = self._solved(whole, False)
-            return u + self._solved(whole - applied(self.stencil, u), True) if self.refined else u
+            return u + self._solved(whole - applied(self.stencil, u), True) if self.rounding else u
 
     def _solved(self, load, inside: bool) -> np.ndarray:
         """Displacements under loads (nx, rows, 2, r); inside: some act below the interface."""
@@ -101,7 +102,7 @@ def condense(stencil, mirrored: bool) -> Condensed:
     """Condense a grid to its first row and check the factors with random forces on it.
 
     stencil: (nx, rows, 3, 3, 2, 2) [N/m per m]; mirrored: whether the grid is its own mirror image in x. NotConverged
-    where the stiffness is not positive definite or one step of refinement changes a solution by more than 1e-5. That
+    where the stiffness is not positive definite or one step of refinement changes a solution by more than 1e-3. That
     change is the error of the compliance too: refined in double precision it differs by as much and is no better.
     """
     columns = stencil.shape[0]
@@ -182,4 +183,4 @@ def _checked(found: Condensed) -> Condensed:
         change = np.abs(found._solved(rest, True)).max() / np.abs(u).max()
     if not change <= CORRECTION:
         raise NotConverged(f"the stiffness of the piece is solved to {change:.1e} only, wanted {CORRECTION:.0e}")
-    return Condensed(found.stencil, found.inside, found.kinds, found.mirrored, True)
+    return Condensed(found.stencil, found.inside, found.kinds, found.mirrored, float(change))

@@ -70,6 +70,11 @@ class Piece:
         return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
 
     @property
+    def rounding(self) -> float:
+        """Relative error of the compliance by round-off [1], as far as it is known: 0 before anything is factorised."""
+        return self.made["factor"].rounding if "factor" in self.made else 0.0
+
+    @property
     def factor(self) -> Condensed:
         """The piece condensed to its interface, made once for compliance and fields.
 

@@ -86,18 +86,18 @@ def test_refuses_a_stiffness_that_is_not_positive_definite():
         condense(-piece_of(grid).stencil, True)
 
 
-@pytest.mark.parametrize("ratio, coating", [(1e5, 1e-8), (6e6, 1e-6), (1e12, 1e-8), (1e17, 1e-4)])
+@pytest.mark.parametrize("ratio, coating", [(1e12, 1e-8), (1e17, 1e-4)])
 def test_refuses_a_coating_that_is_beyond_the_arithmetic(ratio, coating):
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
     with pytest.raises(NotConverged, match=r"Young's moduli of coating and substrate differ .* leave it out"):
         interface_compliance(piece_of(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers))
 
 
-@pytest.mark.parametrize("ratio, coating", [(1700, 1e-8), (1e5, 1e-6), (6e6, 1e-4)])
+@pytest.mark.parametrize("ratio, coating", [(1700, 1e-8), (1e5, 1e-6), (6e6, 1e-4), (1e5, 1e-8), (6e6, 1e-6)])
 def test_exact_what_the_check_lets_pass_is_known_to_its_bound(ratio, coating):
     """Whole and halves meet round-off in another order: what they differ by is the error of both."""
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
     piece = piece_of(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers)
     one, two = (condense(piece.stencil, mirrored) for mirrored in (False, True))
-    assert two.refined
-    assert np.abs(one.compliance() - two.compliance()).max() <= CORRECTION * np.abs(one.compliance()).max()
+    assert 0 < two.rounding <= CORRECTION
+    assert np.abs(one.compliance() - two.compliance()).max() <= 3 * two.rounding * np.abs(one.compliance()).max()

@@ -32,6 +32,9 @@ def solved(*sets, text=BLOCKS):
     result = run(plan(scene))
     patch = result.patch
     for name, measure in result.measures.items():
+        if measure.value is None:
+            assert measure.reason, name
+            continue
         assert np.isfinite(measure.value) and measure.error >= 0 and np.isfinite(measure.error), name
     for field in result.fields.values():
         assert np.isfinite(field).all()
@@ -54,7 +57,7 @@ def holds(result, name, truth) -> bool:
 @pytest.fixture
 def cheap(monkeypatch):
     """Coarser automatic meshes: a hundredth of the work."""
-    monkeypatch.setattr(ladder, "MOST_WORK", {True: 1e9, False: 1e9})
+    monkeypatch.setattr(ladder, "SPENT", {True: 0.1, False: 0.1})
 
 
 @pytest.mark.parametrize(("load", "error"), [(1e-3, 2e-2), (1e-6, 3e-2)])
@@ -267,7 +270,7 @@ def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
     text = BLOCKS + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else BLOCKS
     found = solved(*GRADED.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
     grids = {id(g): g for g in (found.patch.pair.grid, found.patch.pair.upper_grid)}.values()
-    assert ladder.work(grids) <= 1e9 and np.diff(found.patch.x).min() > 0
+    assert ladder.seconds_of(grids) <= 0.15 and np.diff(found.patch.x).min() > 0
     if name in ("corner", "billionth"):  # the contact lies at the corner that the wedge closes
         assert value(found, "pressure_centre") == pytest.approx(-SIZE / 2, rel=5e-3)
 

@@ -52,18 +52,14 @@ def base_grids(asked, sweep=()) -> list:
     """
     cell = asked.size if asked.gap.profile is not None else asked.length / SEARCH_CELLS
     layout = Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
-    found = None
     for _ in range(SEARCHES):
-        grids = _grids(asked, layout, found)
+        grids = _grids(asked, layout)
         pair = condensed(asked, *grids)
-        seen = [one for one in (_loaded(pressed(each, pair)) for each in (asked, *sweep)) if one is not None]
-        if not seen:
-            break
-        found = seen[0]
+        seen = [_loaded(pressed(each, pair)) for each in (asked, *sweep)]
         layout = _layout(asked, seen)
         if max(one.cell / one.wide for one in seen) <= 1 / (EDGE - 1):
             break
-    return _grids(asked, layout, found)
+    return _grids(asked, layout)
 
 
 def _layout(asked, seen: list) -> Layout:
@@ -99,14 +95,16 @@ def _coating(asked) -> float:
     return min((piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0)
 
 
-def _loaded(patch: Patch) -> Found | None:
-    """Extent of the contact of a patch; None where nothing touches.
+def _loaded(patch: Patch) -> Found:
+    """Extent of the contact of a patch; where nothing touches, the cells around the narrowest gap.
 
     Of a smooth skin the part that bears a thousandth of the largest pressure counts.
     """
     x, sigma = patch.x, patch.pressure.sigma_n
     if not (sigma > 0).any():
-        return None
+        least = int(np.argmin(patch.pressure.gap))
+        low, high = float(x[max(least - 1, 0)]), float(x[min(least + 1, x.size - 1)])
+        return Found((low, high), (float(x[least]),), (), np.inf)
     strips = patch.strips.pressure if patch.strips is not None else sigma[None]
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
@@ -124,16 +122,16 @@ def _loaded(patch: Patch) -> Found | None:
     return Found((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)))
 
 
-def _grids(asked, layout: Layout, found: Found | None) -> list:
+def _grids(asked, layout: Layout) -> list:
     pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
     x = columns(layout, asked.gap.jumps)
     while x.size > MOST_COLUMNS + 1 and layout.bands:
         layout = layout.times(x.size / MOST_COLUMNS)
         x = columns(layout, asked.gap.jumps)
-    return [_grid(asked, x, piece, found) for piece in pieces]
+    return [_grid(asked, x, piece) for piece in pieces]
 
 
-def _grid(asked, x, piece, found: Found | None) -> TensorGrid:
+def _grid(asked, x, piece) -> TensorGrid:
     """Grid of one piece: rows as fine as the columns at the interface, at the coating's own face and at the holder."""
     thick, height = piece.thickness, piece.height
     top = float(np.diff(x).min())

@@ -1,6 +1,9 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
+import numpy as np
+
 from ...core import NotConverged, Outcome
+from ...elasticity.predicted import predicted_seconds
 from ...mesh.tensor import TensorGrid, coarser, finer
 from ...model.pieces import bodies_of
 from .condensed import condensed
@@ -10,7 +13,7 @@ from .press import pressed, solve
 from .values import values
 
 LEAST_LEVELS = 3  # nested meshes that show an order
-MOST_WORK = {True: 1e10, False: 1.5e9}  # flop of condensing the finest mesh: of a static patch, of one that moves
+SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 
 
 def solve_split(asked, level: int) -> tuple:
@@ -71,11 +74,13 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
         if len(out) < LEAST_LEVELS:
             continue
         nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
-        if not estimate or nothing or work(grids) > MOST_WORK[asked.still] or met(measures(*out, tolerance=tolerance),
-                                                                                  tolerance):
+        if not estimate or nothing or seconds_of(grids) > SPENT[asked.still] or \
+                met(measures(*out, tolerance=tolerance), tolerance):
             return tuple(out)
 
 
-def work(grids) -> float:
-    """About how many floating-point operations it takes to condense the grids of a patch."""
-    return sum(60.0 * (grid.x.size * grid.depth.size)**1.5 for grid in grids)
+def seconds_of(grids) -> float:
+    """Predicted time [s] of condensing the grids of a patch; a grid counts as its own mirror image where it is even."""
+    return sum(predicted_seconds(grid.x.size, grid.depth.size, bool(np.allclose(grid.x, -grid.x[::-1], rtol=0,
+                                                                               atol=1e-12 * grid.length)))
+               for grid in grids)

@@ -43,12 +43,12 @@ def limit(values, nested: bool = True) -> Limit:
     ratio = before / last if last else float("inf") * (1 if before >= 0 else -1)
     if not nested:
         rest = max(abs(last), abs(before) / DOUBTFUL) / (min(max(ratio, SLOWEST), DOUBTFUL) - 1)
-        return Limit(values[-1], SAFE * rest, values[-1], SAFE * rest)
+        return Limit(values[-1], WILD * rest, values[-1], WILD * rest)
     if not GROWING <= ratio:
         error = WILD * max(abs(last), abs(before) / ORDER)
         return Limit(values[-1], error, values[-1], error)
     if ratio > REGULAR[1]:  # the last change is small by chance
-        error = WILD * max(abs(last) / (ORDER - 1), abs(before) / ORDER**2)
+        error = WILD * max(abs(last) / (ORDER - 1), abs(before) / ORDER**2 * 2)
         return Limit(values[-1], error, values[-1], error)
     rest = last / (min(max(ratio, SLOWEST), ORDER) - 1)
     return Limit(values[-1], SAFE * abs(rest), values[-1] + rest, _left(values, rest, ratio))

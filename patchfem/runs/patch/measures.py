@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...contact import edges
 from ...core import Measure
 from ...mesh.tensor import TensorGrid
 from ..results.patch_rows import TABLE
@@ -77,7 +78,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         seen = limit([*(one[name] for one in found), value], nested)
         wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
         best, error = seen.best(wanted)
-        error = max(error, least.get(name, 0.0), ALIKE * abs(value))
+        error = max(error, least.get(name, 0.0), max(ALIKE, fine.pair.rounding) * abs(value))
         out[name] = Measure(float(best), TABLE[name].unit, float(error), floors[name])
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
@@ -156,11 +157,24 @@ def _least(patch: Patch, mine: dict) -> dict:
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
-    off = OFFSET * edge_cells(patch.x, patch.active).sum() * (1 + (count <= POINT)) if patch.skin is None else 0.0
+    off = _offset(patch) * edge_cells(patch.x, patch.active).sum() * (1 + (count <= POINT)) if patch.skin is None else 0
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
             "contact_half_width": off / 2, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
             "rotation": turned / length, "approach": ROUND * (np.ptp(patch.gap) + moved)}
+
+
+def _offset(patch: Patch) -> float:
+    """Cells by which an edge may lie off its place between two nodes.
+
+    A soft coating thinner than the cells is a bed of springs, whose edge lies where the pressure of a node vanishes.
+    """
+    out, cell = OFFSET, max(edge_cells(patch.x, patch.active), default=0.0)
+    for grid, piece in ((patch.pair.grid, patch.pair.piece), (patch.pair.upper_grid, patch.pair.upper)):
+        if grid.coating > 0:
+            ratio = piece.layers.coating[0] / piece.layers.substrate[0]
+            out = max(out, edges.BEHIND * min(1.0, cell / grid.coating) * (1 - min(ratio, 1 / ratio)))
+    return out
 
 
 def _corner_layer(patch: Patch) -> float:
