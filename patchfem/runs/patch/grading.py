@@ -7,7 +7,9 @@ import numpy as np
 
 from ...core import Outcome, frozen_array
 from ...mesh.grading import Layout, columns
-from ...mesh.tensor import TensorGrid, finer, graded_depth
+from ...mesh.nested import finer
+from ...mesh.tensor import TensorGrid, graded_depth
+from ...model.pieces import outlined
 from .condensed import condensed
 from .measures import measures, order
 from .press import Patch, pressed
@@ -157,7 +159,7 @@ def _loaded(patch: Patch) -> tuple | None:
 
 def _grids(asked, x, growth: float) -> list:
     pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
-    return [_grid(asked, x, piece, growth) for piece in pieces]
+    return [outlined(asked, piece, _grid(asked, x, piece, growth), growth) for piece in pieces]
 
 
 def _grid(asked, x, piece, growth: float) -> TensorGrid:

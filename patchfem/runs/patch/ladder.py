@@ -1,6 +1,6 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
-from ...mesh.tensor import TensorGrid, coarser, finer
+from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from .grading import solve_graded
 from .press import solve
@@ -16,7 +16,7 @@ def solve_split(asked, level: int) -> tuple:
 
 
 def _halved(body):
-    if isinstance(body, TensorGrid):
+    if plan_of(body) is not None:
         return finer(body)
     from ...mesh.anymesh import halved
 
@@ -36,7 +36,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     out = [solve(asked, low, high, fresh), None, None]
     if not estimate or low.x.size <= 8:
         return tuple(out)
-    if not isinstance(low, TensorGrid):
+    if plan_of(low) is None:
         out[1] = solve(asked, _halved(low), _halved(high))
         return tuple(out)
     for k in (1, 2):

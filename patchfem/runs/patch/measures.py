@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import Measure
-from ...mesh.tensor import TensorGrid
+from ...mesh.nested import plan_of
 from ..results.patch_rows import TABLE
 from .press import Patch, pressed, solve
 from .values import edge_cells, values
@@ -141,9 +141,10 @@ def _snap(patch: Patch, mine: dict) -> dict:
 
 def _halved(fine: Patch, coarse: Patch) -> bool:
     """Whether every cell of the coarse grids was split in two."""
-    pairs = ((fine.pair.grid, coarse.pair.grid), (fine.pair.upper_grid, coarse.pair.upper_grid))
-    return all(isinstance(a, TensorGrid) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
-               for a, b in pairs)
+    bodies = ((fine.pair.grid, coarse.pair.grid), (fine.pair.upper_grid, coarse.pair.upper_grid))
+    plans = [tuple(map(plan_of, pair)) for pair in bodies]
+    return all(None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
+               for a, b in plans)
 
 
 def _cell(patch: Patch) -> float:
