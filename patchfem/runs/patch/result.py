@@ -50,6 +50,10 @@ def strained(asked, patch) -> list:
                         (closed, "the approach is {:.3g} of the pieces' height")):
         if share > 0.02:
             out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
+    kinds = {piece.corner(asked.length / 2) for piece in (asked.lower, asked.upper)}
+    if "radius" in kinds and patch.active[[0, -1]].any():
+        out.append("the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches "
+                   "here; lower the tilt or the load")
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > 0.47:
         out.append(f"Poisson's ratio {stiff:g} in plane strain: bilinear cells lock towards 0.5; the pressure peak is "

@@ -58,5 +58,5 @@ def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
                           "wanted")
         elif size and length and size < LEAST * length:
             draft.say(at, f"{size} m is less than a millionth of the length {length} m: leave it out")
-        if size and height and size + thickness >= height:
+        elif size and height and size + thickness >= height:
             draft.say(at, f"{size} m and a coating of {thickness} m do not fit into the height {height} m of the piece")
