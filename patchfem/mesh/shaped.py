@@ -39,6 +39,11 @@ class ShapedGrid(PieceMesh):
         """Thickness of the coating [m], 0 without one."""
         return self.inner.coating
 
+    @property
+    def flat(self) -> float:
+        """Half the length [m] of the face before its ends begin."""
+        return self._whole / 2 - self.end.size
+
     def finer(self) -> "ShapedGrid":
         """Every cell split in two in both directions; the face follows its shape anew."""
         return _made(tensor.finer(self.inner), tensor.split(self.outer), self._whole, self.end)

@@ -1,5 +1,6 @@
 """Grids and elastic layers of the two pieces of a patch: made, or read from a mesh file."""
 
+from ..closed_forms.contact import rounded_punch_half_width
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh.tensor import GROWTH, TensorGrid, graded_grid
@@ -27,6 +28,25 @@ def outlined(patch: PatchModel, piece: OnePiece, grid: TensorGrid, growth: float
     from ..mesh.shaped import shaped_grid
 
     return shaped_grid(grid, piece.length, piece.end, growth)
+
+
+def rounded_edges(patch: PatchModel) -> tuple:
+    """Places [m] where the flat and where the contact ends at rounded ends, either side, and the distance [m] between
+    the two; ((), None) where the ends are not rounded.
+
+    It is that of a rounded punch on a half plane under the nominal load without tilt (closed_forms.contact), the faces
+    as stiff as their coatings.
+    """
+    rounded = [piece.end.size for piece in (patch.lower, patch.upper) if piece.corner(patch.length / 2) == "radius"]
+    load = patch.nominal_load / (patch.width * patch.pairs)
+    if not rounded or not load > 0:
+        return (), None
+    flat = min(piece.length / 2 - piece.end.size for piece in (patch.lower, patch.upper))
+    faces = [piece.coating.material if piece.coating else piece.substrate for piece in (patch.lower, patch.upper)]
+    modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
+    half = rounded_punch_half_width(load, flat, 1 / sum(1 / radius for radius in rounded), modulus)
+    half = min(half, patch.length / 2)
+    return (-half, -flat, flat, half), half - flat
 
 
 def bodies_of(patch: PatchModel) -> tuple:

@@ -18,7 +18,7 @@ from patchfem.mesh.nested import finer
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
 from patchfem.model.model import build
-from patchfem.model.pieces import bodies_of, outlined
+from patchfem.model.pieces import bodies_of, outlined, rounded_edges
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
@@ -170,6 +170,20 @@ def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_cho
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "contact_fraction"):
         assert abs(rough[name].value - best[name].value) <= rough[name].error + best[name].error, name
         assert rough[name].error <= 0.05 * abs(rough[name].value)
+
+
+@pytest.mark.parametrize("radius", ["2 um", "0.2 mm", "2 mm"])
+@pytest.mark.parametrize("tilt", ["", TILT.format("")])
+def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_over_it(radius, tilt):
+    tables = UPPER + f'length = "8 mm"\nend_radius = "{radius}"\n' + tilt
+    model = asked(BLOCK + tables)
+    (*_, half), edge = rounded_edges(model)
+    true = values(graded(model, towards(half, model.length / 2, edge / 30)))
+    for cells in (20, 150):
+        found = measures(*solve_all(asked(BLOCK + f'element_size = "{model.length / cells!r} m"\n' + tables), 1e-3))
+        for name in ("pressure_peak", "contact_fraction", "contact_half_width", "approach"):
+            assert abs(found[name].value - true[name]) <= found[name].error, name
+        assert found["pressure_peak"].error < 20 * true["pressure_peak"]
 
 
 def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):

@@ -9,7 +9,7 @@ from ...core import Outcome, frozen_array
 from ...mesh.grading import Layout, columns
 from ...mesh.nested import finer
 from ...mesh.tensor import TensorGrid, graded_depth
-from ...model.pieces import outlined
+from ...model.pieces import outlined, rounded_edges
 from .condensed import condensed
 from .measures import measures, order
 from .press import Patch, pressed
@@ -116,22 +116,26 @@ def _base(asked, tolerance: float) -> Base:
         if found is None:
             break
         span, places, cell = found
-        layout = _layout(size, span, places, tolerance)
+        known, edge = rounded_edges(asked)
+        places += [x for x in known if span[0] - cell <= x <= span[1] + cell]
+        layout = _layout(size, span, places, tolerance, edge)
         if cell <= (span[1] - span[0]) / 64:  # the places are known better than the coarsest cells there
             break
     return Base(layout)
 
 
-def _layout(length: float, span, places, tolerance: float) -> Layout:
+def _layout(length: float, span, places, tolerance: float, edge: float | None) -> Layout:
     """Layout of the coarsest columns, with the finest cells where the contact ends.
 
-    An edge of the contact is known to about half a cell of the finest mesh, which is a quarter as long.
+    An edge of the contact is known to about half a cell of the finest mesh, which is a quarter as long. edge [m]: over
+    which the pressure falls off at a rounded end, None where it does not.
     """
     wide = span[1] - span[0]
     if len(places) > MOST_PLACES:
         return Layout(length, (), span, length / 64, length / 64, length / 64, 0.0)
     inside = min(wide / 6, length / 24)
-    least = max(min(inside / 64, tolerance * wide), inside / 800, LEAST * length)
+    least = max(min(inside / 64, tolerance * wide), inside / 800)
+    least = max(min(least, edge / 4 if edge else least), LEAST * length)
     return Layout(length, tuple(places), tuple(span), least, max(inside, least), length / 12, 0.6)
 
 

@@ -9,6 +9,7 @@ from ...core import Measure
 from ...mesh.nested import plan_of
 from ..results.patch_rows import TABLE
 from .press import Patch, pressed, solve
+from .rounding import open_ends, unresolved_rounding
 from .values import edge_cells, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
@@ -162,8 +163,8 @@ def _floors(fine: Patch) -> dict:
 def _least(patch: Patch, mine: dict) -> dict:
     """Errors that three meshes may agree to hide.
 
-    They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, and
-    round-off.
+    They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
+    smaller than the cells, and round-off.
     """
     length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
     count = max(int(patch.active.sum()), 1)
@@ -172,10 +173,13 @@ def _least(patch: Patch, mine: dict) -> dict:
     peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell else 0.0)
     if count <= FEW and cell:
         peak = max(peak, _wedge(patch))
+    peak = max(peak, unresolved_rounding(patch) - mine["pressure_peak"])
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
-    return {"normal_load": 1e-10 * load, "pressure_peak": peak, "loaded_fraction": peak * fullness,
+    ends = float(open_ends(patch))
+    return {"contact_fraction": ends / length, "contact_half_width": ends / 2, "normal_load": 1e-10 * load,
+            "pressure_peak": peak, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
             "rotation": turned / length, "approach": ROUND * (np.ptp(patch.gap) + moved)}
 

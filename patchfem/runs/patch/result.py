@@ -6,6 +6,7 @@ from ...model.source import placed
 from ..results.result import Result, still
 from .ladder import solve_all
 from .measures import measures, plane_band, strip_error
+from .rounding import beyond_gentle
 from .values import values
 
 __all__ = ["bodies", "measures", "probed", "solve_all", "static", "strained"]
@@ -50,8 +51,7 @@ def strained(asked, patch) -> list:
                         (closed, "the approach is {:.3g} of the pieces' height")):
         if share > 0.02:
             out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
-    kinds = {piece.corner(asked.length / 2) for piece in (asked.lower, asked.upper)}
-    if "radius" in kinds and patch.active[[0, -1]].any():
+    if beyond_gentle(patch):
         out.append("the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches "
                    "here; lower the tilt or the load")
     stiff = max(m.poisson for m in stuff)

@@ -4,7 +4,7 @@ from ..keys.contact import Contact
 from .draft import Draft
 
 ENDS = ("chamfer", "end_radius")
-LEAST = 1e-6  # of the length of a piece: an end, or a difference of lengths, below it is no shape that a mesh can show
+LEAST = 1e-5  # of the length of a piece: an end, or a difference of lengths, below it is no shape that a mesh can show
 
 
 def length_of(contact: Contact, name: str) -> float | None:
@@ -39,7 +39,7 @@ def outlines(draft: Draft) -> None:
     given = [name for name in ("upper", "lower") if draft.given(f"contact.{name}.length")]
     if given and None not in lengths and 0 < abs(lengths[0] - lengths[1]) < LEAST * max(lengths):
         draft.say(f"contact.{given[-1]}.length", f"the pieces are {lengths[0]} and {lengths[1]} m long, unlike by less "
-                                                 "than a millionth: write the same length for both")
+                                                 "than 1e-5 of it: write the same length for both")
     if len(given) == 2 and draft.given("contact.length"):
         draft.remark("contact.length is not used: [contact.upper] and [contact.lower] name their own")
 
@@ -57,6 +57,6 @@ def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
             draft.say(at, f"{size} m at both ends leaves no face of a piece {length} m long: {key} < length/2 is "
                           "wanted")
         elif size and length and size < LEAST * length:
-            draft.say(at, f"{size} m is less than a millionth of the length {length} m: leave it out")
+            draft.say(at, f"{size} m is less than 1e-5 of the length {length} m: leave it out")
         elif size and height and size + thickness >= height:
             draft.say(at, f"{size} m and a coating of {thickness} m do not fit into the height {height} m of the piece")
