@@ -53,8 +53,8 @@ EFFECTS = {
     "contact": Effect("patchfem.contact.unilateral", "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
                       (), ("pressure",)),
     "contact.coating": Effect("", "Lame pair of the layer in the coating rows"),
-    "contact.upper": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
-    "contact.lower": Effect("", "C = C_upper + C_lower, each with its own height, materials and coating"),
+    "contact.upper": Effect("", "C = C_upper + C_lower, each with its own size, ends, materials and coating"),
+    "contact.lower": Effect("", "C = C_upper + C_lower, each with its own size, ends, materials and coating"),
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
     "contact.step": Effect(GAPS, "g += height H(x - at)", means={

@@ -147,6 +147,18 @@ def rounded_punch_pressure(x, line_load, flat, radius, modulus):
     return np.where(np.abs(x) < half, p, 0.0)[()]
 
 
+def rounded_corner(intensity, radius, modulus) -> tuple:
+    """How far [m] contact reaches onto a rounding of radius R [m], small beside all else, and the peak [Pa] there.
+
+    Away from it the pressure is K/sqrt(r), r from the end of the flat: intensity K [Pa m^0.5]; modulus E* [Pa]. The
+    limit of `rounded_punch_half_width` for a long flat: e = (3 sqrt(2) pi K R/E*)^(2/3)/2, peak 1.7995 K/sqrt(e), 0.305
+    e beyond the end of the flat. ValueError unless all are positive.
+    """
+    positive(intensity=intensity, radius=radius, modulus=modulus)
+    reach = (3 * np.sqrt(2) * np.pi * intensity * radius / modulus)**(2 / 3) / 2
+    return float(reach), float(1.7995 * intensity / np.sqrt(reach))
+
+
 # ---- waves and layers
 
 def westergaard_full_pressure(wavelength, amplitude, modulus):

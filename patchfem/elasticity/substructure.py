@@ -18,7 +18,7 @@ from .factor import factorise
 from .stiffness import stiffness
 from .threads import one_thread
 
-RESIDUAL = 1e-8  # of a solve with random loads, relative
+MISS = 1e-5  # of the displacements under random loads, relative: beyond it bars of the tolerance 1e-3 may not hold
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -72,9 +72,12 @@ def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
     with one_thread():
         found = factorise(matrix, firsts, name)
         load = np.random.default_rng(0).normal(size=(matrix.shape[0], 1))
-        miss = np.abs(matrix @ found.solve(load) - load).max() / np.abs(load).max()
-    if not miss <= RESIDUAL:
-        raise NotConverged(f"the stiffness of the piece is solved to {miss:.1e} only, wanted {RESIDUAL:.0e}")
+        u = found.solve(load)
+        # the step of a refinement is the error; the residual itself is round-off of K u wherever cells are tiny
+        miss = np.abs(found.solve(load - matrix @ u)).max() / np.abs(u).max()
+    if not miss <= MISS:
+        raise NotConverged(f"the stiffness of a piece is solved to {miss:.1e} only, wanted {MISS:.0e}: it is too "
+                           "slender for such small cells; lower its height or name a larger contact.element_size")
     return order, matrix, found
 
 

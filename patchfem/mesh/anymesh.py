@@ -72,8 +72,13 @@ class PieceMesh:
 
     @property
     def coating(self) -> float:
-        """Mean thickness of the coating [m], its area over the length of the interface; 0 without one."""
-        return float(self.areas()[self.is_coating].sum() / self.length)
+        """Mean thickness of the coating: its area over its extent along x [m], 0 without one."""
+        if not self.is_coating.any():
+            return 0.0
+        count = len(self.triangles)
+        cells = self.triangles[self.is_coating[:count]], self.quads[self.is_coating[count:]]
+        x = self.points[np.concatenate([part.ravel() for part in cells]), 0]
+        return float(self.areas()[self.is_coating].sum() / np.ptp(x))
 
     def areas(self) -> np.ndarray:
         """Areas of the cells (t + q,) [m2], > 0, triangles first."""

@@ -121,11 +121,12 @@ def coarser(grid: TensorGrid) -> TensorGrid:
         x = np.linspace(grid.x[0], grid.x[-1], nx // 2 + 2)
     else:
         x = grid.x[::2]
-    coated, under = _every_second(grid.depth[:coat + 1]), _every_second(grid.depth[coat:])
+    coated, under = every_second(grid.depth[:coat + 1]), every_second(grid.depth[coat:])
     return TensorGrid(frozen_array(x), frozen_array(np.concatenate([coated, under[1:]])), coated.size - 1)
 
 
-def _every_second(levels) -> np.ndarray:
+def every_second(levels) -> np.ndarray:
+    """Every second one of the levels (k,), first and last kept; evenly spaced between them where k is even."""
     if levels.size % 2:
         return levels[::2]
     return np.interp(np.linspace(0, levels.size - 1, levels.size // 2 + 1), np.arange(levels.size), levels)
@@ -137,11 +138,11 @@ def finer(grid: TensorGrid) -> TensorGrid:
     The rows of the coating stay in the coating.
     """
     coat = grid.coating_rows
-    coated, under = _split(grid.depth[:coat + 1]), _split(grid.depth[coat:])
-    return TensorGrid(frozen_array(_split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat)
+    coated, under = split(grid.depth[:coat + 1]), split(grid.depth[coat:])
+    return TensorGrid(frozen_array(split(grid.x)), frozen_array(np.concatenate([coated, under[1:]])), 2 * coat)
 
 
-def _split(levels) -> np.ndarray:
+def split(levels) -> np.ndarray:
     """Levels with one more inside each cell, nearer to the shorter neighbour, so that a geometric series stays one."""
     if levels.size < 2:
         return levels

@@ -13,7 +13,7 @@ from ..inputs.measured import read_table
 from ..scene.rules.limits import sideways
 from ..scene.scene import files_of, is_there
 from .drive import record
-from .patch import AUTOMATIC_CELLS
+from .patch import AUTOMATIC_CELLS, interface_of, pieces_asked
 from .profile import profile_gap, trace_of
 from .slide import rows_of
 
@@ -52,13 +52,14 @@ def _mesh(path: Path, tables, whole: bool) -> None:
 
 
 def _profile(path: Path, tables, whole: bool) -> None:
-    """A trace that covers the patch and is no finer than its elements."""
+    """A trace that covers the interface and is no finer than its elements."""
     trace_of(path)
     contact = tables.contact
     if not whole or contact.mesh is not None:
         return
-    size = contact.element_size or contact.length / AUTOMATIC_CELLS
-    x = np.linspace(-contact.length / 2, contact.length / 2, max(1, round(contact.length / size)) + 1)
+    length = interface_of(pieces_asked(contact))
+    size = contact.element_size or length / AUTOMATIC_CELLS
+    x = np.linspace(-length / 2, length / 2, max(1, round(length / size)) + 1)
     profile_gap(path, x, size, contact.asperities is not None, contact.profile.heights == "surface")
 
 

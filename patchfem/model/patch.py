@@ -4,35 +4,51 @@ solved."""
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..mesh.ends import SHARP, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from .gap import Gap, gap_asked
 
 CHOSEN_POINTS = 160  # about what a patch takes at the default tolerance
 AUTOMATIC_CELLS = 200  # along the interface: down to this length a profile stands for content
+CLOSE = 1e-9  # lengths below this share of another one are nothing
 
 
 @dataclass(frozen=True, slots=True)
 class OnePiece:
     """One of the two pieces of a patch.
 
-    height [m], its coating included; coating: None where the piece is bare.
+    height [m], its coating included; coating: None where the piece is bare; length [m] along x; end: shape of both
+    ends.
     """
 
     height: float
     substrate: Material
     coating: Coating | None
+    length: float
+    end: End
 
     @property
     def thickness(self) -> float:
         """Thickness of the coating [m], 0 where the piece is bare."""
         return self.coating.thickness if self.coating else 0.0
 
+    @property
+    def bearing(self) -> float:
+        """Half the length [m] of the face that can touch."""
+        return self.end.bearing(self.length)
+
+    def corner(self, half: float) -> str:
+        """What the face does at the distance `half` [m] from its middle: "flat" where it goes on, else the kind of its
+        end."""
+        return "flat" if self.bearing > half * (1 + CLOSE) else self.end.kind
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchModel:
     """Two pieces and what presses them.
 
-    length, width, height [m], the last of a piece that names none; pairs: equal patches that share the load; plane:
+    length [m] of the interface, which is where both faces can touch; width, height [m], the last of a piece that names
+    none; pairs: equal patches that share the load; plane:
     "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface; None lets
     the tolerance choose; mesh: file of the two pieces; still: nothing of the patch moves, so that all the time there is
     may be spent on it. load [N] or approach
@@ -68,13 +84,28 @@ class PatchModel:
 
     @property
     def alike(self) -> bool:
-        """Whether the pieces have the same height, material and coating."""
+        """Whether the pieces have the same height, material, coating, length and ends."""
         return self.lower == self.upper
 
     @property
     def chosen(self) -> bool:
         """Whether the tolerance chooses the mesh."""
         return self.element_size is None and self.mesh is None
+
+    @property
+    def outlined(self) -> bool:
+        """Whether a piece reaches beyond the interface, by its length or by its ends."""
+        return any(piece.length > self.length * (1 + CLOSE) for piece in (self.lower, self.upper))
+
+    @property
+    def singular_ends(self) -> bool:
+        """Whether pressure at the ends of the interface has no bound.
+
+        It has none where a corner of one piece meets a face that goes on, or a chamfer. Two sharp ends that meet are
+        bounded: by symmetry either piece is half of a straight bar. Nothing is said of the ends in a mesh file.
+        """
+        corners = {piece.corner(self.length / 2) for piece in (self.lower, self.upper)}
+        return self.mesh is None and "radius" not in corners and corners != {"sharp"}
 
     @property
     def size(self) -> float:
@@ -104,12 +135,13 @@ class PatchModel:
 
 def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
     """The patch of [contact]; kind: of the run; beside(name) -> path of a file that the scene names."""
-    size = None if contact.mesh is not None else contact.element_size or contact.length / AUTOMATIC_CELLS
+    lower, upper = pieces = pieces_asked(contact)
+    length = interface_of(pieces)
+    size = None if contact.mesh is not None else contact.element_size or length / AUTOMATIC_CELLS
     line, holder, strips = contact.load_line, contact.holder, contact.strips
     return PatchModel(
-        contact.length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate,
-        _piece(contact, contact.lower),
-        _piece(contact, contact.upper), gap_asked(contact, size, beside), contact.element_size, kind == "patch",
+        length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate, lower, upper,
+        gap_asked(contact, size, beside), contact.element_size, kind == "patch",
         beside(contact.mesh) if contact.mesh is not None else None, contact.load,
         contact.approach.distance if contact.approach is not None else None,
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
@@ -119,13 +151,27 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
         contact.gives_way)
 
 
+def pieces_asked(contact: Contact) -> tuple:
+    """The lower and the upper OnePiece of [contact]."""
+    return _piece(contact, contact.lower), _piece(contact, contact.upper)
+
+
+def interface_of(pieces) -> float:
+    """Length [m] over which the faces of both pieces, centred at x = 0, can touch: that of the shorter one."""
+    return 2 * min(piece.bearing for piece in pieces)
+
+
 def _piece(contact: Contact, own) -> OnePiece:
     """One piece: its own table before the common keys."""
     height, substrate, coating = contact.height, contact.substrate, contact.coating
+    length, end = contact.length, SHARP
     if own is not None:
         height, substrate = own.height or height, own.substrate or substrate
         coating = None if own.coating == "none" else own.coating or coating
-    return OnePiece(height, substrate, coating)
+        length = own.length or length
+        if own.chamfer or own.end_radius:
+            end = End("chamfer", own.chamfer) if own.chamfer else End("radius", own.end_radius)
+    return OnePiece(height, substrate, coating, length, end)
 
 
 def bars(patch: PatchModel, softness) -> float:

@@ -100,6 +100,15 @@ def test_exact_rounded_punch_follows_its_shape(load, share):
     assert found == pytest.approx(want, abs=1e-6 * half / ROUND)
 
 
+@pytest.mark.parametrize("load, radius", [(1e4, 2e-4), (1e3, 1e-5)])
+def test_order_a_rounded_corner_is_the_limit_of_the_rounded_punch(load, radius):
+    flat, modulus = 4e-3, 1e11
+    reach, peak = exact.rounded_corner(load / np.pi / np.sqrt(2 * flat), radius, modulus)
+    x = flat + np.linspace(-2, 1, 3001) * reach
+    assert exact.rounded_punch_half_width(load, flat, radius, modulus) - flat == pytest.approx(reach, rel=1e-4)
+    assert exact.rounded_punch_pressure(x, load, flat, radius, modulus).max() == pytest.approx(peak, rel=1e-4)
+
+
 def test_exact_rounded_punch_between_hertz_and_the_flat_punch():
     load = 3e6
     x = np.linspace(-0.9, 0.9, 7) * exact.hertz_half_width(load, ROUND, MODULUS)

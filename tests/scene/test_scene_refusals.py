@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from scene_texts import BENCH, LINEAR, PATCH, RIG, STRUCTURE, line_of, mistakes, only
+from scene_texts import BENCH, LINEAR, PATCH, PIECE, RIG, STRUCTURE, line_of, mistakes, only
 
 from patchfem.scene.keys.tables import Tables
 from patchfem.scene.keys.types import keys, model_of
@@ -74,6 +74,12 @@ BAD_SETS = [
     ("contact.pairs=true", "contact.pairs", "a whole number is wanted, not true"),
     ("contact.plane=strane", "contact.plane", "did you mean 'strain'?"),
     ("contact.element_size=13 mm", "contact.element_size", "longer than contact.length"),
+    ("contact.upper.length=0 mm", "contact.upper.length", "must be > 0"),
+    ("contact.lower.length=12.7000001 mm", "contact.lower.length", "write the same length for both"),
+    ("contact.lower.chamfer=-1 mm", "contact.lower.chamfer", "must be > 0"),
+    ("contact.lower.chamfer=6.2 mm", "contact.lower.chamfer", "do not fit into the height"),
+    ("contact.lower.end_radius=6.4 mm", "contact.lower.end_radius", "leaves no face"),
+    ("contact.upper.chamfer=1 nm", "contact.upper.chamfer", "less than 1e-5 of the length"),
     ("contact.load_line.offset=1 mm", "contact.load_line", "without [contact.holder]"),
     ("contact.crown.radius=-1 m", "contact.crown.radius", "must be > 0"),
     ("contact.tilt.on=both", "contact.tilt.on", "one of upper, lower"),
@@ -344,3 +350,19 @@ cycles = 2
     scene = loads(text.replace("0.4", "0.2"))
     assert scene.kind == "rig" and scene.structure.masses == (1.0, 2.0) and scene.structure.output_mass == 1
     assert (scene.structure.interface[0].between, scene.structure.interface[0].kinetic) == ((2, 0), 0.2)
+
+
+OUTLINES = [
+    ('[contact.upper]\nchamfer = "1 mm"\nend_radius = "1 mm"\n', (), "contact.upper.end_radius", "exclude each other"),
+    ('[contact.upper]\nlength = "8 mm"\n', ("contact.element_size=9 mm",), "contact.element_size", "the interface,"),
+    ('[contact.upper]\nlength = "8 mm"\n', ("contact.load_line.offset=4 mm",), "contact.load_line.offset", "outside"),
+    ('[contact.lower]\nchamfer = "3 mm"\n', ('contact.step={height="1 um",at="4 mm"}',), "contact.step.at", "outside"),
+    *((f'mesh = "a.msh"\n[contact.lower]\n{key} = "1 mm"\n', (), f"contact.lower.{key}", "beside contact.mesh")
+      for key in ("length", "chamfer", "end_radius")),
+]
+
+
+@pytest.mark.parametrize("tables, sets, key, words", OUTLINES)
+def test_refuses_outlines_that_do_not_fit(tables, sets, key, words):
+    text = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables
+    assert any(f"{key}: " in line and words in line for line in mistakes(text, *sets)), mistakes(text, *sets)

@@ -11,6 +11,7 @@ import numpy as np
 from ...core import frozen_array
 from ...mesh.grading import Layout, columns, rows
 from ...mesh.tensor import TensorGrid
+from ...model.pieces import outlined, rounded_edges
 from .condensed import condensed
 from .press import Patch, pressed
 from .values import found_ends
@@ -75,7 +76,10 @@ def _layout(asked, seen: list) -> Layout:
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
     bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
-    corner = max(min(thick / 8 if thick else np.inf, wide / EDGE), LEAST * asked.length)
+    known, fall = rounded_edges(asked)
+    bands += tuple((place, place, min(least, fall / 4)) for place in known if span[0] - least <= place <= span[1] + least)
+    sharp = JUMP if asked.singular_ends else 1
+    corner = max(min(thick / 8 if thick else np.inf, wide / EDGE / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder
@@ -128,7 +132,7 @@ def _grids(asked, layout: Layout) -> list:
     while x.size > MOST_COLUMNS + 1 and layout.bands:
         layout = layout.times(x.size / MOST_COLUMNS)
         x = columns(layout, asked.gap.jumps)
-    return [_grid(asked, x, piece) for piece in pieces]
+    return [outlined(asked, piece, _grid(asked, x, piece), 1 + SLOPE) for piece in pieces]
 
 
 def _grid(asked, x, piece) -> TensorGrid:

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import NotConverged, Outcome
 from ...elasticity.predicted import predicted_seconds
-from ...mesh.tensor import TensorGrid, coarser, finer
+from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from .condensed import condensed
 from .grading import base_grids
@@ -12,6 +12,7 @@ from .measures import measures, met
 from .press import pressed, solve
 from .values import values
 
+OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
 LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 
@@ -25,7 +26,7 @@ def solve_split(asked, level: int) -> tuple:
 
 
 def _halved(body):
-    if isinstance(body, TensorGrid):
+    if plan_of(body) is not None:
         return finer(body)
     from ...mesh.anymesh import halved
 
@@ -45,7 +46,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     out = [solve(asked, low, high, fresh), None, None]
     if not estimate or low.x.size <= 8:
         return tuple(out)
-    if not isinstance(low, TensorGrid):
+    if plan_of(low) is None:
         out[1] = solve(asked, _halved(low), _halved(high))
         return tuple(out)
     for k in (1, 2):
@@ -79,8 +80,12 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
             return tuple(out)
 
 
-def seconds_of(grids) -> float:
+def seconds_of(bodies) -> float:
     """Predicted time [s] of condensing the grids of a patch; a grid counts as its own mirror image where it is even."""
-    return sum(predicted_seconds(grid.x.size, grid.depth.size, bool(np.allclose(grid.x, -grid.x[::-1], rtol=0,
-                                                                               atol=1e-12 * grid.length)))
-               for grid in grids)
+    out = 0.0
+    for body in bodies:
+        plan = plan_of(body)
+        columns = plan.x.size if plan is body else len(body.points) // plan.depth.size
+        even = plan is body and bool(np.abs(plan.x + plan.x[::-1]).max() <= 1e-12 * plan.length)
+        out += (1 if plan is body else OTHER) * predicted_seconds(columns, plan.depth.size, even)
+    return out

@@ -55,7 +55,7 @@ def limit(values, nested: bool = True) -> Limit:
 
 
 def _left(values, rest: float, ratio: float) -> float:
-    """Half-width around the extrapolated value: how far it has moved with the last mesh, a quarter of the rest at least."""
+    """Half-width around the extrapolated value: how far it moved with the last mesh, a quarter of the rest at least."""
     least = abs(rest) / (4 if ratio >= REGULAR[0] else 2)
     if len(values) < 4:
         return 2 * least

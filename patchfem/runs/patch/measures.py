@@ -7,10 +7,11 @@ import numpy as np
 
 from ...contact import edges
 from ...core import Measure
-from ...mesh.tensor import TensorGrid
+from ...mesh.nested import plan_of
 from ..results.patch_rows import TABLE
 from .limits import limit
 from .press import Patch, pressed, solve
+from .rounding import open_ends, unresolved_rounding
 from .values import edge_cells, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
@@ -71,6 +72,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
                                for name, value in mine.items()})
     found, least, out = [values(one) for one in reversed(series)], _least(fine, mine), {}
     nested = all(_halved(a, b) for a, b in pairwise((fine, *series)))
+    rough = 2.0 if unresolved_rounding(fine) else 1.0  # of meshes that pass over a rounding none shows what it does
     for name, value in mine.items():
         if not mine["normal_load"] > 0:
             out[name] = Measure(value, TABLE[name].unit, 0.0, floors[name])
@@ -78,7 +80,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         seen = limit([*(one[name] for one in found), value], nested)
         wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
         best, error = seen.best(wanted)
-        error = max(error, least.get(name, 0.0), max(ALIKE, fine.pair.rounding) * abs(value))
+        error = max(rough * error, least.get(name, 0.0), max(ALIKE, fine.pair.rounding) * abs(value))
         out[name] = Measure(float(best), TABLE[name].unit, float(error), floors[name])
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
@@ -110,6 +112,8 @@ def _unbounded(patch: Patch) -> str:
         return ""
     x, cells = patch.x, np.diff(patch.x)
     bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active
+    if patch.sharp and bears[[0, -1]].any():
+        return "unbounded: the contact reaches a corner that meets a face which goes on"
     for place in patch.jumps:
         beside = np.abs(x - place) <= 1.5 * cells[np.clip(np.searchsorted(x, place), 1, cells.size) - 1]
         if bears[beside].any():
@@ -125,9 +129,10 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
 
 def _halved(fine: Patch, coarse: Patch) -> bool:
     """Whether every cell of the coarse grids was split in two."""
-    pairs = ((fine.pair.grid, coarse.pair.grid), (fine.pair.upper_grid, coarse.pair.upper_grid))
-    return all(isinstance(a, TensorGrid) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
-               for a, b in pairs)
+    bodies = ((fine.pair.grid, coarse.pair.grid), (fine.pair.upper_grid, coarse.pair.upper_grid))
+    plans = [tuple(map(plan_of, pair)) for pair in bodies]
+    return all(None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
+               for a, b in plans)
 
 
 def _cell(patch: Patch) -> float:
@@ -144,8 +149,8 @@ def _floors() -> dict:
 def _least(patch: Patch, mine: dict) -> dict:
     """Errors that three meshes may agree to hide.
 
-    They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, and
-    round-off.
+    They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
+    smaller than the cells, and round-off.
     """
     length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
     count = max(int(patch.active.sum()), 1)
@@ -154,10 +159,12 @@ def _least(patch: Patch, mine: dict) -> dict:
     peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
     if count <= POINT and cell:
         peak = max(peak, _wedge(patch))
+    peak = max(peak, unresolved_rounding(patch) - mine["pressure_peak"])
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
     off = _offset(patch) * edge_cells(patch.x, patch.active).sum() * (1 + (count <= POINT)) if patch.skin is None else 0
+    off += float(open_ends(patch))
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
             "contact_half_width": off / 2, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,

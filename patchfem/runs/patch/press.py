@@ -35,6 +35,7 @@ class Patch:
     tangential_ratio: float | None
     skinned: bool
     jumps: tuple
+    sharp: bool
     notes: tuple
     seconds: dict
 
@@ -92,7 +93,7 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
         notes = (*notes, f"contact.mesh: {pair.joint.reason}")
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio,
-                 asked.skin is not None, asked.gap.jumps, notes, pair.seconds | seconds)
+                 asked.skin is not None, asked.gap.jumps, asked.singular_ends, notes, pair.seconds | seconds)
 
 
 def presser(asked, pair: Pair):

@@ -6,6 +6,7 @@ from ...model.source import placed
 from ..results.result import Result, still
 from .ladder import solve_all
 from .measures import measures, plane_band, strip_error
+from .rounding import beyond_gentle
 from .values import values
 
 __all__ = ["bodies", "measured", "probed", "solve_all", "static", "strained"]
@@ -28,8 +29,7 @@ def bodies(model) -> tuple:
 
 
 def measured(model, patch, coarse) -> dict:
-    """Static measures of the patch of a model; those of a mesh that the tolerance chose are extrapolated where they miss
-    it."""
+    """Static measures of the patch of a model; on a mesh that the tolerance chose those that miss it are extrapolated."""
     return measures(patch, *coarse, tolerance=model.accuracy.tolerance if model.patch.chosen else None)
 
 
@@ -56,6 +56,9 @@ def strained(asked, patch) -> list:
                         (closed, "the approach is {:.3g} of the pieces' height")):
         if share > 0.02:
             out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
+    if beyond_gentle(patch):
+        out.append("the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches "
+                   "here; lower the tilt or the load")
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > 0.47:
         out.append(f"Poisson's ratio {stiff:g} in plane strain: bilinear cells lock towards 0.5; the pressure peak is "

@@ -50,8 +50,11 @@ class OnePiece(Table):
     """What one of the two pieces has otherwise than the other; `coating = "none"` leaves it bare."""
 
     height: Length | None = None
+    length: Length | None = None
     substrate: Substance | None = None
     coating: Coating | Literal["none"] | None = None
+    chamfer: Length | None = None
+    end_radius: Length | None = None
 
 
 class Tilt(Table):

@@ -14,7 +14,7 @@ MEANINGS = {
         "density": "mass per volume",
     },
     "Contact": {
-        "length": "length of the patch along the sliding direction x",
+        "length": "length of both pieces along the sliding direction x",
         "width": "width of the patch across the plane of the model",
         "height": "height of each piece from the interface to its held far face, coating included",
         "load": "total normal force on the interface, weight included; [contact.approach] may stand in its place",
@@ -31,8 +31,12 @@ MEANINGS = {
     },
     "OnePiece": {
         "height": "height of this piece; contact.height unless given",
+        "length": "length of this piece, its middle at x = 0; contact.length unless given; the interface is as long as "
+                  "the shorter one",
         "substrate": "what this piece is made of; contact.substrate unless given",
         "coating": 'layer of this piece, {material = ..., thickness = ...}, or "none"; contact.coating unless given',
+        "chamfer": "length along x, and depth, that is cut off both ends at 45 degrees; the interface stops there",
+        "end_radius": "radius that rounds both ends off; the interface stops where the slope exceeds 0.097",
     },
     "LoadLine": {
         "offset": "distance of the line of the load from the middle of the patch; > 0 moves the pressure to +x",

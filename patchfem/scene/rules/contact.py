@@ -2,6 +2,7 @@
 
 from .draft import ASPERITIES, Draft, _needs
 from .limits import NOT_YET_BUILT
+from .outlines import flat_of, outlines
 
 
 def _contact(draft: Draft) -> None:
@@ -13,8 +14,11 @@ def _contact(draft: Draft) -> None:
         draft.say("contact.approach", "[contact.approach] and contact.load exclude each other: keep one")
     if not load and not approach:
         draft.lacks("contact.load", "" if "contact.approach" in NOT_YET_BUILT else "or [contact.approach] instead")
-    if contact.element_size and contact.length and contact.element_size > contact.length:
-        draft.say("contact.element_size", f"{contact.element_size} m is longer than contact.length {contact.length} m")
+    outlines(draft)
+    flat = flat_of(contact)
+    if contact.element_size and flat and contact.element_size > flat:
+        name = "contact.length" if flat == contact.length else "the interface,"
+        draft.say("contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m")
     if contact.element_size and contact.mesh:
         draft.remark("contact.element_size is not used beside contact.mesh, whose elements are those of the file")
     pieces = [("contact.coating", contact.coating, contact.height)]
@@ -31,7 +35,7 @@ def _contact(draft: Draft) -> None:
     if contact.holder and not draft.given("contact.holder.rotational_stiffness"):
         if not draft.given("contact.holder.tangential_stiffness"):
             draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are wanted")
-    if contact.step and contact.step.at is not None and contact.length and abs(contact.step.at) >= contact.length / 2:
+    if contact.step and contact.step.at is not None and flat and abs(contact.step.at) >= flat / 2:
         draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is wanted")
     if contact.asperities:
         _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
@@ -55,7 +59,8 @@ def _load_line(draft: Draft) -> None:
     if draft.given("contact.tilt.angle") and not draft.given("contact.holder"):
         draft.say(at, "stands beside contact.tilt.angle without [contact.holder]: a piece free to rotate has no "
                       "prescribed angle; keep one of the two or add the holder's spring")  # fmt: skip
-    half = contact.length / 2 if contact.length else None
+    flat = flat_of(contact)
+    half = flat / 2 if flat else None
     if half and line.offset is not None and abs(line.offset) >= half:
         draft.say(f"{at}.offset", f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is wanted")
     if half and line.moment and contact.load is not None and abs(line.moment) >= half * contact.load:

@@ -1,0 +1,212 @@
+"""Pieces of unlike lengths and with shaped ends, through their scenes: corners, rounded punches, balance, swaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scene_texts import COATED, COULOMB, SLIDE
+from wedges import falling
+
+import patchfem as pf
+from patchfem.closed_forms.contact import rounded_punch_half_width, rounded_punch_pressure
+from patchfem.core import PatchfemError, frozen_array
+from patchfem.elasticity.coating_bond import bond_line
+from patchfem.elasticity.recovery import cells_of
+from patchfem.elasticity.substructure import displacement
+from patchfem.mesh.files import write_mesh
+from patchfem.mesh.nested import finer
+from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
+from patchfem.model.files import faults
+from patchfem.model.model import build
+from patchfem.model.pieces import bodies_of, outlined, rounded_edges
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.patch.measures import measures
+from patchfem.runs.patch.press import solve
+from patchfem.runs.patch.result import strained
+from patchfem.runs.patch.values import values
+from patchfem.scene.scene import loads
+
+BLOCK = """\
+[contact]
+length = "24 mm"
+width = "1 m"
+height = "8 mm"
+load = "100 kN"
+substrate = {young = "120 GPa", poisson = 0.3, density = "1 kg/m^3"}
+"""
+NARROW = '[contact.{}]\nlength = "8 mm"\n'
+UPPER, LOWER = '[contact.upper]\n', '[contact.lower]\n'
+CHAMFER = 'length = "8 mm"\nchamfer = "1 mm"\n'
+TILT = '[contact.tilt]\nangle = "{}0.04 mrad"\n'
+OUTLINE = '[contact.{}]\nlength = "8 mm"\nchamfer = "0.3 mm"\n[contact.{}]\nend_radius = "1 mm"\n'
+
+
+def asked(text: str):
+    """The PatchModel of a scene."""
+    return build(loads(text, "scene.toml")).patch
+
+
+def even(text: str):
+    """The patch of a scene solved on its even interface."""
+    model = asked(text)
+    return solve(model, *bodies_of(model))
+
+
+def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.ndarray:
+    """Mirrored columns over |x| <= half, cells of `fine` on either side of |x| = place, growing from there."""
+    right = [place - np.append(0.0, np.cumsum(graded_rows(fine, place, growth)))[::-1]]
+    if half > place:
+        right.append(place + np.cumsum(graded_rows(fine, half - place, growth)))
+    x = np.concatenate(right)
+    x[0], x[-1] = 0.0, half
+    return frozen_array(np.concatenate([-x[:0:-1], x]))
+
+
+def graded(patch, x, growth: float = 1.2, halvings: int = 0):
+    """The patch solved on columns x of its interface, rows graded alike, every cell split so often."""
+    pieces = (patch.lower,) if patch.alike else (patch.lower, patch.upper)
+    fine = float(np.diff(x).min())
+    grids = [TensorGrid(x, *graded_depth(piece.height, fine, piece.thickness, growth, 2)) for piece in pieces]
+    bodies = [outlined(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
+    for _ in range(halvings):
+        bodies = [finer(body) for body in bodies]
+    return solve(patch, *bodies)
+
+
+@pytest.mark.parametrize("tables, angles, printed", [
+    (NARROW.format("upper"), (90, 180), 0.2260), (UPPER + CHAMFER, (135, 180), None),
+    (UPPER + CHAMFER + LOWER + CHAMFER, (135, 135), None),
+    (UPPER + CHAMFER + LOWER + 'length = "6 mm"\n', (135, 90), None),
+])
+def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(tables, angles, printed):
+    model = asked(BLOCK + tables)
+    assert model.singular_ends
+    wanted = falling(*angles)
+    assert printed is None or wanted == pytest.approx(printed, abs=5e-5)
+    patch = graded(model, towards(model.length / 2, model.length / 2, 1e-8))
+    inward = patch.x[-1] - patch.x
+    near = (inward > 1e-7) & (inward < 5e-6)
+    found = -np.polyfit(np.log(inward[near]), np.log(patch.pressure.sigma_n[near]), 1)[0]
+    assert found == pytest.approx(wanted, abs=3e-3)
+
+
+def test_order_the_end_of_two_alike_sharp_pieces_is_bounded_and_a_rounded_end_too():
+    assert not asked(BLOCK).singular_ends
+    assert not asked(BLOCK + UPPER + 'end_radius = "1 mm"\n').singular_ends
+    assert not asked(BLOCK + UPPER + 'length = "8 mm"\nend_radius = "1 mm"\n').singular_ends
+    patch = graded(asked(BLOCK), towards(12e-3, 12e-3, 1e-7))
+    inward = patch.x[-1] - patch.x
+    near = (inward > 1e-6) & (inward < 1e-4)
+    assert abs(np.polyfit(np.log(inward[near]), np.log(patch.pressure.sigma_n[near]), 1)[0]) < 5e-3
+
+
+def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
+    flat, radius, load, young, poisson = 1e-3, 1e-3, 2e6, 120e9, 0.3
+    text = BLOCK.replace("24 mm", "80 mm").replace("8 mm", "40 mm").replace("100 kN", "2000 kN")
+    model = asked(text + '[contact.upper]\nlength = "4 mm"\nheight = "2 mm"\nend_radius = "1 mm"\n'
+                         'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n')
+    modulus = young / (1 - poisson**2) / (1 + 1e-4)
+    half = rounded_punch_half_width(load, flat, radius, modulus)
+    misses = []
+    for halvings in (0, 1):
+        patch = graded(model, towards(half, model.length / 2, 2e-6), halvings=halvings)
+        wanted = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
+        off, weight = patch.pressure.sigma_n - wanted, patch.pieces.interface.weight
+        misses.append(np.sqrt((weight * off**2).sum() / (weight * wanted**2).sum()))
+    assert misses[1] < 4e-3 and misses[0] / misses[1] > 1.8  # first order, by the nodes where the contact ends
+    assert patch.pressure.sigma_n.max() == pytest.approx(wanted.max(), rel=4e-3)
+    assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
+    assert "steep" not in " ".join(strained(model, patch))
+
+
+def test_exact_equal_lengths_said_and_not_said_are_one_answer():
+    named = NARROW.format("upper") + NARROW.format("lower")
+    short = asked(BLOCK.replace("24 mm", "8 mm")), asked(BLOCK + named)
+    for one, other in ((asked(BLOCK), asked(BLOCK + named.replace("8 mm", "24 mm"))), short):
+        a, b = (values(solve(model, *bodies_of(model))) for model in (one, other))
+        assert a == b and one.length == other.length and other.alike and not other.outlined
+
+
+@pytest.mark.parametrize("text, outline", [(COATED, OUTLINE), (BLOCK, NARROW)])
+def test_exact_the_narrow_piece_may_lie_above_or_below(text, outline):
+    a, b = (even(text + outline.format(*sides) + TILT.format("")) for sides in (("lower", "upper"), ("upper", "lower")))
+    assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n).max() <= 1e-9 * a.pressure.sigma_n.max()
+    assert values(b) == pytest.approx(values(a), rel=1e-8)
+
+
+def test_exact_a_tilt_the_other_way_is_the_mirror_image():
+    a, b = (even(COATED + OUTLINE.format("upper", "lower") + TILT.format(sign)) for sign in ("", "-"))
+    assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n[::-1]).max() <= 1e-8 * a.pressure.sigma_n.max()
+
+
+def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_piece():
+    model = asked(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
+    patch = solve(model, *bodies_of(model))
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    assert force.sum() == pytest.approx(model.load, rel=1e-10)
+    assert patch.pieces.interface.weight.sum() == pytest.approx(model.length * model.width, rel=1e-12)
+    line = force / model.width
+    for piece, nodal in zip((patch.pair.piece, patch.pair.upper), patch.pair.forces(line)):
+        u = displacement(piece, 0 * nodal, nodal)
+        assert bond_line(cells_of(piece), u).force[0].sum(axis=0) == pytest.approx([0.0, line.sum()], rel=1e-7,
+                                                                                   abs=1e-7 * line.sum())
+
+
+def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(tmp_path):
+    text = COATED + TILT.format("")
+    model = asked(text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]"))
+    bodies = bodies_of(model)
+    write_mesh(bodies[0], tmp_path / "pair.vtu", bodies[1])
+    again = build(loads(text.replace('length = "12.7 mm"', f'length = "{model.length!r} m"').replace(
+        'element_size = "0.5 mm"', 'mesh = "pair.vtu"'), tmp_path / "scene.toml")).patch
+    a, b = values(solve(model, *bodies)), values(solve(again, *bodies_of(again)))
+    assert b == pytest.approx(a, rel=1e-8)
+
+
+@pytest.mark.parametrize("tables", [NARROW.format("upper"), UPPER + 'length = "8 mm"\nend_radius = "2 mm"\n'])
+def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_chooses(tables):
+    model = asked(BLOCK + tables)
+    rough, best = (measures(*solve_all(model, tolerance)) for tolerance in (2e-2, 4e-3))
+    for name in ("approach", "normal_stiffness", "tangential_stiffness", "contact_fraction"):
+        assert abs(rough[name].value - best[name].value) <= rough[name].error + best[name].error, name
+        assert rough[name].error <= 0.05 * abs(rough[name].value)
+
+
+@pytest.mark.parametrize("radius", ["2 um", "0.2 mm", "2 mm"])
+@pytest.mark.parametrize("tilt", ["", TILT.format("")])
+def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_over_it(radius, tilt):
+    tables = UPPER + f'length = "8 mm"\nend_radius = "{radius}"\n' + tilt
+    model = asked(BLOCK + tables)
+    (*_, half), edge = rounded_edges(model)
+    true = values(graded(model, towards(half, model.length / 2, edge / 30)))
+    for cells in (20, 150):
+        found = measures(*solve_all(asked(BLOCK + f'element_size = "{model.length / cells!r} m"\n' + tables), 1e-3))
+        for name in ("pressure_peak", "contact_fraction", "contact_half_width", "approach"):
+            assert abs(found[name].value - true[name]) <= found[name].error, name
+        assert found["pressure_peak"].error < 20 * true["pressure_peak"]
+
+
+def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):
+    text = COATED + OUTLINE.format("upper", "lower") + TILT.format("") + "[contact.shear]\n" + COULOMB + SLIDE
+    result = pf.run(text + "cycles = 1\n")
+    assert result.measures["friction_ratio_peak"].value == pytest.approx(0.3, rel=1e-6)
+    result.save(tmp_path / "out")
+    assert {"fields.vtkhdf", "result.nc"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer_piece(tmp_path):
+    x = np.linspace(0, 8.2, 400)
+    rows = "\n".join(f"{a:.6f},{0.05 * np.sin(a):.6f}" for a in x)
+    (tmp_path / "before.csv").write_text(f"x [mm],z [um]\n{rows}\n")
+    profile = '[contact.profile]\nfile = "before.csv"\n'
+    scene = loads(BLOCK + NARROW.format("upper") + profile, tmp_path / "scene.toml")
+    model = build(scene).patch
+    patch = solve(model, *bodies_of(model))
+    assert patch.x[-1] == 4e-3 and np.ptp(patch.gap) > 0
+    assert faults(scene, tmp_path) == []
+    for text in (BLOCK, BLOCK + NARROW.format("upper").replace("8 mm", "8.3 mm")):
+        scene = loads(text + profile, tmp_path / "scene.toml")
+        model = build(scene).patch
+        with pytest.raises(PatchfemError, match="trace"):
+            solve(model, *bodies_of(model))
+        assert [key for key, _ in faults(scene, tmp_path)] == ["contact.profile.file"]

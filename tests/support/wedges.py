@@ -1,0 +1,32 @@
+"""Corner singularities of two elastic wedges pressed together without friction, from the eigenfunctions of either."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+
+
+def turning(angle: float, power: float) -> float:
+    """Turn of the loaded face of a wedge of `angle` [rad] under the pressure r^(power - 1), up to a common factor.
+
+    Airy's function r^(power + 1) f(t) with f = (cos, sin)((power + 1) t), (cos, sin)((power - 1) t): no traction on the
+    face t = angle, no shear and unit pressure on t = 0. The motion across that face is the last coefficient (Williams
+    1952).
+    """
+    p, m = power + 1, power - 1
+
+    def value(t):
+        return [np.cos(p * t), np.sin(p * t), np.cos(m * t), np.sin(m * t)]
+
+    def slope(t):
+        return [-p * np.sin(p * t), p * np.cos(p * t), -m * np.sin(m * t), m * np.cos(m * t)]
+
+    return np.linalg.solve([value(0.0), slope(0.0), value(angle), slope(angle)], [1.0, 0.0, 0.0, 0.0])[3]
+
+
+def falling(one: float, other: float, low: float = 0.4, high: float = 0.95) -> float:
+    """Exponent a of p ~ r^-a where wedges of one material and of these angles [degrees] meet at their corners."""
+    def turn(power):
+        return sum(turning(np.deg2rad(angle), power) for angle in (one, other))
+
+    return 1 - brentq(turn, low, high)
