@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fields.vtkhdf import Frame
+from ..fields.series import Frame
 from .pictures import axis_unit
 
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..fields.vtkhdf import Frame, Series
+from ..fields.series import Frame, Series
 from .panels import Panel, borders, curves, panels
 from .pictures import axis_unit
 
