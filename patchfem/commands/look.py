@@ -9,7 +9,8 @@ from .shared import Out, say
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
-    """Write the fields of a results folder as .pvd (series), .vtu or .csv (last or --frame), or .vtkhdf."""
+    """Write the fields of a results folder as .pvd (series, for any ParaView), .vtu or .csv (last or --frame), or
+    .vtkhdf."""
     from ..export.fields.vtu import export as write
 
     print(write(folder, out, frame))

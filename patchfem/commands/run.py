@@ -1,6 +1,7 @@
 """The verb that runs a scene and writes its results folder."""
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -55,3 +56,7 @@ def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
     if verbose:
         say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
     print(f"results: {target}")
+    if (target / "fields.vtkhdf").is_file():
+        place = shlex.quote(str(target))
+        print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; before it, "
+              f"`patchfem export {place} -o {shlex.quote(str(target / 'fields.pvd'))}`")

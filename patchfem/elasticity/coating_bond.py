@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .recovery import Cells, quadratures, stresses
+from .recovery import Cells, Quadrature, quadratures, stresses
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,10 +24,11 @@ class Bond:
     normal: np.ndarray
 
 
-def bond_line(cells: Cells, u) -> Bond | None:
+def bond_line(cells: Cells, u, rules: list | None = None) -> Bond | None:
     """Forces of the coating on its substrate under the displacements u (frames, N, 2) [m]; None without a coating.
 
-    They are the nodal forces of the coating's own stress, so they carry exactly the load on the coating's face.
+    They are the nodal forces of the coating's own stress, so they carry exactly the load on the coating's face. rules:
+    the `quadratures` of the cells, made here where None.
     """
     edge, aside = _bond_edges(cells)
     if not len(edge):
@@ -41,8 +42,8 @@ def bond_line(cells: Cells, u) -> Bond | None:
         np.add.at(length, end, np.hypot(*aside.T) / 2)
     across /= np.hypot(*across.T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]
-    rules = quadratures(cells)
-    force = np.stack([-_coating_forces(cells, rules, motion)[node] for motion in u])
+    coating, own = _coating_only(cells, quadratures(cells) if rules is None else rules)
+    force = np.stack([-_nodal_forces(coating, own, motion)[node] for motion in u])
     shear, normal = ((force * way).sum(axis=2) / length for way in (along, across))
     return Bond(node, length, force, shear, normal)
 
@@ -59,17 +60,26 @@ def _bond_edges(cells: Cells) -> tuple:
     return mine, way[:, ::-1] * [1.0, -1.0]
 
 
-def _coating_forces(cells: Cells, rules: list, u) -> np.ndarray:
-    """Nodal forces (N, 2) [N/m] that the stress of the coating balances."""
-    out, first = np.zeros((len(cells.points), 2)), 0
-    for rule, stress in zip(rules, stresses(cells, rules, u)):
+def _coating_only(cells: Cells, rules: list) -> tuple:
+    """The coating as Cells on the same points, with its own part of the quadratures."""
+    out, first = [], 0
+    for rule in rules:
         coat = cells.is_coating[first:first + len(rule.block)]
         first += len(rule.block)
-        xx, yy, xy = np.moveaxis(stress[coat] * rule.weight[coat][..., None], -1, 0)
-        slope = rule.slope[coat]
+        out.append(Quadrature(rule.block[coat], rule.shape, rule.slope[coat], rule.weight[coat]))
+    blocks = tuple(rule.block for rule in out)
+    return Cells(cells.points, blocks, np.ones(sum(map(len, blocks)), bool), cells.layers), out
+
+
+def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
+    """Nodal forces (N, 2) [N/m] that the stress of the cells balances."""
+    out = np.zeros((len(cells.points), 2))
+    for rule, stress in zip(rules, stresses(cells, rules, u)):
+        xx, yy, xy = np.moveaxis(stress * rule.weight[..., None], -1, 0)
+        slope = rule.slope
         force = np.stack([np.einsum("cg,cgn->cn", xx, slope[..., 0]) + np.einsum("cg,cgn->cn", xy, slope[..., 1]),
                           np.einsum("cg,cgn->cn", xy, slope[..., 0]) + np.einsum("cg,cgn->cn", yy, slope[..., 1])], -1)
-        np.add.at(out, rule.block[coat], force)
+        np.add.at(out, rule.block, force)
     return out
 
 

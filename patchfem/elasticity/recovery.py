@@ -208,13 +208,14 @@ class Indicator:
         return np.sqrt(self.error / whole[:, None]), np.sqrt(total / whole)
 
 
-def indicator(found: Recovery, u, stress) -> Indicator:
+def indicator(found: Recovery, u, stress, rules: list | None = None) -> Indicator:
     """Zienkiewicz-Zhu indicator of displacements u (frames, N, 2) [m] with stress (frames, t, 4) at the cell middles.
 
     ||sigma* - sigma||^2 = integral of (sigma* - sigma) : C^-1 : (sigma* - sigma), sigma* the recovered stress carried
-    by the shape functions; per metre of width.
+    by the shape functions; per metre of width. rules: the `quadratures` of the cells, made here where None.
     """
-    cells, rules = found.cells, quadratures(found.cells)
+    cells = found.cells
+    rules = quadratures(cells) if rules is None else rules
     layers = cells.layers
     pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
     lam, mu = pairs[cells.is_coating.astype(int)].T

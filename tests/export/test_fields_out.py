@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 import subprocess
 import sys
 
+import h5py
 import meshio
 import numpy as np
 import pytest
 import pyvista
 from command_line import cli
-from exported import UNITS, at, write_small
+from exported import CROWNED, UNITS, at, write_small
 from scene_texts import BENCH
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDataArray
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.export.fields.vtkhdf import NAME, Series
+from patchfem.export.fields.blocks import CODES, NAMES
+from patchfem.export.fields.series import Series
+from patchfem.export.fields.vtkhdf import NAME
 from patchfem.export.fields.vtu import BLOCK, _packed, export
 from patchfem.export.results import FILES
+
+ON_THE_INTERFACE = {"normal_stress", "gap", "status", "normal_bond_lower", "normal_bond_upper"}
 
 
 def through_vtk(path):
@@ -32,22 +40,103 @@ def through_vtk(path):
     return reader.GetOutput()
 
 
+def same_block(grid, block, number: int) -> None:
+    """A block of pyvista or VTK is the one that was written, and has no other arrays."""
+    grid = pyvista.wrap(grid)
+    assert np.array_equal(grid.points, block.points)
+    assert np.array_equal(grid.cell_connectivity, block.connectivity) and np.array_equal(grid.celltypes, block.types)
+    for data, theirs in ((grid.point_data, block.point_data), (grid.cell_data, block.cell_data)):
+        assert set(data.keys()) == theirs.keys()
+        for name, values in theirs.items():
+            wanted = at(values, number)
+            assert data[name].dtype == wanted.dtype
+            assert np.array_equal(data[name], wanted, equal_nan=wanted.dtype.kind == "f"), name
+
+
+def joined(given, number: int) -> tuple:
+    """Points, connectivity, point data and cell data of the written blocks as one mesh, put together here anew."""
+    points = np.concatenate([one.points for one in given.blocks.values()])
+    nodes = np.concatenate([given.blocks["lower"].connectivity, 12 + given.blocks["upper"].connectivity,
+                            24 + given.blocks["interface"].connectivity])
+    at_points = {"displacement": np.concatenate([one.point_data["displacement"][number]
+                                                 for one in given.blocks.values()])}
+    for name in ON_THE_INTERFACE:
+        values = given.blocks["interface"].point_data[name][number]
+        at_points[name] = np.concatenate([np.full(24, -1 if name == "status" else np.nan, values.dtype), values])
+    in_cells = {"part": np.repeat(np.array([0, 1, 2], np.int8), [7, 7, 3])}
+    for name in ("stress", "von_mises", "stress_error", "material"):
+        values = np.concatenate([at(given.blocks[side].cell_data[name], number) for side in ("lower", "upper")])
+        in_cells[name] = np.concatenate([values, np.full((3, *values.shape[1:]), -1 if name == "material" else np.nan,
+                                                         values.dtype)])
+    return points, nodes, at_points, in_cells
+
+
+def test_exact_blocks_hold_what_the_pieces_gave(tmp_path):
+    given = write_small(tmp_path / "out", 4)
+    assert tuple(given.blocks) == NAMES
+    for side, one in zip(("lower", "upper"), given.pair):
+        block = given.blocks[side]
+        assert not ON_THE_INTERFACE & {*block.point_data, *block.cell_data}
+        assert np.array_equal(block.points[:, :2], one["points"]) and not block.points[:, 2].any()
+        assert np.array_equal(block.point_data["displacement"][..., :2], one["displacement"].astype(np.float32))
+        assert np.array_equal(block.cell_data["stress"][..., :4], one["stress"].astype(np.float32))
+        assert np.array_equal(block.cell_data["material"][0], one["material"])
+        assert np.array_equal(given.blocks["interface"].point_data[f"normal_bond_{side}"],
+                              one["bond"]["normal_bond"].astype(np.float32))
+    line = given.blocks["interface"]
+    assert np.array_equal(line.points[:, 0], given.pair[0]["points"][given.pair[0]["interface"], 0])
+    assert np.array_equal(line.connectivity, [0, 1, 1, 2, 2, 3])
+    assert np.array_equal(line.point_data["displacement"], given.blocks["lower"].point_data["displacement"][:, ::3])
+    for name, values in given.interface.items():
+        assert np.array_equal(line.point_data[name], values.astype(line.point_data[name].dtype))
+
+
 def test_exact_a_series_is_read_back_as_written(tmp_path):
     given = write_small(tmp_path / "out", 4)
     with Series(tmp_path / "out") as series:
         assert np.array_equal(series.times, given.times) and series.units == UNITS and len(series) == 4
         for number in range(4):
             frame = series.frame(number)
-            assert np.array_equal(frame.points, given.points) and frame.time == given.times[number]
-            for kind in ("point_data", "cell_data"):
-                mine, theirs = getattr(frame, kind), getattr(given, kind)
+            points, nodes, *data = joined(given, number)
+            assert np.array_equal(frame.points, points) and frame.time == given.times[number]
+            assert np.array_equal(frame.connectivity, nodes)
+            for mine, theirs in zip((frame.point_data, frame.cell_data), data):
                 assert mine.keys() == theirs.keys()
                 for name, values in theirs.items():
-                    assert np.array_equal(mine[name], at(values, number), equal_nan=values.dtype.kind == "f"), name
-            for part, blocks in ((0, given.blocks[:2]), (1, given.blocks[2:4]), (2, given.blocks[4:])):
-                assert all(np.array_equal(a, b) for a, b in zip(frame.cells(part), blocks, strict=True))
+                    assert np.array_equal(mine[name], values, equal_nan=values.dtype.kind == "f"), name
+            for part, (first, body) in enumerate(zip((0, 12), given.pair)):
+                assert all(np.array_equal(a, first + b) for a, b in zip(frame.cells(part), body["blocks"], strict=True))
         assert series.frame(-1).number == 3
         assert np.all(np.diff(frame.points[frame.interface(), 0]) > 0) and frame.interface().min() >= 24
+
+
+def test_exact_vtk_reads_three_named_blocks_at_every_time(tmp_path, capfd):
+    given = write_small(tmp_path / "out", 4)
+    reader = vtkHDFReader()
+    reader.SetFileName(str(tmp_path / "out" / NAME))
+    reader.UpdateInformation()
+    for number in (0, 3, 1):
+        reader.UpdateTimeStep(given.times[number])
+        out = reader.GetOutputDataObject(0)
+        assert [out.GetMetaData(k).Get(vtkCompositeDataSet.NAME()) for k in range(out.GetNumberOfBlocks())] == \
+            list(NAMES)
+        for k, name in enumerate(NAMES):
+            same_block(out.GetBlock(k), given.blocks[name], number)
+    assert reader.GetNumberOfSteps() == 4 and not capfd.readouterr().err
+
+
+def test_exact_units_and_codes_stand_in_the_file(tmp_path):
+    write_small(tmp_path / "out")
+    with h5py.File(tmp_path / "out" / NAME) as file:
+        for block in NAMES:
+            group = file["VTKHDF"][block]
+            arrays = {**group["PointData"], **group["CellData"]}
+            assert {name: one.attrs["units"] for name, one in arrays.items()} == {name: UNITS[name] for name in arrays}
+            for name in {*arrays} & {*CODES}:
+                assert dict(zip(arrays[name].attrs["flag_values"], arrays[name].attrs["flag_meanings"].split())) == \
+                    CODES[name]
+            assert {b"gap [m]", b"stress [Pa]"} < set(group["FieldData/units"][:])
+            assert {b"material 1 coating", b"status 2 slip"} < set(group["FieldData/codes"][:])
 
 
 @pytest.mark.parametrize("number", [None, 0, 1])
@@ -57,26 +146,30 @@ def test_exact_vtu_is_read_by_vtk_and_by_meshio(tmp_path, number):
     assert cli(*words).code == 0
     frame = 2 if number is None else number
     grid, mesh = through_vtk(tmp_path / "one.vtu"), meshio.read(tmp_path / "one.vtu")
-    assert np.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), given.points)
-    assert np.array_equal(mesh.points, given.points)
-    nodes = np.concatenate([block.ravel() for block in given.blocks])
+    points, nodes, at_points, in_cells = joined(given, frame)
+    assert np.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), points) and np.array_equal(mesh.points, points)
     assert np.array_equal(vtk_to_numpy(grid.GetCells().GetConnectivityArray()), nodes)
     assert np.array_equal(np.concatenate([block.data.ravel() for block in mesh.cells]), nodes)
     assert vtk_to_numpy(grid.GetFieldData().GetArray("TimeValue")) == given.times[frame]
-    for data, theirs, other in ((grid.GetPointData(), given.point_data, mesh.point_data),
-                                (grid.GetCellData(), given.cell_data, mesh.cell_data)):
+    for data, theirs, other in ((grid.GetPointData(), at_points, mesh.point_data),
+                                (grid.GetCellData(), in_cells, mesh.cell_data)):
         assert data.GetNumberOfArrays() == len(theirs) and other.keys() == theirs.keys()
-        for name, values in theirs.items():
-            array, wanted = data.GetArray(name), at(values, frame)
+        for name, wanted in theirs.items():
+            array = data.GetArray(name)
             read, again = vtk_to_numpy(array), other[name]
             again = np.concatenate(again) if isinstance(again, list) else again
             assert read.dtype == again.dtype == wanted.dtype
             assert np.array_equal(read, wanted, equal_nan=wanted.dtype.kind == "f"), name
             assert np.array_equal(again, wanted, equal_nan=wanted.dtype.kind == "f"), name
-            assert array.GetInformation().Get(vtkDataArray.UNITS_LABEL()) == UNITS[name]
+            assert array.GetInformation().Get(vtkDataArray.UNITS_LABEL()) == (UNITS | {"part": "1"})[name]
+    said = {f"unit of {name}: {unit}": 1.0 for name, unit in (UNITS | {"part": "1"}).items()} | {
+        f"code of {name}: {meaning}": code for name, codes in CODES.items() for code, meaning in codes.items()}
+    field = grid.GetFieldData()
+    assert {field.GetArrayName(k): field.GetArray(k).GetTuple1(0) for k in range(field.GetNumberOfArrays())} == \
+        said | {"TimeValue": given.times[frame]}
 
 
-def test_exact_pvd_is_read_by_pyvista(tmp_path):
+def test_exact_pvd_is_read_by_pyvista_as_named_blocks(tmp_path):
     given = write_small(tmp_path / "out", 12)
     out = tmp_path / "out" / "fields.pvd"
     assert cli("export", tmp_path / "out", "-o", out).code == 0
@@ -84,17 +177,19 @@ def test_exact_pvd_is_read_by_pyvista(tmp_path):
     assert reader.time_values == list(given.times)
     for number in range(12):
         reader.set_active_time_point(number)
-        grid = reader.read()[0]
-        assert np.array_equal(grid.points, given.points)
-        for name, values in given.point_data.items():
-            assert np.array_equal(grid.point_data[name], at(values, number), equal_nan=values.dtype.kind == "f")
-        for name, values in given.cell_data.items():
-            assert np.array_equal(grid.cell_data[name], at(values, number), equal_nan=values.dtype.kind == "f")
+        blocks = reader.read()[0]
+        assert blocks.keys() == list(NAMES)
+        for name in NAMES:
+            same_block(blocks[name], given.blocks[name], number)
+            assert ("unit of gap: m" in blocks[name].field_data) == (name == "interface")
+    mesh = meshio.read(tmp_path / "out" / "fields_frames" / "frame_0011_interface.vtu")
+    assert np.array_equal(mesh.point_data["gap"], given.blocks["interface"].point_data["gap"][11])
     assert {path.name for path in (tmp_path / "out").iterdir()} == {NAME, "fields.pvd", "fields_frames"} <= set(FILES)
+    (tmp_path / "out" / "fields_frames" / "frame_0007.vtu").write_text("of an earlier version")
     write_small(tmp_path / "out", 2)  # a shorter series leaves no frames of the longer one
     assert cli("export", tmp_path / "out", "-o", out).code == 0
-    assert sorted(path.name for path in (tmp_path / "out" / "fields_frames").iterdir()) == \
-        ["frame_0000.vtu", "frame_0001.vtu"]
+    assert sorted(path.name for path in (tmp_path / "out" / "fields_frames").iterdir()) == sorted(
+        f"frame_000{number}{end}" for number in (0, 1) for end in (".vtm", *(f"_{name}.vtu" for name in NAMES)))
 
 
 def test_exact_arrays_of_several_blocks_and_none_are_unpacked_by_vtk(tmp_path):
@@ -117,10 +212,10 @@ def test_exact_csv_holds_the_interface_to_the_last_bit(tmp_path):
     with open(tmp_path / "rows.csv", newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file)
     columns = dict(zip(head, zip(*rows)))
-    nodes = np.arange(24, 28)
-    assert np.array_equal(np.array(columns.pop("x [m]"), float), given.points[nodes, 0])
-    for name, values in given.point_data.items():
-        wanted = at(values, 1)[nodes]
+    line = given.blocks["interface"]
+    assert np.array_equal(np.array(columns.pop("x [m]"), float), line.points[:, 0])
+    for name, values in line.point_data.items():
+        wanted = at(values, 1)
         for k, axis in enumerate(("_x", "_y", "_z") if wanted.ndim > 1 else ("",)):
             read = np.array(columns.pop(f"{name}{axis} [{UNITS[name]}]")).astype(wanted.dtype)
             assert np.array_equal(read, wanted[:, k] if axis else wanted)
@@ -172,19 +267,45 @@ def test_exact_bond_line_of_a_run_carries_load_and_friction_in_every_frame(bench
             x = frame.points[line, 0]
             share = np.convolve(np.diff(x), [0.5, 0.5])
             size = 1e-6 * share @ frame.point_data["normal_stress"][line]
-            for inside, outside in (("normal_bond", "normal_stress"), ("shear_bond", "shear_stress")):
-                top, bond = (share @ frame.point_data[name][line].astype(float) for name in (outside, inside))
-                assert bond == pytest.approx(top, abs=size)
-                upper = np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
-                upper = upper[frame.points[upper, 1] == 0]
-                assert share @ frame.point_data[inside][upper].astype(float) == pytest.approx(bond, abs=size)
-                inner = frame.points[:, 1] != 0
-                assert np.isnan(frame.point_data[inside][inner]).all()
+            for side in ("lower", "upper"):
+                for inside, outside in (("normal_bond", "normal_stress"), ("shear_bond", "shear_stress")):
+                    top, bond = (share @ frame.point_data[name][line].astype(float)
+                                 for name in (outside, f"{inside}_{side}"))
+                    assert bond == pytest.approx(top, abs=size)
         assert np.abs(frame.point_data["shear_stress"][line]).max() > 0
-        assert series.units["stress_error"] == "1" and series.units["shear_bond"] == "Pa"
+        assert series.units["stress_error"] == "1" and series.units["shear_bond_upper"] == "Pa"
         error = frame.cell_data["stress_error"]
         assert np.isnan(error[frame.cell_data["part"] == 2]).all()
         assert 0.01 < np.sqrt(np.nansum(error.astype(float)**2)) < 0.5
+
+
+def test_always_every_number_of_a_block_is_finite(bench):
+    """So a colouring by any array shows that array, and nothing of the colour of NaN."""
+    with Series(bench) as series:
+        for number in (0, len(series) - 1):
+            for one in series.frame(number).blocks.values():
+                for name, values in (one.point_data | one.cell_data).items():
+                    assert np.isfinite(values).all() and (name not in CODES or set(np.unique(values)) <= {*CODES[name]})
+
+
+def test_exact_a_run_says_where_its_fields_are_and_how_an_older_paraview_opens_them(tmp_path):
+    (tmp_path / "point.toml").write_text(BENCH, "utf-8")
+    (tmp_path / "pair.toml").write_text(CROWNED, "utf-8")
+    assert "fields" not in cli("run", tmp_path / "point.toml", "-o", tmp_path / "point", "-q").out
+    answer = cli("run", tmp_path / "pair.toml", "-o", tmp_path / "my pair", "-q")
+    said = answer.out.splitlines()[-1]
+    assert said.startswith(f"fields: {tmp_path / 'my pair' / NAME} ") and "ParaView 5.13" in said
+    command = shlex.split(said.split("`")[1])
+    assert command[0] == "patchfem" and cli(*command[1:]).code == 0
+    assert pyvista.PVDReader(str(tmp_path / "my pair" / "fields.pvd")).read()[0].keys() == list(NAMES)
+
+
+def test_refuses_the_single_mesh_of_an_older_version(tmp_path):
+    write_small(tmp_path / "out")
+    with h5py.File(tmp_path / "out" / NAME, "r+") as file:
+        file["VTKHDF"].attrs["Type"] = np.bytes_("UnstructuredGrid")
+    with pytest.raises(PatchfemError, match=r"older patchfem.*run its scene again"):
+        Series(tmp_path / "out")
 
 
 def test_refuses_a_run_without_contact(tmp_path):

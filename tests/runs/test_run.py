@@ -14,6 +14,7 @@ import xarray as xr
 from command_line import cli
 from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
@@ -68,7 +69,7 @@ def netcdf(folder):
 
 
 class Fields:
-    """fields.vtkhdf as VTK's own reader gives it."""
+    """fields.vtkhdf as VTK's own reader gives it: blocks of arrays."""
 
     def __init__(self, folder):
         self.reader = vtkHDFReader()
@@ -79,15 +80,18 @@ class Fields:
     def frame(self, step):
         self.reader.SetStep(step)
         self.reader.Update()
-        grid = self.reader.GetOutput()
+        out = self.reader.GetOutputDataObject(0)
+        named = {out.GetMetaData(k).Get(vtkCompositeDataSet.NAME()): self._block(out.GetBlock(k))
+                 for k in range(out.GetNumberOfBlocks())}
+        return SimpleNamespace(time=self.reader.GetTimeValue(), **named)
+
+    @staticmethod
+    def _block(grid):
         points, cells = grid.GetPointData(), grid.GetCellData()
-        ends, nodes = (vtk_to_numpy(a) for a in (grid.GetCells().GetOffsetsArray(),
-                                                 grid.GetCells().GetConnectivityArray()))
-        units = grid.GetFieldData().GetAbstractArray("units")
+        ends, nodes = (vtk_to_numpy(a).copy() for a in (grid.GetCells().GetOffsetsArray(),
+                                                        grid.GetCells().GetConnectivityArray()))
         return SimpleNamespace(
-            place=vtk_to_numpy(grid.GetPoints().GetData()), time=self.reader.GetTimeValue(),
-            cells=[nodes[a:b] for a, b in pairwise(ends)],
-            units=dict(units.GetValue(i).rstrip("]").split(" [") for i in range(units.GetNumberOfValues())),
+            place=vtk_to_numpy(grid.GetPoints().GetData()).copy(), cells=[nodes[a:b] for a, b in pairwise(ends)],
             **{part.GetArrayName(i): vtk_to_numpy(part.GetArray(i)).copy()
                for part in (points, cells) for i in range(part.GetNumberOfArrays())})
 
@@ -250,13 +254,12 @@ def test_exact_fields_hold_both_bodies(done, name):
     fields, data = Fields(folder), netcdf(folder)
     assert fields.steps == data.sizes["frame"]
     first = fields.frame(0)
-    wanted = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "normal_stress": "Pa", "gap": "m"}
-    assert wanted.items() <= first.units.items()
-    assert set(np.unique(first.part)) == {0, 1, 2} and (first.part == 0).sum() == (first.part == 1).sum()
-    for part, side in ((0, -1), (1, 1)):
-        heights = np.concatenate([first.place[c, 1] for c, p in zip(first.cells, first.part) if p == part])
-        assert np.abs(heights).max() == pytest.approx(6.35e-3) and (side * heights >= 0).all()
-        assert {len(c) for c, p in zip(first.cells, first.part) if p == part} == {4}
+    assert len(first.lower.cells) == len(first.upper.cells)
+    for body, side in ((first.lower, -1), (first.upper, 1)):
+        assert np.abs(body.place[:, 1]).max() == pytest.approx(6.35e-3) and (side * body.place[:, 1] >= 0).all()
+        assert {len(c) for c in body.cells} == {4}
+        assert {"displacement", "stress", "von_mises", "material"} <= vars(body).keys()
+    assert {"normal_stress", "gap"} <= vars(first.interface).keys() and not hasattr(first.lower, "gap")
     np.testing.assert_allclose([fields.frame(k).time for k in range(fields.steps)], data.frame_time, rtol=1e-12)
 
 
@@ -266,12 +269,14 @@ def test_exact_the_interface_closes_where_it_is_pressed(done, name):
     fields, data = Fields(folder), netcdf(folder)
     for step in (0, fields.steps - 1):
         frame = fields.frame(step)
-        nodes = np.flatnonzero(np.isfinite(frame.gap)).reshape(3, -1)  # lower body, upper body, line between them
-        np.testing.assert_allclose(frame.place[nodes[0]], frame.place[nodes[1]], atol=1e-15)
-        opening = frame.displacement[nodes[1], 1] - frame.displacement[nodes[0], 1]
-        np.testing.assert_allclose(opening, frame.gap[nodes[0]], atol=1e-12)
+        low, high = (np.flatnonzero(body.place[:, 1] == 0) for body in (frame.lower, frame.upper))
+        np.testing.assert_allclose(frame.lower.place[low], frame.upper.place[high], atol=1e-15)
+        np.testing.assert_allclose(frame.lower.place[low], frame.interface.place, atol=1e-15)
+        np.testing.assert_allclose(frame.interface.displacement, frame.lower.displacement[low], atol=1e-15)
+        opening = frame.upper.displacement[high, 1] - frame.lower.displacement[low, 1]
+        np.testing.assert_allclose(opening, frame.interface.gap, atol=1e-12)
         np.testing.assert_allclose(opening[data.normal_stress[step] > 0], 0.0, atol=1e-12)
-        np.testing.assert_allclose(frame.normal_stress[nodes[0]], data.normal_stress[step], rtol=1e-6)
+        np.testing.assert_allclose(frame.interface.normal_stress, data.normal_stress[step], rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
@@ -282,11 +287,10 @@ def test_exact_every_row_of_cells_carries_the_load(done, name):
     for step in range(0, fields.steps, 5):
         frame = fields.frame(step)
         shear = float((data.weight * data.shear_stress).sum("x")[step]) if "shear_stress" in data else 0.0
-        for part in (0, 1):
-            mine = np.flatnonzero(frame.part == part)
-            corners = frame.place[np.array([frame.cells[k] for k in mine])]
+        for body in (frame.lower, frame.upper):
+            corners = body.place[np.array(body.cells)]
             width, height = np.ptp(corners[:, :, 0], axis=1), corners[:, :, 1].mean(axis=1)
-            stress = frame.stress[mine].astype(float)
+            stress = body.stress.astype(float)
             _, row = np.unique(height.round(9), return_inverse=True)
             assert row.max() > 5
             np.testing.assert_allclose(np.bincount(row, -stress[:, 1] * width) * WIDTH, LOAD, rtol=2e-6)

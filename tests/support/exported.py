@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 from scene_texts import COATED, COULOMB
 
-from patchfem.export.fields.vtkhdf import NAME, bodies, write_series
+from patchfem.export.fields.blocks import blocks_of
+from patchfem.export.fields.vtkhdf import NAME, write_series
 
-UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "part": "1", "material": "1",
-         "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond": "Pa"}
+UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
+         "normal_stress": "Pa", "gap": "m", "status": "1", "normal_bond_lower": "Pa", "normal_bond_upper": "Pa"}
 CROWNED = COATED + """\
 [contact.crown]
 radius = "80 m"
@@ -40,16 +41,17 @@ def body(sign: float, frames: int, rng) -> dict:
 
 
 def write_small(folder, frames: int = 3, seed: int = 0):
-    """A results folder with only fields.vtkhdf; (times, point data, cell data) as given to the writer."""
+    """A results folder with only fields.vtkhdf; what was given to the writer."""
     rng = np.random.default_rng(seed)
     gap = rng.random((frames, 4)) * 1e-6
     interface = {"normal_stress": rng.random((frames, 4)) * 1e7, "gap": gap,
                  "status": rng.integers(0, 3, (frames, 4))}
-    points, blocks, at_points, in_cells = bodies(body(-1.0, frames, rng), body(1.0, frames, rng), interface)
+    pair = body(-1.0, frames, rng), body(1.0, frames, rng)
+    blocks = blocks_of(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
     times = np.cumsum(rng.random(frames))
     folder.mkdir(exist_ok=True)
-    write_series(folder / NAME, points, blocks, times, at_points, in_cells, UNITS)
-    return SimpleNamespace(points=points, blocks=blocks, times=times, point_data=at_points, cell_data=in_cells)
+    write_series(folder / NAME, blocks, times, UNITS)
+    return SimpleNamespace(blocks=blocks, times=times, pair=pair, interface=interface)
 
 
 def at(values, frame: int):

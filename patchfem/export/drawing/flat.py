@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ..fields.vtkhdf import Frame
+from ..fields.series import Frame
 from .panels import Panel, borders, curves, panels
 from .pictures import BLUE, ORANGE, STYLE, axis_unit
 

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fields.vtkhdf import Frame
+from ..fields.series import Frame
 from .pictures import axis_unit
 
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way
+ROUND_OFF = 1e-5  # of the largest motion: what is kept is in single precision, a slide is a difference of two
 VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap in it takes
 
 
@@ -15,13 +16,15 @@ VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap 
 class Panel:
     """One view of both pieces.
 
-    places: (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion; window: (left, right, bottom,
-    top) [mm] of what is drawn; top: stress [Pa] at the upper end of the colours; over: whether some cell exceeds it.
+    places: (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion; slide [mm] of the upper piece
+    as a whole, drawn as long as it is; window: (left, right, bottom, top) [mm] of what is drawn; top: stress [Pa] at
+    the upper end of the colours; over: whether some cell exceeds it.
     """
 
     places: np.ndarray
     cells: np.ndarray
     factor: float
+    slide: float
     window: tuple
     top: float
     over: bool
@@ -30,7 +33,8 @@ class Panel:
         """Head of the panel: how much its motion is magnified, and which stress the top colour stands for."""
         text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
         unit, scale = axis_unit([self.top], "Pa")
-        return text + (f", top colour {self.top * scale:.3g} {unit} and more" if self.over else "")
+        text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over else ""
+        return text + (f"\nthe slide of {self.slide * 1e3:.3g} um as it is" if self.slide and self.factor > 1 else "")
 
     def ticks(self) -> tuple:
         """Round numbers (along x, along y) [mm] for the axes of the window, about five on the longer side."""
@@ -46,14 +50,16 @@ def panels(frame: Frame, magnify: float | None = None) -> tuple:
 
     The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
     """
-    move = moved(frame)
+    move, slide = moved(frame), slide_of(frame)
     used = np.unique(np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)]))
     x, y = frame.points[used, :2].T * 1e3
     whole = (x.min(), x.max(), y.min(), y.max())
-    return tuple(_panel(frame, move, window, share, magnify) for window, share in ((whole, 0.995), (near(frame), 1.0)))
+    return tuple(_panel(frame, (move, slide), window, share, magnify)
+                 for window, share in ((whole, 0.995), (near(frame), 1.0)))
 
 
-def _panel(frame: Frame, move, window: tuple, share: float, magnify: float | None) -> Panel:
+def _panel(frame: Frame, motion: tuple, window: tuple, share: float, magnify: float | None) -> Panel:
+    move, slide = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
     mine = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
@@ -66,10 +72,13 @@ def _panel(frame: Frame, move, window: tuple, share: float, magnify: float | Non
     largest = float(mises[here].max(initial=0.0))
     limit = float(_exceeded(mises[here], areas(frame)[here], share))
     limit = limit if limit < CLIPPED * largest else largest
-    places = (frame.points[:, :2] + magnify * move) * 1e3
+    whole = np.zeros_like(move)
+    whole[upper_points(frame), 0] = slide
+    places = (frame.points[:, :2] + min(magnify, 1.0) * whole + magnify * (move - whole)) * 1e3
     drawn = places[np.unique(frame.connectivity[np.repeat(here, np.diff(frame.offsets))])]
     low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
-    return Panel(places, here, float(magnify), (low[0], high[0], low[1], high[1]), limit, largest > limit * (1 + 1e-6))
+    return Panel(places, here, float(magnify), slide * 1e3, (low[0], high[0], low[1], high[1]), limit,
+                 largest > limit * (1 + 1e-6))
 
 
 def _exceeded(values, weight, share: float) -> float:
@@ -81,6 +90,22 @@ def _exceeded(values, weight, share: float) -> float:
     return values[order][min(np.searchsorted(heap, share * heap[-1]), values.size - 1)]
 
 
+def upper_points(frame: Frame) -> np.ndarray:
+    """Numbers of the points of the upper piece."""
+    return np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
+
+
+def slide_of(frame: Frame) -> float:
+    """Slide [m] of the upper piece as a whole: of its far face, which is held rigid, carried down to y = 0."""
+    upper = upper_points(frame)
+    height = frame.points[upper, 1].max()
+    far = upper[frame.points[upper, 1] >= height * (1 - 1e-9)]
+    x, (across, up) = frame.points[far, 0], frame.point_data["displacement"][far, :2].astype(float).T
+    rotation = np.polyfit(x - x.mean(), up, 1)[0] if np.ptp(x) > 0 else 0.0
+    slide = float(across.mean() + rotation * height)
+    return slide if abs(slide) > ROUND_OFF * np.abs(frame.point_data["displacement"][upper]).max() else 0.0
+
+
 def moved(frame: Frame) -> np.ndarray:
     """Displacement (N, 2) [m] as drawn.
 
@@ -90,7 +115,7 @@ def moved(frame: Frame) -> np.ndarray:
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
     line = frame.interface()
     x = frame.points[line, 0]
-    upper = np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
+    upper = upper_points(frame)
     height = frame.points[upper, 1].max()
     face = upper[frame.points[upper, 1] <= 1e-9 * height]
     face = face[np.argsort(frame.points[face, 0], kind="stable")]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..fields.vtkhdf import Frame, Series
+from ..fields.series import Frame, Series
 from .panels import Panel, borders, curves, panels
 from .pictures import axis_unit
 
@@ -132,7 +132,8 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str) -> None:
         if len(edges):
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
-    plotter.add_text(text, font_size=FONT * 0.6, color="black", position=(0.03, 0.93), viewport=True)
+    said = plotter.add_text(text, font_size=FONT * 0.6, color="black", position=(0.03, 0.98), viewport=True)
+    said.GetTextProperty().SetVerticalJustificationToTop()
     _axes(plotter, panel, _look(plotter, panel.window))
 
 

@@ -1,13 +1,20 @@
 """The bodies and their interface frame by frame: what a run writes for VTK and draws in its report."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ...elasticity import coating_bond, elasticity, substructure
 from ...elasticity.elasticity import Piece, von_mises
-from ...elasticity.recovery import cells_of, indicator, recovery
-from .vtkhdf import bodies, write_series
+from ...elasticity.recovery import Cells, Recovery, cells_of, indicator, quadratures, recovery
+from .blocks import blocks_of
+from .vtkhdf import write_series
+
+UNITS = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "stress_error": "1", "material": "1",
+         "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1", "worn_depth": "m"} | {
+    f"{name}_{side}": "Pa" for name in ("normal_bond", "shear_bond") for side in ("lower", "upper")}
 
 
 def write_fields(result, path: Path) -> dict:
@@ -19,29 +26,18 @@ def write_fields(result, path: Path) -> dict:
     times = fields["time"]
     interface = {k: v for k, v in fields.items() if k != "time" and not k.startswith("holder_")}
     loads = [_loads(patch, fields, side) for side in ("lower", "upper")]
-    low, high = (_body(patch, fields, side, motion) for side, motion in zip(("lower", "upper"), _motions(patch, loads)))
+    motions = _motions(patch, loads)
+    insides = [_inside(patch.pair.piece, patch.pair.grid)]
+    insides += insides if patch.pair.upper is patch.pair.piece else [_inside(patch.pair.upper, patch.pair.upper_grid)]
+    low, high = (_body(patch, fields, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].shares(other["error"])[0]
-    joined = [interface] if patch.pair.joint is None else \
-        [_moved(interface, patch.x, body.x) for body in (patch.pair.grid, patch.pair.upper_grid)]
-    points, blocks, point_data, cell_data = bodies(low, high, *joined)
-    units = {"displacement": "m", "stress": "Pa", "von_mises": "Pa", "part": "1", "material": "1",
-             "normal_stress": "Pa", "shear_stress": "Pa", "gap": "m", "slip": "m", "status": "1", "worn_depth": "m",
-             "stress_error": "1", "normal_bond": "Pa", "shear_bond": "Pa"}
-    used = {k: v for k, v in units.items() if k in point_data or k in cell_data}
-    write_series(path, points, blocks, times, point_data, cell_data, used)
+    write_series(path, blocks_of(low, high, patch.x, interface), times, UNITS)
     if not isinstance(patch.pair.piece, Piece):
         return {}
     shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
     return {"depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
             "mises": [body["mises"][shown].reshape(shape) for body in (low, high)]}
-
-
-def _moved(interface: dict, x, nodes) -> dict:
-    """Fields (f, m) at x read off at the nodes of a piece; a status is that of the nearest point."""
-    nearest = np.abs(np.subtract.outer(nodes, x)).argmin(axis=1)
-    return {name: rows[:, nearest] if name == "status" else np.array([np.interp(nodes, x, row) for row in rows])
-            for name, rows in interface.items()}
 
 
 def _loads(patch, fields: dict, side: str) -> tuple:
@@ -68,41 +64,57 @@ def _motions(patch, loads: list) -> list:
     return [how(piece, *load) for piece, load in zip((pair.piece, pair.upper), loads)]
 
 
-def _body(patch, fields: dict, side: str, u) -> dict:
-    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
-    u: of `_motions`."""
-    lower = side == "lower"
-    piece, grid = (patch.pair.piece, patch.pair.grid) if lower else (patch.pair.upper, patch.pair.upper_grid)
-    sign = -1.0 if lower else 1.0
-    points, blocks, interface, stress = _inside(piece, grid, u)
-    u, stress, cells = u[:1] + u[1:], stress[:1] + stress[1:], cells_of(piece)
-    error = indicator(recovery(cells), u, stress)
-    bonded = coating_bond.at(cells, coating_bond.bond_line(cells, u), grid.x)
-    if bonded:
-        bonded["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
-    move, stress = u * [1.0, sign], stress * np.array([1.0, 1.0, 1.0, sign])
-    if not lower:
-        same = np.ones((len(move), 1))
-        rotation = patch.pressure.rotation * same if "holder_rotation" not in fields else \
-            fields["holder_rotation"][:, None]
-        closing = patch.pressure.approach * same if "holder_closing" not in fields else \
-            fields["holder_closing"][:, None]
-        slide = fields["holder_slide"][:, None] if "holder_slide" in fields else 0.0
-        move[..., 0] += slide - rotation * points[:, 1]
-        move[..., 1] += rotation * points[:, 0] - closing
-    blocks = [block if not lower else block[:, ::-1] for block in blocks]
-    return {"points": points * [1.0, sign], "blocks": blocks, "interface": interface, "displacement": move,
-            "material": grid.is_coating if hasattr(grid, "is_coating") else piece.is_coating, "stress": stress,
-            "mises": von_mises(stress), "error": error, "bond": bonded}
+@dataclass(frozen=True, eq=False, slots=True)
+class _Inside:
+    """What the fields of a piece are made with, once for two pieces alike.
+
+    points: (n, 2) [m] as x and depth; blocks: of cells; interface: (m,) node numbers; stress: cell stresses of motions.
+    """
+
+    points: np.ndarray
+    blocks: list
+    interface: np.ndarray
+    stress: Callable
+    cells: Cells
+    rules: list
+    found: Recovery
 
 
-def _inside(piece, grid, u) -> tuple:
-    """Inside of a piece displaced by u: (points (n, 2) as x and depth, blocks of cells, interface nodes, cell
-    stress)."""
+def _inside(piece, grid) -> _Inside:
+    cells = cells_of(piece)
     if isinstance(piece, elasticity.Piece):
-        rows = grid.depth.size
-        points = np.stack([np.repeat(grid.x, rows), np.tile(grid.depth, grid.x.size)], axis=1)
-        return points, [piece.cells], np.arange(0, len(points), rows), elasticity.cell_stress(piece, u)[0]
+        points, blocks, interface = cells.points, [piece.cells], np.arange(0, len(cells.points), grid.depth.size)
+        how = elasticity.cell_stress
+    else:
+        points, blocks, interface = grid.points, list(cells.blocks), grid.interface
+        how = substructure.cell_stress
+    return _Inside(points, blocks, interface, lambda u: how(piece, u)[0], cells, quadratures(cells), recovery(cells))
 
-    blocks = [block for block in (grid.triangles, grid.quads) if len(block)]
-    return grid.points, blocks, grid.interface, substructure.cell_stress(piece, u)[0]
+
+def _body(patch, fields: dict, side: str, inside: _Inside, u) -> dict:
+    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
+    u: of `_motions`, whose pressed state is that of the first frame."""
+    lower = side == "lower"
+    sign, cells, stress = -1.0 if lower else 1.0, inside.cells, inside.stress(u)
+    u, stress = u[:1] + u[1:], stress[:1] + stress[1:]
+    error = indicator(inside.found, u, stress, inside.rules)
+    bond = coating_bond.at(cells, coating_bond.bond_line(cells, u, inside.rules), patch.x)
+    if bond:
+        bond["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
+    stress = stress * [1.0, 1.0, 1.0, sign]
+    move = u * [1.0, sign]
+    if not lower:
+        move += _rigid(patch, fields, inside.points)
+    blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
+    return {"points": inside.points * [1.0, sign], "blocks": blocks, "interface": inside.interface,
+            "displacement": move, "material": cells.is_coating, "stress": stress, "mises": von_mises(stress),
+            "error": error, "bond": bond}
+
+
+def _rigid(patch, fields: dict, points) -> np.ndarray:
+    """Motion (f, n, 2) [m] of the upper holder at the places (n, 2) [m]."""
+    same = np.ones((len(fields["time"]), 1))
+    rotation, closing, slide = (fields[f"holder_{name}"][:, None] if f"holder_{name}" in fields else constant * same
+                                for name, constant in (("rotation", patch.pressure.rotation),
+                                                       ("closing", patch.pressure.approach), ("slide", 0.0)))
+    return np.stack([slide - rotation * points[:, 1], rotation * points[:, 0] - closing], axis=2)

@@ -1,11 +1,14 @@
-"""Results folder to other files: a frame as .vtu, the series as .pvd with a .vtu per frame, the interface as .csv.
+"""Results folder to other files: a frame as .vtu, the series as .pvd with named blocks, the interface as .csv.
 
 The .vtu is inline XML, arrays in base64 of zlib blocks, the numbers those of fields.vtkhdf to the last bit. A unit
-stands in the information key UNITS_LABEL of its array, where VTK keeps units; ParaView reads TimeValue.
+stands in the information key UNITS_LABEL of its array, where VTK keeps units, and where every reader shows it: in the
+name of a field array, "unit of gap: m". Codes too, as "code of material: coating" with the code as its value. Both are
+numbers because meshio refuses a file with field arrays of text. ParaView reads TimeValue.
 """
 
 import base64
 import os
+import re
 import shutil
 import zlib
 from pathlib import Path
@@ -14,7 +17,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from .vtkhdf import Frame, Series
+from .blocks import CODES, NAMES, Block
+from .series import Frame, Series
 
 BLOCK = 1 << 20  # bytes of a compressed block
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
@@ -51,7 +55,10 @@ def _export(series: Series, out: Path, number: int) -> str:
     if out.suffix == ".pvd":
         return f"{out}: {write_pvd(out, series)} frames in {frames_beside(out).name}"
     one = series.frame(number)
-    (write_vtu if out.suffix == ".vtu" else write_csv)(out, one)
+    if out.suffix == ".vtu":
+        write_vtu(out, one, one.time, one.units)
+    else:
+        write_csv(out, one)
     return f"{out}: frame {one.number} of {len(series)}, {one.time:.6g} s"
 
 
@@ -71,8 +78,9 @@ def frames_beside(path: Path) -> Path:
 
 
 def write_pvd(path: Path, series: Series) -> int:
-    """Write the series as a .pvd and one .vtu per frame in the folder beside it; returns the number of frames.
+    """Write the series as a .pvd, which any ParaView opens; returns the number of frames.
 
+    In the folder beside it stand a .vtm per frame, which names the blocks, and a .vtu per block.
     Frames left there by a longer series are removed; PatchfemError where the folder holds anything else.
     """
     folder = frames_beside(path)
@@ -82,41 +90,65 @@ def write_pvd(path: Path, series: Series) -> int:
         raise PatchfemError(f"{folder}: holds files that are not frames of patchfem ({', '.join(strange[:3])}); "
                             "name another -o")
     folder.mkdir(exist_ok=True)
-    names = [f"frame_{number:04d}.vtu" for number in range(len(series))]
-    for number, name in enumerate(names):
-        write_vtu(folder / name, series.frame(number))
-    files = [quoteattr(f"{folder.name}/{name}") for name in names]
-    lines = [f'    <DataSet timestep="{float(time)!r}" group="" part="0" file={file}/>'
-             for time, file in zip(series.times, files)]
-    text = "\n".join(['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">',
-                      "  <Collection>", *lines, "  </Collection>", "</VTKFile>", ""])
-    _whole(path, lambda partial: partial.write_text(text, "utf-8"))
+    lines, written = [], set()
+    for number, time in enumerate(series.times):
+        names = _write_vtm(folder, f"frame_{number:04d}", series.frame(number))
+        written.update(names)
+        lines.append(f'<DataSet timestep="{float(time)!r}" group="" part="0" '
+                     f'file={quoteattr(f"{folder.name}/{names[0]}")}/>')
+    _listing(path, "Collection", "0.1", lines)
     for one in old:
-        if one.name not in names:
+        if one.name not in written:
             one.unlink()
-    return len(names)
+    return len(series)
+
+
+def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
+    """Write a frame as a .vtm and a .vtu per block; the names of the files, the .vtm first."""
+    names = [f"{stem}_{name}.vtu" for name in frame.blocks]
+    for name, one in zip(names, frame.blocks.values()):
+        write_vtu(folder / name, one, frame.time, frame.units)
+    _listing(folder / f"{stem}.vtm", "vtkMultiBlockDataSet", "1.0",
+             [f'<DataSet index="{k}" name="{block}" file="{name}"/>'
+              for k, (block, name) in enumerate(zip(frame.blocks, names))])
+    return [f"{stem}.vtm", *names]
+
+
+def _listing(path: Path, kind: str, version: str, lines: list) -> None:
+    """Write a file of VTK that lists other files."""
+    text = "\n".join(['<?xml version="1.0"?>',
+                      f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">', f"  <{kind}>",
+                      *("    " + line for line in lines), f"  </{kind}>", "</VTKFile>", ""])
+    _whole(path, lambda partial: partial.write_text(text, "utf-8"))
 
 
 def _ours(name: str) -> bool:
-    return name.startswith("frame_") and name.endswith(".vtu") and name[6:-4].isdigit()
+    return re.fullmatch(rf"frame_\d+(\.vtm|(_({'|'.join(NAMES)}))?\.vtu)", name) is not None
 
 
-def write_vtu(path: Path, frame: Frame) -> None:
-    """One frame as an unstructured grid of VTK with inline arrays."""
+def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> None:
+    """Write a block, or a whole frame as one mesh, at a time [s] with inline arrays; units: name -> unit."""
     count, cells = len(frame.points), len(frame.types)
     text = ['<?xml version="1.0"?>',
             '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64" '
             'compressor="vtkZLibDataCompressor">', "<UnstructuredGrid>", "<FieldData>",
-            _array("TimeValue", np.array([frame.time]), "s", ' NumberOfTuples="1"'), "</FieldData>",
+            *(_array(name, np.array([value]), unit, ' NumberOfTuples="1"') for name, value, unit in
+              (("TimeValue", time, "s"), *_meanings((*frame.point_data, *frame.cell_data), units))), "</FieldData>",
             f'<Piece NumberOfPoints="{count}" NumberOfCells="{cells}">']
     for kind, data in (("PointData", frame.point_data), ("CellData", frame.cell_data)):
-        text += [f"<{kind}>", *(_array(name, values, frame.units.get(name)) for name, values in data.items()),
+        text += [f"<{kind}>", *(_array(name, values, units.get(name)) for name, values in data.items()),
                  f"</{kind}>"]
     text += ["<Points>", _array("Points", frame.points, "m"), "</Points>", "<Cells>",
              _array("connectivity", frame.connectivity.astype(np.int64)),
              _array("offsets", frame.offsets[1:].astype(np.int64)), _array("types", frame.types.astype(np.uint8)),
              "</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>", ""]
     _whole(path, lambda partial: partial.write_text("\n".join(text), "ascii"))
+
+
+def _meanings(names: tuple, units: dict) -> list:
+    """(Name, value, None) of the field arrays that say the unit of every array and its codes."""
+    return [(f"unit of {name}: {units.get(name, '1')}", 1.0, None) for name in names] + \
+        [(f"code of {name}: {meaning}", code, None) for name in names for code, meaning in CODES.get(name, {}).items()]
 
 
 def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
@@ -140,9 +172,10 @@ def _packed(values) -> str:
 
 def write_csv(path: Path, frame: Frame) -> None:
     """Write the interface of one frame: a row per node by rising x, a column per field; SI, the unit in the header."""
-    nodes = frame.interface()
-    head, columns = ["x [m]"], [[repr(float(x)) for x in frame.points[nodes, 0]]]
-    for name, values in frame.point_data.items():
+    line = frame.blocks["interface"]
+    nodes = np.argsort(line.points[:, 0], kind="stable")
+    head, columns = ["x [m]"], [[repr(float(x)) for x in line.points[nodes, 0]]]
+    for name, values in line.point_data.items():
         mine = values[nodes]
         parts = [(name, mine)] if mine.ndim == 1 else [(f"{name}_{axis}", mine[:, k]) for k, axis in enumerate("xyz")]
         for label, part in parts:

@@ -1,0 +1,94 @@
+"""Both pieces and their interface as three named blocks of cells with their fields, and what their codes mean."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LINE, TRIANGLE, QUAD = 3, 5, 9  # cell types of VTK
+NAMES = ("lower", "upper", "interface")  # the place of a name is its code in `part`
+CODES = {"part": dict(enumerate(NAMES)), "material": {0: "substrate", 1: "coating"},
+         "status": {0: "open", 1: "stick", 2: "slip"}}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Block:
+    """Cells with their fields.
+
+    points: (n, 3) [m]; connectivity, offsets (c + 1,), types (c,): as VTK has them; point_data, cell_data: name ->
+    (n or c, ...) at one moment, (f or 1, n or c, ...) of a series, 1 if constant.
+    """
+
+    points: np.ndarray
+    connectivity: np.ndarray
+    offsets: np.ndarray
+    types: np.ndarray
+    point_data: dict
+    cell_data: dict
+
+
+def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
+    """A Block of points (n, 2) [m] and of arrays (c, 2 to 4) of node numbers: lines, triangles or quadrilaterals."""
+    sizes = np.concatenate([np.full(len(one), one.shape[1]) for one in cells])
+    return Block(np.column_stack([points, np.zeros(len(points))]),
+                 np.concatenate([np.ravel(one) for one in cells]).astype(np.int64),
+                 np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+                 np.array([0, 0, LINE, TRIANGLE, QUAD], np.uint8)[sizes], point_data, cell_data)
+
+
+def blocks_of(lower: dict, upper: dict, x, interface: dict) -> dict:
+    """The blocks of a pair, by name.
+
+    lower, upper: "points" (n, 2) [m], "blocks" of cells numbered from 0, "material" (t,) of all of them, "interface"
+    (m,) node numbers by rising x, "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises"
+    (f, t) [Pa], "stress_error" (f, t) [1], "bond" name -> (f, k), stress under its coating at x, {} without one;
+    interface: name -> (f, k) at the places x (k,) [m]. The interface moves with the lower piece.
+    """
+    line = lower["interface"]
+    own = lower["points"][line, 0]
+    move = np.zeros((len(lower["displacement"]), len(x), 3), np.float32)
+    for axis in (0, 1):
+        move[..., axis] = [np.interp(x, own, row) for row in lower["displacement"][:, line, axis]]
+    fields = {"displacement": move} | {name: np.asarray(rows, np.int8 if name in CODES else np.float32)
+                                       for name, rows in interface.items()}
+    for side, body in (("lower", lower), ("upper", upper)):
+        fields |= {f"{name}_{side}": np.asarray(rows, np.float32) for name, rows in body["bond"].items()}
+    ends = np.stack([np.arange(len(x) - 1), np.arange(1, len(x))], axis=1)
+    return {"lower": _body(lower), "upper": _body(upper),
+            "interface": block(np.column_stack([x, np.zeros(len(x))]), [ends], fields, {})}
+
+
+def _body(body: dict) -> Block:
+    frames, cells = len(body["displacement"]), len(body["material"])
+    move = np.zeros((frames, len(body["points"]), 3), np.float32)
+    move[..., :2] = body["displacement"]
+    stress = np.zeros((frames, cells, 6), np.float32)
+    stress[..., :4] = body["stress"]
+    return block(body["points"], body["blocks"], {"displacement": move},
+                 {"stress": stress, "von_mises": np.asarray(body["mises"], np.float32),
+                  "stress_error": np.asarray(body["stress_error"], np.float32),
+                  "material": np.asarray(body["material"], np.int8)[None]})
+
+
+def joined(blocks: dict) -> Block:
+    """Blocks of one moment as one, with the cell array `part` of CODES; what a block does not have is NaN there, or -1
+    of a code."""
+    first = np.cumsum([0, *(len(one.points) for one in blocks.values())])
+    ends = np.cumsum([0, *(one.connectivity.size for one in blocks.values())])
+    all_of = list(blocks.values())
+    part = np.repeat(np.array([NAMES.index(name) for name in blocks], np.int8), [len(one.types) for one in all_of])
+    return Block(np.concatenate([one.points for one in all_of]),
+                 np.concatenate([one.connectivity + at for one, at in zip(all_of, first)]),
+                 np.concatenate([[0], *(one.offsets[1:] + at for one, at in zip(all_of, ends))]),
+                 np.concatenate([one.types for one in all_of]),
+                 _filled([one.point_data for one in all_of], [len(one.points) for one in all_of]),
+                 _filled([one.cell_data for one in all_of], [len(one.types) for one in all_of]) | {"part": part})
+
+
+def _filled(parts: list, sizes: list) -> dict:
+    out = {}
+    for name in dict.fromkeys(name for part in parts for name in part):
+        like = next(part[name] for part in parts if name in part)
+        hole = np.nan if like.dtype.kind == "f" else -1
+        out[name] = np.concatenate([part[name] if name in part else np.full((size, *like.shape[1:]), hole, like.dtype)
+                                    for part, size in zip(parts, sizes)])
+    return out

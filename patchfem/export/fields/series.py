@@ -1,0 +1,110 @@
+"""fields.vtkhdf read back, frame by frame."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ...core import Missing, PatchfemError
+from .blocks import NAMES, Block, joined
+from .vtkhdf import NAME
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Frame:
+    """One moment of a series: its blocks, and all of them as one mesh.
+
+    blocks: name -> Block; points: (N, 3) [m]; connectivity, offsets (cells + 1,), types, point_data, cell_data: of
+    `joined`; units: name -> unit; time [s]; number: from 0.
+    """
+
+    blocks: dict
+    points: np.ndarray
+    connectivity: np.ndarray
+    offsets: np.ndarray
+    types: np.ndarray
+    point_data: dict
+    cell_data: dict
+    units: dict
+    time: float
+    number: int
+
+    def cells(self, part: int) -> list:
+        """The cells of a part as arrays (c, nodes), one per size; `part` 0 lower, 1 upper piece, 2 interface."""
+        mine, size = self.cell_data["part"] == part, np.diff(self.offsets)
+        return [self.connectivity[self.offsets[:-1][mine & (size == n)][:, None] + np.arange(n)]
+                for n in np.unique(size[mine])]
+
+    def interface(self) -> np.ndarray:
+        """Numbers of the points of the interface (m,), by rising x."""
+        nodes = np.unique(np.concatenate([block.ravel() for block in self.cells(2)]))
+        return nodes[np.argsort(self.points[nodes, 0], kind="stable")]
+
+
+class Series:
+    """The fields of a results folder, frame by frame, as written; a context that holds the file.
+
+    times: (f,) [s]. Missing where the folder has no fields, PatchfemError for a file that is not one of `write_series`.
+    """
+
+    def __init__(self, folder: Path):
+        path = Path(folder) / NAME
+        if not path.is_file():
+            if not Path(folder).is_dir():
+                raise Missing(f"{folder}: no such results folder")
+            raise Missing(f"{folder}: it has no {NAME}; only a run with [contact] writes one")
+        self.path = path
+        try:
+            self.file = h5py.File(path, "r")
+        except OSError as error:
+            raise PatchfemError(f"{path}: not a readable HDF5 file ({error})") from None
+        try:
+            self.root = self.file["VTKHDF"]
+            self.times = self.root["Steps/Values"][:]
+            old = self.root.attrs["Type"] == b"UnstructuredGrid"
+            texts = [] if old else self.root["lower/FieldData/units"][:]
+            self.units = dict(text.decode().rstrip("]").split(" [", 1) for text in texts)
+        except (KeyError, ValueError) as error:
+            self.file.close()
+            raise PatchfemError(f"{path}: not a series of fields of patchfem ({error})") from None
+        if old:
+            self.file.close()
+            raise PatchfemError(f"{path}: written by an older patchfem, without blocks; run its scene again")
+
+    def __enter__(self) -> "Series":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.file.close()
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def frame(self, number: int = -1) -> Frame:
+        """The frame `number` from 0, counted from the end where it is negative.
+
+        PatchfemError for a number that is not there and for a file that is damaged.
+        """
+        count = len(self)
+        if not -count <= number < count:
+            raise PatchfemError(f"--frame: {number} is not there, {self.path} has frames 0 to {count - 1}")
+        number %= count
+        try:
+            blocks = {name: self._block(self.root[name], number) for name in NAMES}
+        except (KeyError, OSError) as error:
+            raise PatchfemError(f"{self.path}: frame {number} cannot be read ({error})") from None
+        one = joined(blocks)
+        return Frame(blocks, one.points, one.connectivity, one.offsets, one.types, one.point_data, one.cell_data,
+                     self.units | {"part": "1"}, float(self.times[number]), number)
+
+    @staticmethod
+    def _block(group, number: int) -> Block:
+        data = [{name: _rows(group, kind, name, number, size) for name in group[kind]} for kind, size in (
+            ("PointData", len(group["Points"])), ("CellData", len(group["Types"])))]
+        return Block(group["Points"][:], group["Connectivity"][:], group["Offsets"][:], group["Types"][:], *data)
+
+
+def _rows(group, kind: str, name: str, number: int, size: int) -> np.ndarray:
+    first = int(group[f"Steps/{kind}Offsets/{name}"][number])
+    return group[f"{kind}/{name}"][first:first + size]
