@@ -77,7 +77,8 @@ def _layout(asked, seen: list) -> Layout:
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
     bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
     known, fall = rounded_edges(asked)
-    bands += tuple((place, place, min(least, fall / 4)) for place in known if span[0] - least <= place <= span[1] + least)
+    near = [place for place in known if span[0] - least <= place <= span[1] + least]
+    bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = JUMP if asked.singular_ends else 1
     corner = max(min(thick / 8 if thick else np.inf, wide / EDGE / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}

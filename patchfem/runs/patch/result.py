@@ -29,7 +29,7 @@ def bodies(model) -> tuple:
 
 
 def measured(model, patch, coarse) -> dict:
-    """Static measures of the patch of a model; on a mesh that the tolerance chose those that miss it are extrapolated."""
+    """Static measures of the patch of a model; on a mesh that its tolerance chose those that miss it are extrapolated."""
     return measures(patch, *coarse, tolerance=model.accuracy.tolerance if model.patch.chosen else None)
 
 
