@@ -5,10 +5,11 @@ from ...model.pieces import bodies_of
 from ...model.source import placed
 from ..results.result import Result, still
 from .ladder import solve_all
-from .measures import measures, plane_band, strip_error
+from .measures import measures, strip_error
+from .notes import left_out
 from .values import values
 
-__all__ = ["bodies", "measures", "probed", "solve_all", "static", "strained"]
+__all__ = ["bodies", "left_out", "measures", "probed", "solve_all", "static", "strained"]
 
 
 def probed(model) -> dict:
@@ -32,8 +33,6 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     p, extra = patch.pressure, {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    elif coarse[-1] is not None and what.kind == "patch":
-        warnings = [*warnings, *plane_band(what.model.patch, coarse[0])]
     found = measures(patch, *coarse)
     if patch.strips is not None and coarse[0] is not None:
         found = strip_error(what.model.patch, coarse[0], found)
