@@ -233,8 +233,9 @@ def undetermined(c, turns: bool, spring: float) -> str:
         return "contact: the equations of the contact set left the numbers; check that load, gap and stiffnesses are " \
                "of ordinary size"
     holder = "raise" if spring > 0 else "name"
-    return "contact: the nodes that touch do not determine the rotation; bring contact.load_line.offset nearer to the " \
-           f"middle (under contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"
+    return "contact: the nodes that touch do not determine the rotation; bring contact.load_line.offset nearer to " \
+           "the middle (under contact.load_line.moment: raise contact.load) or " \
+           f"{holder} contact.holder.rotational_stiffness"
 
 
 def checked(c, ask: Ask, out: Solved) -> tuple:

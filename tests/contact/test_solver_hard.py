@@ -145,7 +145,7 @@ def test_refuses_an_overlap_without_digits():
 @pytest.mark.parametrize("moment", [None, LOAD * 1e-5])
 def test_refuses_an_indefinite_compliance(moment):
     c = -coated_pair(100).normal
-    with pytest.raises(NotConverged, match="not positive definite.*contact.element_size") as caught:
+    with pytest.raises(NotConverged, match=r"not positive definite.*contact\.element_size") as caught:
         press(pair_on(coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
     assert "raise the load" not in str(caught.value) and "holder" not in str(caught.value)  # no load mends it
 
