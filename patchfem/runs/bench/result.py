@@ -5,9 +5,9 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
-from ..patch.travel import FAR, ended, reach, travelled
 from ..results.notes import unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
+from ..results.travel import FAR, ended, reach, travelled
 from . import bench
 from .errors import errors_of
 from .watch import Watch

@@ -3,8 +3,7 @@
 import numpy as np
 
 from ...core import Outcome
-from ...mesh.anymesh import PieceMesh
-from ...mesh.recognise import held_share
+from ...mesh.tensor import TensorGrid
 from .measures import plane_band
 
 COUPLED = 0.02  # of the tangential compliance; the closing by shear is said from there on
@@ -35,8 +34,10 @@ def half_held(pair) -> list:
     """A note for each piece whose far face the mesh file holds in part."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        if not isinstance(body, PieceMesh):  # all of the last row of a tensor grid is held
+        if isinstance(body, TensorGrid):  # all of its last row is held
             continue
+        from ...mesh.recognise import held_share
+
         held, whole = held_share(body)
         if held < WHOLE * whole:
             out.append(f"contact.mesh: {side}_far holds {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} of "

@@ -13,9 +13,9 @@ from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
 from ..bench.averaged import limit_tractions
-from ..patch.travel import ended, travelled
 from ..results.notes import creeping, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
+from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors

@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import settle
 from ..bench import bench
-from ..patch.travel import ended
+from ..results.travel import ended
 from ..rig.engines import ENGINES
 from ..rig.numerics import choose
 from ..rig.rig import rig_fields

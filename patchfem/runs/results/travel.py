@@ -3,7 +3,6 @@
 import numpy as np
 
 from ...response.outcome import off_the_piece
-from .values import half_width
 
 FAR = 0.1  # of the contact length; from there on the fixed pressure is doubtful
 
@@ -15,9 +14,13 @@ def reach(slide) -> float:
 
 
 def contact_length(patch) -> float:
-    """Length [m] from one end of the contact to the other, at least that of the nodes that touch."""
-    share = patch.pieces.interface.weight / patch.pieces.interface.weight.sum()
-    return max(2 * half_width(patch.x, patch.pressure.sigma_n), float(share[patch.active].sum() * np.ptp(patch.x)))
+    """Length [m] from one end of the contact to the other, each end half way between its nodes."""
+    touching = np.flatnonzero(patch.active)
+    if not touching.size:
+        return 0.0
+    middle = (patch.x[1:] + patch.x[:-1]) / 2
+    ends = np.concatenate([patch.x[:1], middle, patch.x[-1:]])
+    return float(ends[touching[-1] + 1] - ends[touching[0]])
 
 
 def travelled(patch, slide) -> list:
