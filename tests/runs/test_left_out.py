@@ -9,7 +9,7 @@ from any_mesh_cases import FORMATS, drawn
 from command_line import cli
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE, POINT, SHEAR
 
-from patchfem.core import Outcome, PatchfemError
+from patchfem.core import NotConverged, Outcome, PatchfemError
 from patchfem.mesh.files import EDGE_TAGS
 from patchfem.mesh.tensor import graded_grid
 from patchfem.model.model import build
@@ -162,6 +162,17 @@ def test_exact_the_middle_of_a_soft_foundation_opens_beyond_a_third_of_the_lengt
         refuse_opening(found, pieces)
     limit = float(re.search(r"beyond (\S+) m", str(caught.value))[1])
     assert limit == pytest.approx(12.7e-3 / 3, rel=3e-3)  # printed to three digits
+
+
+def test_refuses_an_approach_between_two_rotations_on_one_node():
+    """A crown of 18 mm on cells of 1 mm touches at one node; under a moment it rolls from node to node, in jumps of the
+    order of h^2/2R = 28 um. On finer cells it rolls evenly and reaches the distance."""
+    text = TURNING.replace("0.2 um", "2.509 um") + '[contact.crown]\nradius = "18.18 mm"\n' \
+        '[contact.load_line]\nmoment = "0.0001782 N m"\n'
+    with pytest.raises(NotConverged, match=r"contact\.approach\.distance: 2\.509e-06 m is passed in a jump"):
+        ran(text.replace('"0.2 mm"', '"1 mm"'), False)
+    found = ran(text.replace('"0.2 mm"', '"0.02 mm"'), False)
+    assert found.measures["approach"].value == pytest.approx(2.509e-6, rel=1e-6)
 
 
 def test_refuses_an_approach_on_a_soft_holder_and_takes_it_on_a_stiff_one():

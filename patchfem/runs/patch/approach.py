@@ -6,7 +6,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ...contact.unilateral import press
-from ...core import Compliance, PatchfemError, frozen_array
+from ...core import Compliance, NotConverged, PatchfemError, frozen_array
+
+MISSED, ROUND = 1e-6, 1e-9  # of the distance and of the gap: what the search may leave of the distance
 
 
 def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple:
@@ -14,19 +16,22 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
 
     under(asked, pieces, gap): the same of a pair under its load; stiff: the pieces as a large load finds them. The load
     at which the approach is reached is searched. Where a load a millionth of what flat pieces would take is too much,
-    nothing touches. PatchfemError where the middle does not close as the load grows (`refuse_opening`).
+    nothing touches. PatchfemError where the middle does not close as the load grows (`refuse_opening`), NotConverged
+    where the approach jumps past the distance: one node under the load line carries at any rotation within bounds.
     """
     refuse_opening(asked, stiff)
     distance, tried = asked.approach, []
+    least = _least_load(asked, np.ptp(pieces.interface.x))
 
     def short(log_load: float) -> float:
-        tried.append(under(replace(asked, load=float(np.exp(log_load)), approach=None), pieces, gap))
+        # beyond the least load: the piece turns ever faster the nearer it is to tipping over
+        load = least + float(np.exp(log_load))
+        tried.append(under(replace(asked, load=load, approach=None), pieces, gap))
         return tried[-1][1].approach - distance
 
     top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
-    least = _least_load(asked, np.ptp(pieces.interface.x))
-    low = top = max(top, np.log(2 * least) if least > 0 else top)
-    bottom = max(top - np.log(1e6), np.log(least * (1 + 1e-9)) if least > 0 else -np.inf)
+    low = top = max(top, np.log(least) if least > 0 else top)
+    bottom = top - np.log(1e6) if least == 0 else np.log(least * 1e-9)
     for _ in range(60):
         if short(top) >= 0:
             break
@@ -39,7 +44,14 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
             return pieces, replace(still, gap=open_, approach=distance), skin, strips
         low, top = max(low - 2, bottom), low
     brentq(short, low, top, xtol=1e-13, rtol=1e-14)
-    return tried[-1]
+    best = min(tried, key=lambda one: abs(one[1].approach - distance))
+    if abs(best[1].approach - distance) > MISSED * distance + ROUND * np.ptp(gap):
+        reached = [one[1].approach for one in tried]
+        below, above = max(a for a in reached if a < distance), min(a for a in reached if a > distance)
+        raise NotConverged(f"{distance:.6g} m is passed in a jump from {below:.6g} m to {above:.6g} m, where the load "
+                           "line passes one of the few nodes that touch; lower contact.element_size or give "
+                           "contact.load in place of the approach", "contact.approach.distance")
+    return best
 
 
 def _least_load(asked, length: float) -> float:
