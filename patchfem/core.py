@@ -28,6 +28,7 @@ class Outcome(StrEnum):
     TRANSIENT = "transient"
     GROWS = "grows"
     EXCEEDS_TRAVEL = "exceeds_travel"
+    LEAVES_CONTACT = "leaves_contact"
     NO_CONTACT = "no_contact"
     NOT_CONVERGED = "not_converged"
 
@@ -44,6 +45,8 @@ _SENTENCES = {
     Outcome.TRANSIENT: "The run ended before the motion settled; ask for more cycles or read the *_steady estimates.",
     Outcome.GROWS: "The motion still rises and no bounded steady motion was found; friction does not limit it.",
     Outcome.EXCEEDS_TRAVEL: "The motion passed the stop of the flexure; the run ended there.",
+    Outcome.LEAVES_CONTACT: "The slide passed the end of the piece, where the pieces no longer overlap; lower the "
+                            "drive, shorten the slide or lengthen the piece.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
     Outcome.NOT_CONVERGED: "A solve did not reach its residual; the result is marked and must not be used.",
 }

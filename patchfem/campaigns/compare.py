@@ -21,7 +21,8 @@ SHOWN = {  # measure: (in words, what a scene needs for it)
 
 
 class Side(NamedTuple):
-    """One run: its measures by name, outcome, sentence, nodes x (n,) [m], normal stress there (n,) [Pa], warnings."""
+    """One run: its measures by name, outcome, sentence, nodes x (n,) [m], normal stress there (n,) [Pa], warnings and
+    notes."""
 
     measures: dict
     outcome: str
@@ -77,7 +78,7 @@ def _side(model: Model, say) -> Side:
     result = run(plan(model), say)
     outcome = result.outcome
     return Side(dict(result.measures), str(outcome), outcome.sentence, np.array(result.patch.x),
-                np.array(result.fields["normal_stress"][0]), list(result.warnings))
+                np.array(result.fields["normal_stress"][0]), [*result.warnings, *result.extra["notes"]])
 
 
 def data_of(found: Pressed) -> dict:

@@ -53,6 +53,8 @@ def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
         print(f"  {name:<42} {value}{error} {m['unit']}")
     for text in answer["warnings"]:
         say(f"warning: {text}")
+    for text in answer["notes"]:
+        say(f"note: {text}")
     if verbose:
         say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
     print(f"results: {target}")

@@ -140,8 +140,8 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     checks = residuals(skin, c, x, weight, gap, force, delta, free, load, moment, spring)
     bearing = (force > 1e-12 * force.max()).any(axis=0).sum()  # less is round-off
     if motion.size > 1 and spring == 0 and not smooth(skin) and bearing < 2:
-        raise NotConverged("contact.strips: the contact set does not determine the rotation; raise the load or name "
-                           "contact.holder.rotational_stiffness")
+        raise NotConverged("contact.strips: the contact set does not determine the rotation; lower "
+                           "contact.element_size or name contact.holder.rotational_stiffness")
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
         raise NotConverged(f"contact.strips: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; lower contact.strips."

@@ -16,10 +16,13 @@ from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, f
 from ..elasticity.threads import one_thread
 from .active_set import ROUND, Ask, Found, flaw, nested_set, rest, settle
 from .gradients import descend, gradients
-from .parts import Operator
+from .parts import Operator, factor
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin
+INDEFINITE = ("contact: the compliance of the pieces is not positive definite to working precision, whatever presses "
+              "them; raise contact.element_size, bring the stiffnesses of coating and substrate nearer to each other, "
+              "or check the cells of contact.mesh")
 LEAST = 1e-200  # N or m; below it the products of the check lose their digits
 
 
@@ -208,13 +211,31 @@ def _pressed(pieces: Compliance, ask: Ask, start, touch: float, rotation: float)
     with one_thread():
         try:
             out = solve(Operator(c), ask, start)
-        except np.linalg.LinAlgError as error:
-            raise NotConverged(f"contact: {error}; raise the load, name contact.holder.rotational_stiffness or check "
-                               "the mesh") from None
+        except np.linalg.LinAlgError:
+            raise NotConverged(undetermined(c, ask.moment is not None, ask.spring)) from None
         opening, checks = checked(c, ask, out)
     return Pressure(frozen_array(out.force / weight), frozen_array(opening), float(touch + out.closing),
                     float(rotation + out.theta), float(out.force.sum()), float(out.force @ x), Outcome.DONE,
                     out.iterations, checks)
+
+
+def undetermined(c, turns: bool, spring: float) -> str:
+    """Why the equations of a contact set have no answer, with the remedy that fits.
+
+    c: compliance (m, m) [m/N] of the pieces; turns: the rotation is free; spring [N m/rad] of the holder. A held
+    rotation is determined by any node in contact, so only the compliance itself can be at fault; no load mends it.
+    """
+    try:
+        factor(np.array(c, order="C"))
+    except np.linalg.LinAlgError:
+        return INDEFINITE
+    if not turns:
+        return "contact: the equations of the contact set left the numbers; check that load, gap and stiffnesses are " \
+               "of ordinary size"
+    holder = "raise" if spring > 0 else "name"
+    return "contact: the nodes that touch do not determine the rotation; bring contact.load_line.offset nearer to " \
+           "the middle (under contact.load_line.moment: raise contact.load) or " \
+           f"{holder} contact.holder.rotational_stiffness"
 
 
 def checked(c, ask: Ask, out: Solved) -> tuple:

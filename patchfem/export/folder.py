@@ -40,7 +40,8 @@ def summary_of(result: Result) -> dict:
     """The object of summary.json."""
     what = result.plan
     return summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
-                   effects_of(result), list(what.not_in_scene), result.warnings, result.seconds)
+                   effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
+                   result.seconds)
 
 
 def effects_of(result: Result) -> list:

@@ -140,6 +140,7 @@ def page(data: dict) -> str:
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     if warnings:
         parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
+    parts += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
     parts += [placed(number, *shown) for number, shown in enumerate(figures(data))]
     if "measured" in data:
         parts.append(_table_one(data))

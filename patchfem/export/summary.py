@@ -19,15 +19,15 @@ def measure_object(measure) -> dict:
 
 
 def summary(version: str, title: str, kind: str, outcome: str, measures: dict, effects: list, absent: list,
-            warnings: list, seconds: dict) -> dict:
-    """The object of summary.json: the answer of a run with its effects, warnings and times.
+            said: tuple, seconds: dict) -> dict:
+    """The object of summary.json: the answer of a run with its effects, warnings, notes and times.
 
     measures: name -> Measure; effects: dicts with effect, equations and seconds; absent: effects not in the scene;
-    seconds: part of the run -> time.
+    said: (warnings on numerical trust, notes on what the model leaves out); seconds: part of the run -> time.
     """
     return {"patchfem": version, "title": title, "kind": kind, "outcome": outcome,
             "measures": {name: measure_object(m) for name, m in measures.items()}, "effects": effects,
-            "not_in_scene": absent, "warnings": warnings,
+            "not_in_scene": absent, "warnings": list(said[0]), "notes": list(said[1]),
             "seconds": {name: round(float(value), 6) for name, value in seconds.items()}}
 
 

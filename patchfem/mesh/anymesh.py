@@ -111,7 +111,8 @@ def pieces(raw: Tagged, where) -> PairMesh:
     """Both pieces of a tagged mesh; `where` begins every message.
 
     PatchfemError names missing and unknown tags, node numbers that do not exist, twisted or empty cells, nodes and
-    cells that lie on one another, loose parts, an interface off y = 0 or with a hole, interfaces with other ends.
+    cells that lie on one another, loose parts, an interface off y = 0 or with a hole, a far face inside its piece,
+    interfaces with other ends.
     """
     _tags(raw, where)
     _numbers(raw, where)
@@ -240,7 +241,7 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
 
 
 def _joined(mesh: PieceMesh, side: str, where) -> None:
-    """Raise PatchfemError unless the cells meet edge to edge, in one part, and the interface runs along their
+    """Raise PatchfemError unless the cells meet edge to edge, in one part, and interface and far face run along their
     border."""
     ends, owner = cell_edges(mesh)
     count = len(mesh.points)
@@ -263,6 +264,9 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     inner[order[twice]] = inner[order[twice + 1]] = True
     border = ends[~inner]
     _hanging(mesh, border, side, where)
+    within = np.setdiff1d(mesh.far, border)
+    if within.size:
+        raise PatchfemError(f"{where}: {side}_far holds {within.size} nodes inside the {side} piece; tag its border")
     wanted = np.sort(np.stack([mesh.interface[:-1], mesh.interface[1:]], axis=1), axis=1)
     gone = ~np.isin(wanted[:, 0] * count + wanted[:, 1], key[~inner])
     if gone.any():

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import Missing, PatchfemError, frozen_array
-from ..effects import unbuilt
+from ..core import Missing, PatchfemError
 from .anymesh import PairMesh, Tagged, pieces
 from .decks import read_inp, read_unv
 from .pairs import blocks
+from .recognise import grids
 from .tensor import TensorGrid
 
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
@@ -63,6 +63,16 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         raise Missing(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
+def read_bodies(path: Path) -> tuple:
+    """Read a tagged mesh of any format as bodies (lower, upper or None where it is alike).
+
+    They are tensor grids where the checked pieces are such (`recognise.grids`), else two PieceMesh. PatchfemError as
+    `read_pieces` raises it.
+    """
+    pair = read_pieces(path)
+    return grids(pair) or (pair.lower, pair.upper)
+
+
 def read_pieces(path: Path) -> PairMesh:
     """Read both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv.
 
@@ -81,7 +91,7 @@ def read_pieces(path: Path) -> PairMesh:
             fault = f"{type(error).__name__}: {error}"
             raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})") from None
     elif path.suffix in (".msh", ".vtu"):
-        raw = _tagged(path, _load(path, (".msh", ".vtu")))
+        raw = _tagged(path, _load(path))
     else:
         raise PatchfemError(f"{path}: a mesh is read from .msh, .vtu, .inp or .unv")
     return pieces(raw, path)
@@ -116,14 +126,10 @@ def _tagged(path: Path, mesh) -> Tagged:
     return Tagged(np.asarray(mesh.points, float), *(part.astype(np.int64) for part in parts), label, nodes, how)
 
 
-def _load(path: Path, known: tuple = (".msh",)):
+def _load(path: Path):
     """Read a file by meshio; what meshio prints is kept from stdout, and its sys.exit is caught."""
     import meshio
 
-    if not path.is_file():
-        raise PatchfemError(f"{path}: no such mesh file")
-    if path.suffix not in known:
-        raise PatchfemError(unbuilt(f"{path}: only .msh meshes are read", "write it as one"))
     if path.suffix == ".msh":
         _plausible(path)
     try:
@@ -145,90 +151,3 @@ def _plausible(path: Path) -> None:
         if numbers and max(numbers[:4]) * least > len(content):
             raise PatchfemError(f"{path}: {section.decode()[1:]} announces {max(numbers[:4])} entries, more than a "
                                 f"file of {len(content)} bytes can hold")
-
-
-def _quads(path: Path, mesh) -> tuple:
-    """Quads (t, 4) of a mesh and the tag of each (t,); PatchfemError for other cells, bad ids and missing tags."""
-    names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
-    cells, labels, edges = [], [], set()
-    for block, physical in zip(mesh.cells, mesh.cell_data.get("gmsh:physical", [])):
-        if block.type == "line":
-            edges |= {names.get((1, int(t)), "") for t in np.unique(physical)}
-        elif block.type == "quad":
-            cells.append(block.data)
-            labels += [names.get((2, int(t)), f"tag {int(t)}") for t in physical]
-        elif block.type != "vertex":
-            raise PatchfemError(unbuilt(f"{path}: {block.type} cells", "use the quads of `patchfem mesh`"))
-    missing = {"upper_substrate", "lower_substrate"} - set(labels) | set(EDGE_TAGS) - edges
-    if missing:
-        raise PatchfemError(f"{path}: nothing is tagged {', '.join(sorted(missing))}")
-    unknown = set(labels) - set(CELL_TAGS)
-    if unknown:
-        raise PatchfemError(f"{path}: cells with the unknown {', '.join(sorted(unknown))}; known are "
-                            f"{', '.join(CELL_TAGS)}")
-    quads = np.concatenate(cells)
-    if quads.min() < 0 or quads.max() >= len(mesh.points):
-        raise PatchfemError(f"{path}: a cell names node {int(quads.max())}, the file has {len(mesh.points)}")
-    if not np.isfinite(mesh.points).all():
-        raise PatchfemError(f"{path}: a node has a coordinate that is not finite")
-    return quads, np.array(labels)
-
-
-def read_grid(path: Path) -> TensorGrid:
-    """Recognise the tensor grid behind a tagged .msh of two alike pieces, as `patchfem mesh` writes them.
-
-    PatchfemError names what is missing or wrong: tags, node ids, twisted cells, pieces that are unlike or shifted, a
-    mesh that is no tensor grid.
-    """
-    path = Path(path)
-    mesh = _load(path)
-    quads, label = _quads(path, mesh)
-    corner = mesh.points[quads][:, :, :2]
-    first, second = corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    side = corner[:, (1, 2, 3, 0)] - corner
-    turns = side[:, :, 0] * side[:, (1, 2, 3, 0), 1] - side[:, :, 1] * side[:, (1, 2, 3, 0), 0]
-    if not (np.all(turns * np.sign(area)[:, None] > 0)):
-        raise PatchfemError(f"{path}: a cell is twisted or has no area")
-    lower = _piece(mesh.points, quads, label, "lower", -1.0, path)
-    upper = _piece(mesh.points, quads, label, "upper", 1.0, path)
-    same = lower.x.size == upper.x.size and lower.depth.size == upper.depth.size
-    size = np.ptp(lower.x)
-    if not same or np.abs(lower.x - upper.x).max() > 1e-9 * size or \
-            np.abs(lower.depth - upper.depth).max() > 1e-9 * size or lower.coating_rows != upper.coating_rows:
-        raise PatchfemError(unbuilt(f"{path}: the two pieces differ or are shifted", "give both the same nodes"))
-    middle = (lower.x[0] + lower.x[-1]) / 2
-    return TensorGrid(frozen_array(lower.x - middle), lower.depth, lower.coating_rows)
-
-
-def _piece(points, quads, label, piece: str, side: float, path: Path) -> TensorGrid:
-    mine = np.char.startswith(label, piece)
-    cells = quads[mine]
-    xy = points[:, :2] * [1.0, side]
-    used = np.unique(cells)
-    span = np.ptp(xy[used], axis=0).max()
-    x = _levels(xy[used, 0], span)
-    depth = _levels(xy[used, 1], span)
-    corner = xy[cells]
-    low, high = corner.min(axis=1), corner.max(axis=1)
-    column = np.searchsorted(x, low[:, 0] - 1e-9 * span)
-    row = np.searchsorted(depth, low[:, 1] - 1e-9 * span)
-    tensor = (cells.shape[0] == (x.size - 1) * (depth.size - 1) and used.size == x.size * depth.size
-              and np.unique(column * depth.size + row).size == cells.shape[0]
-              and np.allclose(high[:, 0], x[np.minimum(column + 1, x.size - 1)], atol=1e-9 * span, rtol=0)
-              and np.allclose(high[:, 1], depth[np.minimum(row + 1, depth.size - 1)], atol=1e-9 * span, rtol=0))
-    if not tensor or abs(depth[0]) > 1e-9 * span:
-        raise PatchfemError(unbuilt(f"{path}: the {piece} piece is no tensor grid with its interface at y = 0",
-                                    "use a mesh of `patchfem mesh`"))
-    coat = label[mine] == f"{piece}_coating"
-    rows = int(row[coat].max() + 1) if coat.any() else 0
-    if not np.array_equal(coat, row < rows):
-        raise PatchfemError(f"{path}: {piece}_coating does not fill whole rows from the interface")
-    depth[0] = 0.0
-    return TensorGrid(frozen_array(x), frozen_array(depth), rows)
-
-
-def _levels(values, span: float) -> np.ndarray:
-    ordered = np.sort(values)
-    keep = np.concatenate([[True], np.diff(ordered) > 1e-7 * span])
-    return ordered[keep].copy()

@@ -52,18 +52,14 @@ def rounded_edges(patch: PatchModel) -> tuple:
 def bodies_of(patch: PatchModel) -> tuple:
     """Meshes of the two pieces: (lower, upper or None where it is alike).
 
-    They are grids that are made (both a ShapedGrid where a piece reaches beyond the interface), the tensor grid that is
-    recognised in the named mesh file, or its two pieces of any triangles and quads.
+    They are grids that are made (both a ShapedGrid where a piece reaches beyond the interface), the tensor grids that
+    are recognised in the named mesh file, or its two pieces of any triangles and quads.
     """
     if patch.mesh is None:
         return grid_of(patch, patch.lower), None if patch.alike else grid_of(patch, patch.upper)
-    from ..mesh import files
+    from ..mesh.files import read_bodies
 
-    try:
-        low, high = files.read_grid(patch.mesh), None
-    except PatchfemError:  # no tensor grid of alike pieces; what is wrong with the file is said by the general reader
-        pair = files.read_pieces(patch.mesh)
-        low, high = pair.lower, pair.upper
+    low, high = read_bodies(patch.mesh)
     for side, body in (("lower", low), ("upper", high or low)):
         _matches(patch, side, body)
     return low, low if high is None and not patch.alike else high

@@ -37,6 +37,17 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     return outcome, measures
 
 
+def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outcome | None:
+    """The outcome of a run, or LEAVES_CONTACT where its largest |slide| `reach` [m] passed the length [m] of the piece.
+
+    From that moment on nothing overlaps, so it comes before whatever the run did later: settle, go on growing, or pass
+    the stop of the flexure, which would have ended the run before had it stood nearer. A motion that grows without
+    having passed the end within the run still `grows`. Only a solve that missed its residual comes first, since its
+    slide means nothing.
+    """
+    return Outcome.LEAVES_CONTACT if reach > length and outcome is not Outcome.NOT_CONVERGED else outcome
+
+
 def changing_note(outcome: Outcome, drive) -> list:
     """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
     if outcome is not Outcome.TRANSIENT or drive.segments:

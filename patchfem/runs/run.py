@@ -43,7 +43,7 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
 
 def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: Kept | None) -> Result:
     begin, model = perf_counter(), what.model
-    seconds, warnings = {}, list(model.source.remarks)
+    seconds, warnings, notes = {}, list(model.source.remarks), []
     patch, coarse = None, (None, None)
     if model.patch is not None:
         from .patch import result as of_patch
@@ -54,9 +54,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if estimate and coarse[0] is None:
             warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; lower "
                             "contact.element_size")
-        if patch.pair.coupling > 0.02 and model.kind != "patch":
-            warnings.append("the pieces are unlike: the coupling between shear and normal closing is left out; it "
-                            f"is {patch.pair.coupling:.2g} of the tangential compliance")
+        notes += of_patch.left_out(model, patch, coarse)
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = of_patch.static(what, patch, coarse, seconds, warnings)
@@ -83,7 +81,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = worn(result, evolved, estimate)
     seconds["total"] = perf_counter() - begin
     apart = "strip" if model.patch is not None else "interface"
-    return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + _loose(result))
+    return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + _loose(result),
+                   extra=result.extra | {"notes": notes})
 
 
 def _unloaded(model: Model) -> bool:

@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..contact.unilateral import residuals
+from ..contact.unilateral import residuals, undetermined
 from ..core import Compliance, NotConverged, PatchfemError, frozen_array
 from ..elasticity.threads import one_thread
 from .sets import Kept, bounded_shear, press_forces
@@ -219,8 +219,7 @@ def _alike(state, operators, gap, step, friction) -> tuple:
         normal, motion, count = press_forces(operators.inverse("normal"), operators.x, lowered, target, state.active,
                                              step.spring)
     except np.linalg.LinAlgError:
-        raise NotConverged("contact: the rotation is not determined by the contact set; raise the load or name "
-                           "contact.holder.rotational_stiffness") from None
+        raise NotConverged(undetermined(operators.normal, step.moment is not None, step.spring)) from None
     index = np.flatnonzero(normal > 0)
     limit, shear = friction * normal[index], np.zeros(normal.size)
     sign = np.zeros(normal.size, np.int8)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from ..contact.unilateral import solve_forces
+from ..contact.unilateral import INDEFINITE, solve_forces
 from ..core import NotConverged, PatchfemError
 
 ROUND = 1e-14  # of the largest value: what counts as nothing
@@ -47,7 +47,7 @@ class Kept:
         self.block = self.full[np.ix_(index, index)]
         low, fault = dpotrf(self.block, lower=1)
         if fault:
-            raise PatchfemError("contact: the compliance is not positive definite on the contact set")
+            raise PatchfemError(INDEFINITE)
         low, _ = dpotri(low, lower=1)
         self.inverse = np.tril(low) + np.tril(low, -1).T
         self.index, self.updates = index.copy(), 0

@@ -16,7 +16,7 @@ from patchfem.contact.active_set import Ask, nested_set, rest, settle
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.gradients import descend, gradients, nearest
 from patchfem.contact.parts import SMALL, Operator
-from patchfem.contact.unilateral import SOLVED, press, press_by, solve
+from patchfem.contact.unilateral import SOLVED, press, press_by, solve, undetermined
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
 
@@ -145,8 +145,16 @@ def test_refuses_an_overlap_without_digits():
 @pytest.mark.parametrize("moment", [None, LOAD * 1e-5])
 def test_refuses_an_indefinite_compliance(moment):
     c = -coated_pair(100).normal
-    with pytest.raises(NotConverged, match="not positive definite"):
+    with pytest.raises(NotConverged, match=r"not positive definite.*contact\.element_size") as caught:
         press(pair_on(coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
+    assert "raise the load" not in str(caught.value) and "holder" not in str(caught.value)  # no load mends it
+
+
+def test_refuses_a_free_rotation_that_nothing_determines_with_the_keys_that_hold_it():
+    c = coated_pair(100).normal
+    assert "name contact.holder.rotational_stiffness" in undetermined(c, True, 0.0)
+    assert "raise contact.holder.rotational_stiffness" in undetermined(c, True, 1.0)
+    assert "holder" not in undetermined(c, False, 0.0)
 
 
 @pytest.mark.parametrize("control", ["load", "line", "spring"])

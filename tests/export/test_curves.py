@@ -160,5 +160,5 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
 def test_exact_a_page_without_curve_or_levels_has_neither():
     data = {"name": "a", "scene": "", "resolved": "", "sentence": Outcome.DONE.sentence, "engine": "", "fields": {},
             "x": None, "versions": {}, "summary": {"patchfem": "0", "title": "", "kind": "patch", "outcome": "done",
-            "measures": {}, "effects": [], "not_in_scene": [], "warnings": [], "seconds": {}}}  # fmt: skip
+            "measures": {}, "effects": [], "not_in_scene": [], "warnings": [], "notes": [], "seconds": {}}}  # fmt: skip
     assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)

@@ -34,7 +34,8 @@ def base(kind, outcome, effects, measures, title="a title") -> dict:
     return {"name": "scene-file", "scene": 'title = "<b>"', "resolved": "", "sentence": Outcome(outcome).sentence,
             "engine": "", "fields": {}, "x": None, "versions": {"python": "3"},
             "summary": {"patchfem": "0", "title": title, "kind": kind, "outcome": outcome, "measures": measures,
-                        "effects": rows, "not_in_scene": ["wear"], "warnings": [], "seconds": {"total": 1.0}}}
+                        "effects": rows, "not_in_scene": ["wear"], "warnings": [], "notes": [],
+                        "seconds": {"total": 1.0}}}
 
 
 def patch(load=1.0, frames=1, effects=("contact",)) -> dict:

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_grid, write_mesh
+from patchfem.mesh.anymesh import PieceMesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, pair_mesh, read_bodies, write_mesh
 from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 GRIDS = {
@@ -37,6 +38,13 @@ def store(path, pair, names=None, extra=(), edges=None):
     mesh.field_data |= {k: np.array([v, 1]) for k, v in (EDGE_TAGS if edges is None else edges).items()}
     meshio.write(path, mesh, file_format="gmsh22", binary=True)
     return path
+
+
+def read_grid(path):
+    """The grid of a file whose pieces are alike and tensor grids."""
+    low, high = read_bodies(path)
+    assert isinstance(low, TensorGrid) and high is None
+    return low
 
 
 def area(points, cells):
@@ -109,7 +117,8 @@ def test_always_numbering_and_place_along_x_do_not_matter(order, shift, tmp_path
     order.shuffle(cells)
     points = np.empty_like(pair["points"])
     points[nodes] = pair["points"] + [shift, 0.0]
-    mixed = {"points": points, "quads": np.array(nodes)[pair["quads"]][cells], "tags": pair["tags"][cells]}
+    mixed = {"points": points, "quads": np.array(nodes)[pair["quads"]][cells], "tags": pair["tags"][cells],
+             "edges": np.array(nodes)[pair["edges"]], "edge_tags": pair["edge_tags"]}
     back = read_grid(store(tmp_path_factory.mktemp("mixed") / "pair.msh", mixed))
     assert back.coating_rows == SMALL.coating_rows
     assert np.abs(back.x - SMALL.x).max() <= 1e-15
@@ -120,8 +129,8 @@ def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
     with pytest.raises(PatchfemError, match="no such mesh file"):
         read_grid(tmp_path / "nowhere.msh")
     (tmp_path / "pair.stl").write_text("solid")
-    with pytest.raises(PatchfemError, match=r"only \.msh"):
-        read_grid(tmp_path / "pair.stl")
+    with pytest.raises(PatchfemError, match=r"from \.msh, \.vtu, \.inp or \.unv"):
+        read_bodies(tmp_path / "pair.stl")
     with pytest.raises(PatchfemError, match=r"\.msh or \.vtu"):
         write_mesh(SMALL, tmp_path / "pair.stl")
     with pytest.raises(Missing, match="cannot be written"):
@@ -163,11 +172,15 @@ def test_always_a_spoilt_file_is_read_or_refused(changes, tmp_path):
         raw[nodes + int(place * (len(raw) - nodes))] = byte
     path.write_bytes(raw)
     try:
-        grid = read_grid(path)
+        low, high = read_bodies(path)
     except PatchfemError:
         return
-    assert np.all(np.diff(grid.x) > 0) and np.all(np.diff(grid.depth) > 0)
-    assert grid.x.size == SMALL.x.size and grid.depth.size == SMALL.depth.size
+    for grid in (low, high or low):
+        if isinstance(grid, TensorGrid):
+            assert np.all(np.diff(grid.x) > 0) and np.all(np.diff(grid.depth) > 0)
+            assert grid.x.size == SMALL.x.size and grid.depth.size == SMALL.depth.size
+        else:
+            assert grid.areas().min() > 0 and np.isfinite(grid.points).all()
 
 
 def test_refuses_missing_tags(tmp_path):
@@ -192,7 +205,7 @@ def test_refuses_a_twisted_cell_and_a_piece_shifted_along_x(tmp_path):
         read_grid(store(tmp_path / "pair.msh", {**pair, "quads": quads}))
     points = pair["points"].copy()
     points[len(points) // 2:, 0] += 1e-4
-    with pytest.raises(PatchfemError, match="shifted"):
+    with pytest.raises(PatchfemError, match="do not match"):
         read_grid(store(tmp_path / "pair.msh", {**pair, "points": points}))
 
 
@@ -217,53 +230,75 @@ def test_refuses_cells_without_a_tag_at_the_interface(tmp_path):
         read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
 
 
-def test_refuses_triangles(tmp_path):
+def test_refuses_triangles_over_quads(tmp_path):
     pair = pair_mesh(SMALL)
-    with pytest.raises(PatchfemError, match="triangle cells"):
+    with pytest.raises(PatchfemError, match="the two pieces share"):
         read_grid(store(tmp_path / "pair.msh", pair, extra=[("triangle", pair["quads"][:, :3])]))
 
 
 @pytest.mark.parametrize("node", [0, 7, 30])
 @pytest.mark.parametrize("shift", [(2e-5, 0.0), (0.0, 2e-6), (np.nan, 0.0), (0.0, np.inf)])
-def test_refuses_a_shifted_node(node, shift, tmp_path):
+def test_always_a_shifted_node_is_refused_or_leaves_no_tensor_grid(node, shift, tmp_path):
     pair = pair_mesh(SMALL)
-    for start, piece in ((0, "lower"), (len(pair["points"]) // 2, "upper")):
+    for start in (0, len(pair["points"]) // 2):
         points = pair["points"].copy()
         points[start + node] += shift
-        with pytest.raises(PatchfemError, match=f"{piece} piece is no tensor grid|not finite|twisted"):
-            read_grid(store(tmp_path / "pair.msh", {**pair, "points": points}))
+        path = store(tmp_path / "pair.msh", {**pair, "points": points})
+        try:
+            assert all(isinstance(body, PieceMesh) for body in read_bodies(path))
+        except PatchfemError as error:
+            assert any(words in str(error) for words in ("not finite", "twisted", "do not match", "across y = 0",
+                                                         "is not the straight line"))
 
 
-def test_refuses_a_doubled_cell_and_a_coating_that_is_no_layer(tmp_path):
+def test_refuses_a_doubled_cell(tmp_path):
     pair = pair_mesh(SMALL)
     quads = pair["quads"].copy()
     quads[3] = quads[4]
-    with pytest.raises(PatchfemError, match="no tensor grid"):
-        read_grid(store(tmp_path / "pair.msh", {**pair, "quads": quads}))
+    with pytest.raises(PatchfemError, match="lie on one another"):
+        read_bodies(store(tmp_path / "pair.msh", {**pair, "quads": quads}))
+
+
+def test_always_a_coating_that_is_no_layer_leaves_no_tensor_grid(tmp_path):
+    pair = pair_mesh(SMALL)
     tags = pair["tags"].copy()
     tags[np.flatnonzero(tags == CELL_TAGS["upper_coating"])[2]] = CELL_TAGS["upper_substrate"]
-    with pytest.raises(PatchfemError, match="upper_coating does not fill whole rows"):
-        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+    low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+    assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
 
 
-@pytest.mark.parametrize("other", [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2.1e-3, 1e-3, 5.25e-4, 1e-4),
-                                   graded_grid(2e-3, 1e-3, 4e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
-                         ids=["taller", "longer", "finer", "uncoated"])
-def test_refuses_unlike_pieces(other, tmp_path):
-    lower, upper = pair_mesh(SMALL), pair_mesh(other)
-    low = np.isin(lower["tags"], [CELL_TAGS["lower_coating"], CELL_TAGS["lower_substrate"]])
-    high = np.isin(upper["tags"], [CELL_TAGS["upper_coating"], CELL_TAGS["upper_substrate"]])
-    pair = {"points": np.concatenate([lower["points"], upper["points"]]),
-            "quads": np.concatenate([lower["quads"][low], upper["quads"][high] + len(lower["points"])]),
-            "tags": np.concatenate([lower["tags"][low], upper["tags"][high]])}
-    with pytest.raises(PatchfemError, match="two pieces differ"):
-        read_grid(store(tmp_path / "pair.msh", pair))
+def together(lower, upper):
+    """The lower piece of one grid and the upper piece of another as one pair."""
+    lower, upper = pair_mesh(lower), pair_mesh(upper)
+    out = {}
+    for part, tags, codes in (("quads", "tags", CELL_TAGS), ("edges", "edge_tags", EDGE_TAGS)):
+        kept = [np.isin(pair[tags], [code for name, code in codes.items() if name.startswith(side)])
+                for side, pair in (("lower", lower), ("upper", upper))]
+        out[part] = np.concatenate([lower[part][kept[0]], upper[part][kept[1]] + len(lower["points"])])
+        out[tags] = np.concatenate([lower[tags][kept[0]], upper[tags][kept[1]]])
+    return out | {"points": np.concatenate([lower["points"], upper["points"]])}
 
 
-def test_refuses_coatings_of_unlike_thickness_on_the_same_grid(tmp_path):
+@pytest.mark.parametrize("other", [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
+                         ids=["taller", "uncoated"])
+def test_exact_unlike_pieces_on_the_same_columns_are_two_grids(other, tmp_path):
+    low, high = read_bodies(store(tmp_path / "pair.msh", together(SMALL, other)))
+    for back, grid in ((low, SMALL), (high, other)):
+        assert back.coating_rows == grid.coating_rows and back.depth == pytest.approx(grid.depth, rel=1e-12)
+        assert back.x == pytest.approx(SMALL.x, rel=1e-12)
+
+
+def test_exact_pieces_on_other_columns_are_any_meshes_and_other_ends_are_refused(tmp_path):
+    bodies = read_bodies(store(tmp_path / "pair.msh", together(SMALL, graded_grid(2e-3, 1e-3, 4e-4, 1e-4))))
+    assert all(isinstance(body, PieceMesh) for body in bodies)
+    with pytest.raises(PatchfemError, match="do not match"):
+        read_bodies(store(tmp_path / "pair.msh", together(SMALL, graded_grid(2.1e-3, 1e-3, 5.25e-4, 1e-4))))
+
+
+def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_path):
     pair = pair_mesh(SMALL)
     deepest = np.abs(pair["points"][pair["quads"], 1]).max(axis=1) > SMALL.depth[SMALL.coating_rows - 1] * (1 + 1e-9)
     tags = pair["tags"].copy()
     tags[deepest & (tags == CELL_TAGS["upper_coating"])] = CELL_TAGS["upper_substrate"]
-    with pytest.raises(PatchfemError, match="two pieces differ"):
-        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+    low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+    assert (low.coating_rows, high.coating_rows) == (SMALL.coating_rows, SMALL.coating_rows - 1)

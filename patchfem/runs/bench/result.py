@@ -7,6 +7,7 @@ from ...effects import has
 from ...response.errors import with_errors
 from ..results.notes import unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
+from ..results.travel import FAR, ended, reach, travelled
 from . import bench
 from .errors import errors_of
 from .watch import Watch
@@ -37,21 +38,19 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
                     "that went to and fro: reading = \"stretch\" creates none"]
     warnings = [*warnings, *warming(model, patch, fine)]
     if patch is not None:
-        warnings = warnings + _overhang(model.patch, fine)
+        warnings = [*warnings, *_overhang(model.patch, patch, fine)]
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
-    return Result(what, Outcome.DONE, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
+    outcome = ended(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral)
+    return Result(what, outcome, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
                   {"engine": fine.engine.name, "steps": steps})
 
 
-def _overhang(asked, fine) -> list:
-    """Warnings of a bench whose slide leaves the patch or whose law has no finite peak."""
-    out, travel = [], float(np.abs(fine.slide).max()) / asked.length
-    if fine.lateral is not None and (aside := float(np.abs(fine.lateral).max()) / asked.width) > 0.1:
+def _overhang(asked, patch, fine) -> list:
+    """Warnings of a bench whose slide leaves the patch."""
+    out = []
+    if fine.lateral is not None and (aside := reach(fine.lateral) / asked.width) > FAR:
         out.append(f"the slide across is {aside:.2g} of the width; the overhang is not modelled")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
         out.append(f"the upper piece slides off the pressure: {100 * lost:.0f} % of the load is not carried at the end")
-    elif travel > 0.1:
-        out.append(f"the slide is {travel:.2g} of the patch; the pressure rides on the upper piece and the overhang is "
-                   "not modelled")
-    return out
+    return [*out, *travelled(patch, fine.slide)]

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure
+from ...core import Measure, PatchfemError
 from ...mesh.nested import plan_of
 from ..results.patch_rows import TABLE
 from .limits import limit
@@ -36,14 +36,17 @@ def plane_band(asked, patch: Patch) -> list:
         return []
     other = "stress" if asked.plane == "strain" else "strain"
     upper = None if pair.upper is pair.piece else pair.upper_grid
-    mine, theirs = values(patch), values(solve(replace(asked, plane=other), pair.grid, upper))
+    assumed = f"plane {asked.plane} is assumed for pieces {ratio:.2g} times as wide as tall"
+    try:
+        mine, theirs = values(patch), values(solve(replace(asked, plane=other), pair.grid, upper))
+    except PatchfemError as error:
+        return [f"{assumed}; the truth lies towards plane {other}, where the patch has no answer ({error})"]
     first = "approach" if asked.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {closing:+.2g} m"] if closing else []
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
-    return [f"plane {asked.plane} is assumed for pieces {ratio:.2g} times as wide as tall; the truth lies towards "
-            f"plane {other}, which would change {', '.join(parts)}"] if parts else []
+    return [f"{assumed}; the truth lies towards plane {other}, which would change {', '.join(parts)}"] if parts else []
 
 
 def strip_error(asked, patch: Patch, found: dict) -> dict:

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ...contact.unilateral import press, press_by
 from ...core import Compliance, Pressure, frozen_array
+from .approach import closed_by
 from .condensed import Pair, condensed
 
 RIPPLE = 1e-2  # expected ripple of the pressure on pieces whose nodes do not match, from which it is said
@@ -78,9 +78,7 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     gap, notes, seconds = asked.gap.at(pair.compliance.interface.x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
     begin = perf_counter()
-    turns = asked.rotates or asked.spring > 0
-    how = _closed_by if asked.approach is not None and turns else _under
-    pieces, pressure, skin, strips = how(asked, pair.compliance, gap)
+    pieces, pressure, skin, strips = _how(asked)(asked, pair.compliance, gap)
     seconds["press"] = perf_counter() - begin
     giving = pieces.tangential
     if not asked.shear:
@@ -88,8 +86,6 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     if asked.slide_spring:
         giving = frozen_array(giving + 1 / asked.slide_spring)
     ratio = asked.skin.tangential_ratio if asked.skin is not None else None
-    if strips is not None:
-        notes = (*notes, strips.note)
     if pair.joint is not None and pair.joint.ripple > RIPPLE:
         notes = (*notes, f"contact.mesh: {pair.joint.reason}")
     return Patch(pair, pieces, giving, frozen_array(gap), pressure, skin, strips, ratio,
@@ -104,13 +100,21 @@ def presser(asked, pair: Pair):
     """
     gap, _, _ = asked.gap.at(pair.compliance.interface.x)
     gap, bare = gap + pair.rise, pair.compliance
-    how = _closed_by if asked.approach is not None and (asked.rotates or asked.spring > 0) else _under
+    how = _how(asked)
 
     def press(worn, softening):
         soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
         return how(asked, soft, gap + worn)[1].sigma_n * bare.interface.weight
 
     return press
+
+
+def _how(asked):
+    """Function (asked, pieces, gap) -> (Compliance with its skin, Pressure, skin, strips) that presses the pair."""
+    if asked.approach is None or not (asked.rotates or asked.spring > 0):
+        return _under
+    bare = with_linear_skin if asked.skin is not None and asked.skin.law == "linear" else lambda skin, pieces: pieces
+    return lambda asked, pieces, gap: closed_by(asked, pieces, gap, _under, bare(asked.skin, pieces))
 
 
 def _under(asked, pieces: Compliance, gap) -> tuple:
@@ -134,43 +138,6 @@ def _under(asked, pieces: Compliance, gap) -> tuple:
         else:
             pressure = press(pieces, gap, asked.load, moment, angle, spring=spring)
     return pieces, pressure, skin, strips
-
-
-def _closed_by(asked, pieces: Compliance, gap) -> tuple:
-    """The pair under an approach with the rotation free; returns as `_under`.
-
-    The load at which the approach is reached is searched, since the approach grows with the load. Where a load a
-    millionth of what flat pieces would take is too much, nothing touches.
-    """
-    distance, tried = asked.approach, []
-
-    def short(log_load: float) -> float:
-        tried.append(_under(replace(asked, load=float(np.exp(log_load)), approach=None), pieces, gap))
-        return tried[-1][1].approach - distance
-
-    top = np.log(max(distance, np.ptp(gap), 1e-12) / pieces.normal.mean())
-    least = _least_load(asked, np.ptp(pieces.interface.x))
-    low = top = max(top, np.log(2 * least) if least > 0 else top)
-    bottom = max(top - np.log(1e6), np.log(least * (1 + 1e-9)) if least > 0 else -np.inf)
-    for _ in range(60):
-        if short(top) >= 0:
-            break
-        low, top = top, top + 2
-    while low == top or short(low) >= 0:
-        if low == bottom:
-            apart = replace(asked, load=0.0, approach=None, rotates=False, spring=0.0)
-            pieces, still, skin, strips = _under(apart, pieces, gap)
-            open_ = frozen_array(gap - min(distance, gap.min()))
-            return pieces, replace(still, gap=open_, approach=distance), skin, strips
-        low, top = max(low - 2, bottom), low
-    brentq(short, low, top, xtol=1e-13, rtol=1e-14)
-    return tried[-1]
-
-
-def _least_load(asked, length: float) -> float:
-    """Load [N] below which a free piece tips over under its moment."""
-    tips = asked.rotates and asked.line_moment and asked.spring == 0
-    return 2 * abs(asked.line_moment) / length if tips else 0.0
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:

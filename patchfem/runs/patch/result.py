@@ -5,11 +5,12 @@ from ...model.pieces import bodies_of
 from ...model.source import placed
 from ..results.result import Result, still
 from .ladder import solve_all
-from .measures import measures, plane_band, strip_error
+from .measures import measures, strip_error
+from .notes import left_out
 from .rounding import beyond_gentle
 from .values import values
 
-__all__ = ["bodies", "measured", "probed", "solve_all", "static", "strained"]
+__all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "strained"]
 
 
 def probed(model) -> dict:
@@ -29,7 +30,7 @@ def bodies(model) -> tuple:
 
 
 def measured(model, patch, coarse) -> dict:
-    """Static measures of the patch of a model; on a mesh that its tolerance chose those that miss it are extrapolated."""
+    """Static measures of the patch of a model; those that miss a tolerance that chose the mesh are extrapolated."""
     return measures(patch, *coarse, tolerance=model.accuracy.tolerance if model.patch.chosen else None)
 
 
@@ -38,8 +39,6 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     p, extra = patch.pressure, {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations}
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    elif coarse[-1] is not None and what.kind == "patch":
-        warnings = [*warnings, *plane_band(what.model.patch, coarse[0])]
     found = measured(what.model, patch, coarse)
     if patch.strips is not None and coarse[0] is not None:
         found = strip_error(what.model.patch, coarse[0], found)

@@ -15,6 +15,7 @@ from ...slip.fields import element_fields, point_fields
 from ..bench.averaged import limit_tractions
 from ..results.notes import creeping, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
+from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors
@@ -57,7 +58,10 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
-    return Result(what, outcome, found, raw.response, raw.window, patch, fields, seconds, warnings, extra)
+    if patch is not None:
+        warnings = [*warnings, *travelled(patch, raw.response.slide)]
+    return Result(what, ended(outcome, model.patch, patch, raw.response.slide), found, raw.response, raw.window, patch,
+                  fields, seconds, warnings, extra)
 
 
 def _said(model, patch, raw, outcome, found) -> list:

@@ -8,6 +8,7 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import settle
 from ..bench import bench
+from ..results.travel import ended
 from ..rig.engines import ENGINES
 from ..rig.numerics import choose
 from ..rig.rig import rig_fields
@@ -53,14 +54,15 @@ def _bench(model, patch, frames: int) -> Rubbed:
     steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
     shaped = not even(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
+    outcome = ended(None, model.patch, patch, found.slide)
     if shaped:
         last = found.frames >= found.first
         local, tau = found.local[last], found.tau[last]
         if found.first == 0:
             local, tau = (np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau))
-        return _read(model, patch, local, tau, False, found.values, None)
+        return _read(model, patch, local, tau, False, found.values, outcome)
     return _alike(model, patch, found.slip[found.first:], found.force[found.first:], found.load[found.first:],
-                  found.values, None)
+                  found.values, outcome)
 
 
 def _rig(model, patch, frames: int) -> Rubbed:
@@ -68,8 +70,9 @@ def _rig(model, patch, frames: int) -> Rubbed:
     shaped = not even(model, numerics.per_point)
     found = ENGINES[numerics.engine].run(model, numerics, patch, frames if shaped else 0, None, None)
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
-    ended, _ = settle(found, {"relative_displacement_amplitude": amplitude}, model.accuracy.tolerance, model.rig.drive)
-    outcome = ended if ended in UNBOUNDED else None
+    wanted = {"relative_displacement_amplitude": amplitude}
+    settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
+    outcome = ended(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
     if shaped:
         fields = rig_fields(model, numerics, patch, found)
         return _read(model, patch, fields["slip"][1:], fields["shear_stress"][1:], True, found.values, outcome)

@@ -1,0 +1,66 @@
+"""What the static model of a patch leaves out, said beside its numbers: plane state, lever arms, couplings, holds."""
+
+import numpy as np
+
+from ...core import Outcome
+from ...mesh.nested import plan_of
+from .measures import plane_band
+
+COUPLED = 0.02  # of the tangential compliance; the closing by shear is said from there on
+BENT = 0.02  # of the load under which a tall piece buckles; as much is missing from its sideways motion
+WHOLE = 1 - 1e-6  # share of a far face that counts as all of it: printed digits of a mesh file
+
+
+def left_out(model, patch, coarse) -> list:
+    """Notes on a pressed patch that hold whatever then moves it.
+
+    coarse: the patches of the error estimate, None for those that were not wanted; without the first no plane band is
+    computed.
+    """
+    asked = model.patch
+    out = [*half_held(patch.pair), *slender(asked, patch)]
+    if patch.strips is not None:
+        out.append(patch.strips.note)
+    if patch.pair.coupling > COUPLED and model.kind != "patch":
+        out.append("the pieces are unlike: the coupling between shear and normal closing is left out; it is "
+                   f"{patch.pair.coupling:.2g} of the tangential compliance")
+    if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
+        # a mesh of any cells has no coarser one: its second patch is finer than its first
+        out += plane_band(asked, patch if coarse[-1] is None else coarse[0])
+    return out
+
+
+def half_held(pair) -> list:
+    """A note for each piece whose far face the mesh file holds in part."""
+    out = []
+    for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
+        if plan_of(body) is not None:  # all of its last row is held
+            continue
+        from ...mesh.recognise import held_share
+
+        held, whole = held_share(body)
+        if held < WHOLE * whole:
+            out.append(f"contact.mesh: {side}_far holds {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} of "
+                       "its length; the rest of it is free")
+    return out
+
+
+def slender(asked, patch) -> list:
+    """A note for each piece so tall that its bending moves the load sideways: the lever arm that grows with it is left
+    out.
+
+    The measure is the load over that under which the piece buckles, clamped at the holder and free at the patch (Euler,
+    pi^2 E' L^2/48 H^2 as a mean pressure); what the motion lacks is about that share. A piece no taller than long bends
+    too little.
+    """
+    out, mean = [], patch.pressure.load / patch.pieces.interface.weight.sum()
+    for side in ("lower", "upper"):
+        piece = getattr(asked, side)
+        young, nu = piece.substrate.young, piece.substrate.poisson
+        stiff = young / (1 - nu**2) if asked.plane == "strain" else young
+        share = mean / (np.pi**2 * stiff * asked.length**2 / (48 * piece.height**2))
+        if piece.height > asked.length and share > BENT:
+            out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as long and bears "
+                       f"{share:.2g} of the load under which it buckles sideways (limit {BENT:g}); the lever arm that "
+                       "grows as it bends is left out")
+    return out

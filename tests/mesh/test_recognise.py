@@ -1,0 +1,84 @@
+"""Tensor grids found behind any mesh, and the held share of a far face, against shapes with lengths in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from any_mesh_cases import FORMATS, GRID, drawn, of_grid
+
+from patchfem.core import PatchfemError
+from patchfem.mesh.anymesh import PieceMesh
+from patchfem.mesh.files import EDGE_TAGS, read_bodies
+from patchfem.mesh.recognise import held_share, tensor_grid
+
+
+def bodies(m, folder, form):
+    ending, write = FORMATS[form]
+    write(m, folder / f"pair{ending}")
+    return read_bodies(folder / f"pair{ending}")
+
+
+def far_edges(m, side="lower"):
+    """Numbers of the far edges of one piece, by rising x."""
+    mine = np.flatnonzero(m.edge_tags == EDGE_TAGS[f"{side}_far"])
+    return mine[np.argsort(m.points[m.edges[mine], 0].mean(axis=1))]
+
+
+def without(m, edges):
+    kept = np.delete(np.arange(len(m.edges)), edges)
+    m.edges, m.edge_tags = m.edges[kept], m.edge_tags[kept]
+    return m
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_exact_the_same_grid_comes_from_every_format(form, tmp_path):
+    low, high = bodies(drawn("quads"), tmp_path, form)
+    assert high is None and low.coating_rows == GRID.coating_rows
+    assert low.x == pytest.approx(GRID.x, abs=1e-15) and low.depth == pytest.approx(GRID.depth, abs=1e-15)
+    assert all(isinstance(body, PieceMesh) for body in bodies(drawn("mixed"), tmp_path, form))
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
+    m = drawn("quads")
+    low, high = bodies(without(m, far_edges(m)[2:]), tmp_path, form)
+    assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
+    assert held_share(low) == pytest.approx((5e-4, 2e-3), rel=1e-12)  # 2 edges of 0.25 mm on 2 mm
+    assert held_share(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+
+
+@pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "unv"])
+def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_format(form, tmp_path):
+    m = drawn("quads")
+    m.edges[far_edges(m)[3]] = m.edges[far_edges(m, "upper")[3]]
+    with pytest.raises(PatchfemError, match="lower_far holds 2 nodes that no cell of the lower piece has"):
+        bodies(m, tmp_path, form)
+    m = drawn("quads")
+    m.edges[far_edges(m)[3]] -= 1  # one row above the far face
+    with pytest.raises(PatchfemError, match="lower_far holds 2 nodes inside the lower piece"):
+        bodies(m, tmp_path, form)
+    m = drawn("quads")
+    m.points = np.append(m.points, m.points[m.quads[3, 2]][None], axis=0)
+    m.quads[3, 2] = len(m.points) - 1
+    with pytest.raises(PatchfemError, match="lie on one another"):
+        bodies(m, tmp_path, form)
+
+
+def test_exact_the_held_share_follows_a_far_face_up_to_its_corners():
+    piece = of_grid(GRID, 0.5, 3)
+    assert held_share(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    bottom, left = piece.points[:, 1] == 1e-3, piece.points[:, 0] == -1e-3
+    sides = replace(piece, far=np.flatnonzero(left & (piece.points[:, 1] > 0)))
+    first = piece.points[left, 1]
+    first = np.sort(first)[1]  # the edge that touches the interface is held at one end alone
+    assert held_share(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
+    points = piece.points.copy()
+    points[:, 1] *= 1 + 40 * np.abs(points[:, 0]) / 2  # two slopes of 0.02, no corner between them
+    slanted = replace(piece, points=points, far=np.flatnonzero(bottom & (points[:, 0] <= 0)))
+    side = np.hypot(1e-3, 2e-5)
+    assert held_share(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
+
+
+def test_always_a_grid_is_recognised_whatever_its_numbers_are():
+    assert tensor_grid(of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
+    assert tensor_grid(of_grid(GRID, 0.2)) is None

@@ -1,0 +1,183 @@
+"""What the model leaves out, said with every kind of run: plane state, held faces, lever arms, slides off the piece."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from any_mesh_cases import FORMATS, drawn
+from command_line import cli
+from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE, POINT, SHEAR
+
+from patchfem.core import NotConverged, Outcome, PatchfemError
+from patchfem.mesh.files import EDGE_TAGS
+from patchfem.mesh.tensor import graded_grid
+from patchfem.model.model import build
+from patchfem.model.pieces import bodies_of
+from patchfem.response.outcome import off_the_piece
+from patchfem.runs.patch.approach import refuse_opening
+from patchfem.runs.patch.condensed import condensed
+from patchfem.runs.patch.press import pressed, with_linear_skin
+from patchfem.runs.patch.values import values
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+SINE = '[slide]\nkind = "sine"\nfrequency = "1 Hz"\ncycles = 1\namplitude = "{}"\n'
+RELEASE = '[drive]\nkind = "free"\ndisplacement = "{}"\ncycles = 5\n'
+TILT = '[contact.tilt]\nangle = "0.1 mrad"\n'
+HELD = ('[contact]\nlength = "12.8 mm"\nwidth = "12.7 mm"\nheight = "6.4 mm"\nload = "26 lbf"\n'
+        'substrate = "Ti-8Al-1Mo-1V"\nmesh = "{}"\n')
+TURNING = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\nelement_size = "0.2 mm"\n[contact.approach]\ndistance = "0.2 um"\n'
+LINE = '[contact.load_line]\noffset = "{} mm"\n'
+SOFT = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e9 Pa/m"\n'
+
+
+def ran(text, estimate=True):
+    return run(plan(loads(text)), estimate=estimate)
+
+
+# ---------------------------------------------------------------------------------------------------- plane state
+def test_exact_the_plane_band_stands_under_the_notes_of_every_kind():
+    """One patch, pressed the same way: the same sentence, whatever then moves it."""
+    kinds = ["", COULOMB + SINE.format("10 um"), COULOMB + MODE + RELEASE.format("10 um"),
+             COULOMB + SINE.format("10 um") + '[wear]\ncoefficient = "1e-15 m^2/N"\ncycles = 10\n']
+    found = [ran(COATED + TILT + text) for text in kinds]
+    notes = [one.extra["notes"] for one in found]
+    assert all(one == notes[0] for one in notes) and len(notes[0]) == 1
+    assert notes[0][0].startswith("plane strain is assumed for pieces 2 times as wide as tall")
+    assert not any("plane strain" in text for one in found for text in one.warnings)
+
+
+def test_exact_notes_are_printed_and_written_beside_the_warnings(tmp_path):
+    (tmp_path / "a.toml").write_text(COATED)
+    answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
+    [note] = json.loads((tmp_path / "out" / "summary.json").read_text())["notes"]
+    assert f"note: {note}" in answer.err and f"Note: {note}" in (tmp_path / "out" / "report.html").read_text()
+
+
+# ---------------------------------------------------------------------------------------------- mesh files, tall pieces
+@pytest.mark.parametrize("kept", [2, 16])
+def test_exact_a_mesh_held_in_part_has_one_answer_in_three_formats_and_says_so(kept, tmp_path):
+    """lower_far on 2 of its 16 edges of 0.8 mm: 1.6 of 12.8 mm."""
+    m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
+    far = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
+    gone = far[np.argsort(m.points[m.edges[far], 0].mean(axis=1))][kept:]
+    m.edges, m.edge_tags = np.delete(m.edges, gone, axis=0), np.delete(m.edge_tags, gone)
+    approaches = []
+    for form in ("gmsh 2.2 binary", "vtu", "inp lines"):
+        path = tmp_path / f"pair{FORMATS[form][0]}"
+        FORMATS[form][1](m, path)
+        found = ran(HELD.format(path))
+        approaches.append(found.measures["approach"].value)
+        said = [text for text in found.extra["notes"] if "lower_far" in text]
+        assert said == ([] if kept == 16 else ["contact.mesh: lower_far holds 0.0016 m of a face of 0.0128 m, 0.125 "
+                                               "of its length; the rest of it is free"])
+    assert approaches == pytest.approx([approaches[0]] * 3, rel=1e-9)
+    flat = 115.654 / (12.8e-3 * 12.7e-3) * 2 * 6.4e-3 / 121e9  # both pieces as bars
+    assert (approaches[0] > 3 * flat) == (kept == 2)
+
+
+def test_exact_a_tall_piece_says_its_share_of_the_load_under_which_it_buckles():
+    """Euler's column, clamped and free: pi^2 E' I/(4 H^2), I = width length^3/12."""
+    text = '[contact]\nlength = "10 mm"\nwidth = "1 m"\nheight = "{} mm"\nload = "{} N"\nelement_size = "0.5 mm"\n' \
+           'substrate = {{young = "100 GPa", poisson = 0.3, density = "4000 kg/m^3"}}\n'
+    critical = np.pi**2 * 100e9 / 0.91 * (1e-2**3 / 12) / (4 * 0.1**2)
+    notes = ran(text.format(100, 0.05 * critical)).extra["notes"]
+    said = [line for line in notes if "buckles" in line]
+    assert len(said) == 2 and "10 times as tall as long and bears 0.05 of the load" in said[0]
+    for height, share in ((100, 0.015), (10, 0.05)):
+        assert not any("buckles" in line for line in ran(text.format(height, share * critical)).extra["notes"])
+
+
+# ---------------------------------------------------------------------------------------------------- sliding away
+@pytest.mark.parametrize("share, said, outcome", [
+    (0.09, False, "done"), (0.11, True, "done"), (0.99, True, "done"), (1.01, True, "leaves_contact")])
+def test_exact_a_bench_says_how_far_it_slides_off_a_full_contact(share, said, outcome):
+    found = ran(COATED + COULOMB + SINE.format(f"{12.7 * share} mm"), False)
+    line = f"slide amplitude {12.7e-3 * share:.3g} m is {share:.2g} of the contact length 0.0127 m"
+    assert any(text.startswith(line) for text in found.warnings) == said
+    assert any(text.startswith("slide amplitude") for text in found.warnings) == said
+    assert found.outcome == outcome
+
+
+def test_exact_a_bench_across_its_width_leaves_it_too(tmp_path):
+    for across, outcome in ((12.6, "done"), (12.8, "leaves_contact")):
+        path = tmp_path / "path.csv"
+        path.write_text(f"time [s],displacement [um],lateral [mm]\n0,0,0\n1,5,{across}\n", "utf-8")
+        law = NONLOCAL.replace("1 um", "1 mm")
+        assert ran(COATED + law + f'[slide]\nkind = "file"\nfile = "{path}"\n', False).outcome == outcome
+
+
+@pytest.mark.parametrize("reach, outcome", [("12.6 mm", None), ("12.8 mm", "leaves_contact")])
+@pytest.mark.parametrize("more", ["", SHEAR])
+def test_exact_a_release_from_beyond_the_piece_leaves_it(reach, outcome, more):
+    """A block let go at rest is never farther away than where it was let go."""
+    found = ran(COATED + TILT + more + COULOMB + MODE + RELEASE.format(reach), False)
+    assert found.outcome == outcome if outcome else found.outcome in ("steady", "stuck", "transient")
+    assert any(text.startswith(f"slide amplitude {float(reach[:-3]) / 1e3:.3g} m") for text in found.warnings)
+    assert ran(POINT + COULOMB + MODE + RELEASE.format(reach), False).outcome != "leaves_contact"
+
+
+def test_always_the_end_of_the_piece_comes_before_what_the_run_did_later():
+    for outcome in Outcome:
+        gone = off_the_piece(outcome, 1.1e-2, 1e-2)
+        assert gone is (outcome if outcome is Outcome.NOT_CONVERGED else Outcome.LEAVES_CONTACT)
+        assert off_the_piece(outcome, 1e-2, 1e-2) is outcome
+    assert "no longer overlap" in Outcome.LEAVES_CONTACT.sentence
+
+
+@pytest.mark.parametrize("travel, outcome", [("5 mm", "exceeds_travel"), ("20 mm", "leaves_contact")])
+def test_exact_the_nearer_of_stop_and_end_of_the_piece_ends_a_growing_motion(travel, outcome):
+    """Friction far below pi/4 of the drive at resonance without damping: nothing bounds the motion."""
+    text = COATED + COULOMB + MODE.replace("damping = 0.003", "damping = 0.0").replace(
+        "[structure]\n", f'[structure]\ntravel = "{travel}"\n')
+    drive = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "40 g"\ncycles = 60\n'
+    assert ran(text + drive, False).outcome == outcome
+
+
+# ------------------------------------------------------------------------------------- approaches that no load reaches
+@pytest.mark.parametrize("offset", ["5", "-5"])
+def test_refuses_an_approach_whose_middle_opens_as_the_load_grows(offset):
+    """At 5 mm twice the load opens the middle of flat pieces twice as far; at 3 mm it closes it twice as far."""
+    with pytest.raises(PatchfemError, match=r"contact\.approach\.distance: the load line lies -?0\.005 m off"):
+        ran(TURNING + LINE.format(offset), False)
+    closing = []
+    for load in (100.0, 200.0):
+        for line in (float(offset), np.sign(float(offset)) * 3):
+            found = build(loads(TURNING.replace('[contact.approach]\ndistance = "0.2 um"', f'load = "{load} N"')
+                                + LINE.format(line))).patch
+            closing.append(values(pressed(found, condensed(found, *bodies_of(found))))["approach"])
+    assert closing[2:] == pytest.approx(2 * np.array(closing[:2]), rel=1e-9)
+    assert closing[0] < 0 < closing[1]
+    assert ran(TURNING + LINE.format(3), False).measures["approach"].value == pytest.approx(2e-7, rel=1e-9)
+
+
+def test_exact_the_middle_of_a_soft_foundation_opens_beyond_a_third_of_the_length():
+    """Winkler: beyond a sixth of the length the pressure is a wedge of length 3 (L/2 - e), whose edge lies at 3 e - L
+    from the middle: the gap there closes until e = L/3."""
+    found = build(loads(TURNING + SOFT + LINE.format(5))).patch
+    pieces = with_linear_skin(found.skin, condensed(found, *bodies_of(found)).compliance)
+    with pytest.raises(PatchfemError) as caught:
+        refuse_opening(found, pieces)
+    limit = float(re.search(r"beyond (\S+) m", str(caught.value))[1])
+    assert limit == pytest.approx(12.7e-3 / 3, rel=3e-3)  # printed to three digits
+
+
+def test_refuses_an_approach_between_two_rotations_on_one_node():
+    """A crown of 18 mm on cells of 1 mm touches at one node; under a moment it rolls from node to node, in jumps of the
+    order of h^2/2R = 28 um. On finer cells it rolls evenly and reaches the distance."""
+    text = TURNING.replace("0.2 um", "2.509 um") + '[contact.crown]\nradius = "18.18 mm"\n' \
+        '[contact.load_line]\nmoment = "0.0001782 N m"\n'
+    with pytest.raises(NotConverged, match=r"contact\.approach\.distance: 2\.509e-06 m is passed in a jump"):
+        ran(text.replace('"0.2 mm"', '"1 mm"'), False)
+    found = ran(text.replace('"0.2 mm"', '"0.02 mm"'), False)
+    assert found.measures["approach"].value == pytest.approx(2.509e-6, rel=1e-6)
+
+
+def test_refuses_an_approach_on_a_soft_holder_and_takes_it_on_a_stiff_one():
+    holder = '[contact.holder]\nrotational_stiffness = "{} N m/rad"\n'
+    with pytest.raises(PatchfemError, match=r"raise contact\.holder\.rotational_stiffness"):
+        ran(TURNING + LINE.format(5) + holder.format(1), False)
+    found = ran(TURNING + LINE.format(5) + holder.format(1e7), False)
+    assert found.measures["approach"].value == pytest.approx(2e-7, rel=1e-9)
