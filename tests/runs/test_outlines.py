@@ -8,17 +8,19 @@ from scene_texts import COATED, COULOMB, SLIDE
 from wedges import falling
 
 import patchfem as pf
-from patchfem.closed_forms.contact import rounded_punch_half_width, rounded_punch_pressure
+from patchfem.closed_forms.contact import punch_pressure, rounded_punch_half_width, rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity.coating_bond import bond_line
+from patchfem.elasticity.elasticity import assemble, interface_compliance
 from patchfem.elasticity.recovery import cells_of
-from patchfem.elasticity.substructure import displacement
+from patchfem.elasticity.substructure import condense, displacement
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.nested import finer
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
 from patchfem.model.model import build
 from patchfem.model.pieces import bodies_of, outlined, rounded_edges
+from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
@@ -117,6 +119,28 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
     assert patch.pressure.sigma_n.max() == pytest.approx(wanted.max(), rel=4e-3)
     assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
     assert "steep" not in " ".join(strained(model, patch))
+
+
+def test_exact_a_piece_that_goes_on_is_the_whole_block_asked_at_the_interface_alone():
+    model = asked(COATED + NARROW.format("upper"))
+    pair = condensed(model, *bodies_of(model))
+    body, layers = pair.grid, pair.piece.layers
+    x = np.unique(body.points[:, 0])
+    inside = np.isin(x, body.x)
+    assert x.size > body.x.size == inside.sum()
+    whole = interface_compliance(assemble(x, body.depth, body.inner.coating_rows, layers))
+    for mine, theirs in zip(condense(pair.piece), whole):
+        assert np.abs(mine - theirs[np.ix_(inside, inside)]).max() <= 1e-9 * np.abs(theirs).max()
+
+
+def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():
+    text = BLOCK.replace("24 mm", "160 mm").replace("8 mm", "80 mm")
+    model = asked(text + '[contact.upper]\nlength = "4 mm"\nheight = "4 mm"\n'
+                         'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n')
+    patch = graded(model, towards(2e-3, 2e-3, 1e-6))
+    inner = np.abs(patch.x) < 1.8e-3
+    wanted = punch_pressure(patch.x[inner], 1e5, 2e-3)
+    assert patch.pressure.sigma_n[inner] == pytest.approx(wanted, rel=5e-3)
 
 
 def test_exact_equal_lengths_said_and_not_said_are_one_answer():
