@@ -10,8 +10,7 @@ falls at each step.
 import numpy as np
 
 from ..core import NotConverged
-from .active_set import ROUND, Ask, on_set, polished, supported
-from .parts import Operator
+from .active_set import ROUND, Ask, Operator, on_set, polished, supported
 
 
 def _program(operator: Operator, ask: Ask) -> tuple:

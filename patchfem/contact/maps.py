@@ -12,8 +12,7 @@ import numpy as np
 
 from ..core import Compliance, Outcome, PatchfemError, frozen_array
 from ..elasticity.threads import one_thread
-from .active_set import Ask
-from .parts import Operator
+from .active_set import Ask, Operator
 from .unilateral import checked, refuse, solve
 
 

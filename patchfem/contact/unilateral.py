@@ -14,9 +14,8 @@ import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array
 from ..elasticity.threads import one_thread
-from .active_set import ROUND, Ask, Found, flaw, nested_set, rest, settle
+from .active_set import ROUND, Ask, Found, Operator, factor, flaw, nested_set, rest, settle
 from .gradients import descend, gradients
-from .parts import Operator, factor
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
 from patchfem.contact import unilateral
-from patchfem.contact.active_set import Ask, nested_set, rest, settle
+from patchfem.contact.active_set import SMALL, Ask, Operator, nested_set, rest, settle
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.gradients import descend, gradients, nearest
-from patchfem.contact.parts import SMALL, Operator
 from patchfem.contact.unilateral import SOLVED, press, press_by, solve, undetermined
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 

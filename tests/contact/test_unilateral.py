@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from pieces import COATED, COATING, LENGTH, LOAD, TILTS, TITANIUM, WIDTH, bare_pair, coated_pair, pair_of, rough
 from scipy.optimize import brentq, nnls
 
-from patchfem.contact.active_set import Ask
+from patchfem.contact.active_set import Ask, Operator
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.gradients import descend, gradients
-from patchfem.contact.parts import Operator
 from patchfem.contact.unilateral import SOLVED, press, solve_forces
 from patchfem.core import Compliance, Interface, Outcome, PatchfemError
 from patchfem.mesh.tensor import graded_grid
