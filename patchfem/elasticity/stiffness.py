@@ -29,22 +29,32 @@ def stiffness(parts, count: int) -> csr_matrix:
     parts: (basis, lam, mu, place) for each kind of cell: scalar basis, Lame pair per cell [Pa], and the node number of
     each of its unknowns, -1 where it is held. Entries that vanish by symmetry are kept as zeros.
     """
-    sums = [_summed(form, parts, count) for form in (along, inward, mixed)]
-    xx, yy, xy = sums
-    block = np.empty((xx.nnz, 2, 2))
-    block[:, 0, 0], block[:, 1, 1], block[:, 0, 1], block[:, 1, 0] = xx.data, yy.data, xy.data, xy.T.tocsr().data
-    return bsr_matrix((block, xx.indices, xx.indptr), shape=(2 * count, 2 * count)).tocsr()
+    rows, columns, straight, crossed = zip(*(_lower(*part) for part in parts))
+    place = tuple(np.concatenate(part) for part in (rows, columns))
+    # real and imaginary part: one sum over the cells serves two entries of a block
+    blocks = [coo_matrix((np.concatenate(part), place), shape=(count, count)).tocsr() for part in (straight, crossed)]
+    del rows, columns, straight, crossed, place
+    one, two = blocks
+    block = np.empty((one.nnz, 2, 2))
+    block[:, 0, 0], block[:, 1, 1], block[:, 0, 1], block[:, 1, 0] = one.data.real, one.data.imag, two.data.real, \
+        two.data.imag
+    row = np.repeat(np.arange(count), np.diff(one.indptr))
+    below = row > one.indices
+    strict = bsr_matrix((block[below], one.indices[below], np.append(0, np.cumsum(below))[one.indptr]),
+                        shape=(2 * count, 2 * count))
+    whole = bsr_matrix((block, one.indices, one.indptr), shape=strict.shape)
+    return (whole + strict.T).tocsr()
 
 
-def _summed(form, parts, count: int) -> csr_matrix:
-    rows, columns, values = [], [], []
-    for basis, lam, mu, place in parts:
-        shape = (lam.size, basis.X.shape[-1])
-        found = form.coo_data(basis, lam=np.broadcast_to(lam[:, None], shape), mu=np.broadcast_to(mu[:, None], shape))
-        row, column = place[found.indices]
-        free = (row >= 0) & (column >= 0)
-        rows.append(row[free])
-        columns.append(column[free])
-        values.append(found.data[free])
-    out = coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
-    return out.tocsr()
+def _lower(basis, lam, mu, place) -> tuple:
+    """Free entries (row >= column) of one kind of cell: rows, columns, xx + i yy and xy + i yx of their blocks."""
+    shape, size = (lam.size, basis.X.shape[-1]), basis.Nbfun
+    moduli = {"lam": np.broadcast_to(lam[:, None], shape), "mu": np.broadcast_to(mu[:, None], shape)}
+    xx = along.coo_data(basis, **moduli)
+    row, column = place.astype(np.int32)[xx.indices]
+    kept = np.flatnonzero((row >= column) & (column >= 0))
+    straight, crossed = np.empty((2, kept.size), complex)
+    straight.real, straight.imag = xx.data[kept], inward.coo_data(basis, **moduli).data[kept]
+    xy = mixed.coo_data(basis, **moduli).data
+    crossed.real, crossed.imag = xy[kept], xy.reshape(size, size, -1).swapaxes(0, 1).ravel()[kept]
+    return row[kept], column[kept], straight, crossed
