@@ -1,33 +1,14 @@
-"""Stiffness of plane elasticity by scikit-fem in three scalar forms, a quarter of the work of one form of vectors."""
+"""Stiffness of plane elasticity from scikit-fem's gradients of scalar shape functions and its quadrature."""
 
 import numpy as np
 from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix
-from skfem import BilinearForm
-
-
-@BilinearForm
-def along(u, v, w):
-    """Energy form of motions u, v along x only: (lambda + 2 mu) u,x v,x + mu u,y v,y."""
-    return (w.lam + 2 * w.mu) * u.grad[0] * v.grad[0] + w.mu * u.grad[1] * v.grad[1]
-
-
-@BilinearForm
-def inward(u, v, w):
-    """Energy form of motions u, v into the piece only: (lambda + 2 mu) u,y v,y + mu u,x v,x."""
-    return (w.lam + 2 * w.mu) * u.grad[1] * v.grad[1] + w.mu * u.grad[0] * v.grad[0]
-
-
-@BilinearForm
-def mixed(u, v, w):
-    """Energy form of an inward motion u with one along x, v: lambda u,y v,x + mu u,x v,y."""
-    return w.lam * u.grad[1] * v.grad[0] + w.mu * u.grad[0] * v.grad[1]
 
 
 def stiffness(parts, count: int) -> csr_matrix:
     """Stiffness (2 count, 2 count) per unit width [N/m per m], unknowns (along x, inward) node by node.
 
-    parts: (basis, lam, mu, place) for each kind of cell: scalar basis, Lame pair per cell [Pa], and the node number of
-    each of its unknowns, -1 where it is held. Entries that vanish by symmetry are kept as zeros.
+    parts: (basis, lam, mu, place) for each kind of cell: its scalar basis, Lame pair per cell [Pa], and the node number
+    of each of its unknowns, -1 where it is held. Entries that vanish by symmetry are kept as zeros.
     """
     rows, columns, straight, crossed = zip(*(_lower(*part) for part in parts))
     place = tuple(np.concatenate(part) for part in (rows, columns))
@@ -47,14 +28,26 @@ def stiffness(parts, count: int) -> csr_matrix:
 
 
 def _lower(basis, lam, mu, place) -> tuple:
-    """Free entries (row >= column) of one kind of cell: rows, columns, xx + i yy and xy + i yx of their blocks."""
-    shape, size = (lam.size, basis.X.shape[-1]), basis.Nbfun
-    moduli = {"lam": np.broadcast_to(lam[:, None], shape), "mu": np.broadcast_to(mu[:, None], shape)}
-    xx = along.coo_data(basis, **moduli)
-    row, column = place.astype(np.int32)[xx.indices]
-    kept = np.flatnonzero((row >= column) & (column >= 0))
-    straight, crossed = np.empty((2, kept.size), complex)
-    straight.real, straight.imag = xx.data[kept], inward.coo_data(basis, **moduli).data[kept]
-    xy = mixed.coo_data(basis, **moduli).data
-    crossed.real, crossed.imag = xy[kept], xy.reshape(size, size, -1).swapaxes(0, 1).ravel()[kept]
-    return row[kept], column[kept], straight, crossed
+    """Free entries (row >= column) of one kind of cell: rows, columns, xx + i yy and xy + i yx of their blocks.
+
+    With u the motion of the column and v that of the row: xx = (lambda + 2 mu) u,x v,x + mu u,y v,y; yy with x and y
+    exchanged; xy = lambda u,y v,x + mu u,x v,y for v along x and u inward; yx the other way round.
+    """
+    node = place.astype(np.int32)[basis.element_dofs]
+    slope = [field[0].grad for field in basis.basis]
+    volume = lam[:, None] * basis.dx, mu[:, None] * basis.dx
+    out = []
+    for i, (vx, vy) in enumerate(slope):
+        for j, (ux, uy) in enumerate(slope[:i + 1]):
+            column = np.minimum(node[i], node[j])
+            free = np.flatnonzero(column >= 0)
+            x, y, xy, yx = ux * vx, uy * vy, vx * uy, vy * ux
+            (lx, ly, lxy, lyx), (mx, my, mxy, myx) = (
+                [np.einsum("tq,tq->t", share, part) for part in (x, y, xy, yx)] for share in volume)
+            straight, crossed = np.empty((2, lam.size), complex)
+            straight.real, straight.imag = lx + 2 * mx + my, ly + 2 * my + mx
+            swapped = node[i] < node[j]
+            crossed.real, crossed.imag = lxy + myx, lyx + mxy
+            crossed[swapped] = 1j * crossed[swapped].conj()
+            out.append((np.maximum(node[i], node[j])[free], column[free], straight[free], crossed[free]))
+    return tuple(np.concatenate(part) for part in zip(*out))
