@@ -16,7 +16,7 @@ from .condense import CORRECTION, RESIDUAL
 from .dissect import dissection
 from .elasticity import Layers, hooke, lame
 from .factor import factorise
-from .stiffness import stiffness
+from .mapped import stiffness
 from .threads import one_thread
 
 
