@@ -2,7 +2,8 @@
 
 In: tagged meshes and materials. Out: compliance matrices of the interface nodes (normal, tangential, coupled), and
 displacement and stress inside for a given interface traction. Plane strain or stress, bilinear or any cells.
-Grids: `tensor_stiffness` assembles them, `condense` eliminates their inside in the fronts of `grid_fronts`, `mapped`
-takes nodes that stand anywhere. Any cells: `substructure` with `stiffness`, `factor`, `fronts` and `dissect`. `mortar`
-joins meshes that do not match, `recovery` goes back inside. Read `elasticity` first, then `condense`.
+Grids: `tensor_stiffness` assembles them, `condense` eliminates their inside in the fronts of `grid_fronts`, which
+also says what that will cost. Nodes that stand anywhere: `mapped`. Any cells: `substructure` with `mapped`, `factor`,
+`fronts` and `dissect`. `mortar` joins meshes that do not match, `recovery` goes back inside. Read
+`elasticity` first, then `condense`.
 """

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.lapack import dpotrf, dpotri, dtfsm, dtfttr, dtrttf
 from scipy.sparse import csc_matrix, tril
 
 from ..core import NotConverged
@@ -24,35 +24,36 @@ LARGE = 40  # nodes of an update from which slices are added
 class Fronts:
     """Factors L L^T of a matrix (n, n) in fronts.
 
-    panels: per front (own + later, own) the columns of L; firsts: (f + 1,) first own unknown of every front; later: per
-    front the unknowns below its own.
+    tops: per front its own triangle of L, packed (own (own + 1) / 2,) as LAPACK's rectangular format; sides: (later,
+    own) the columns of L below it; firsts: (f + 1,) first own unknown of every front; later: per front the unknowns
+    below its own.
     """
 
-    panels: list
+    tops: list
+    sides: list
     firsts: np.ndarray
     later: list
 
     @property
     def entries(self) -> int:
         """Count of the numbers that are kept, 8 bytes each."""
-        return sum(panel.size for panel in self.panels)
+        return sum(part.size for part in (*self.tops, *self.sides))
 
     def compliance(self) -> np.ndarray:
         """Last diagonal block (k, k) of the inverse, that of the unknowns of the last front."""
-        both, _ = dpotri(self.panels[-1], lower=1)
+        low, _ = dtfttr(self.firsts[-1] - self.firsts[-2], self.tops[-1], uplo="L")
+        both, _ = dpotri(low, lower=1)
         return np.tril(both) + np.tril(both, -1).T
 
     def solve(self, load) -> np.ndarray:
         """Solution (n, r) of the stiffness equations for the loads (n, r), front by front, forth and back."""
         x = np.array(load, dtype=float, order="C")
-        steps = list(zip(self.panels, self.firsts, self.firsts[1:], self.later))
-        for panel, start, stop, later in steps:
-            own = stop - start
-            x[start:stop] = dtrsm(1.0, panel[:own], x[start:stop], lower=1)
-            x[later] -= panel[own:] @ x[start:stop]
-        for panel, start, stop, later in reversed(steps):
-            own = stop - start
-            x[start:stop] = dtrsm(1.0, panel[:own], x[start:stop] - panel[own:].T @ x[later], lower=1, trans_a=1)
+        steps = list(zip(self.tops, self.sides, self.firsts, self.firsts[1:], self.later))
+        for top, side, start, stop, later in steps:
+            x[start:stop] = dtfsm(1.0, top, x[start:stop], uplo="L")
+            x[later] -= side @ x[start:stop]
+        for top, side, start, stop, later in reversed(steps):
+            x[start:stop] = dtfsm(1.0, top, x[start:stop] - side.T @ x[later], uplo="L", trans="T")
         return x
 
 
@@ -65,7 +66,7 @@ def factorise(matrix: csc_matrix, firsts) -> Fronts:
     reach = _reach(low, firsts)
     count = len(firsts) - 1
     owner = np.repeat(np.arange(count), np.diff(firsts))
-    panels, later, updates = [], [], [[] for _ in range(count)]
+    tops, sides, later, updates = [], [], [], [[] for _ in range(count)]
     place = np.empty(firsts[-1], np.int64)
     for front, (start, stop, below) in enumerate(zip(firsts, firsts[1:], reach)):
         own = PER_NODE * (stop - start)
@@ -75,17 +76,18 @@ def factorise(matrix: csc_matrix, firsts) -> Fronts:
         for rows, update in updates[front]:
             _add(whole, update, place[rows])
         updates[front] = None
-        panel, fault = dpotrf(whole[:own, :own], lower=1, clean=1)
+        top, fault = dpotrf(whole[:own, :own], lower=1)
         if fault:
             raise NotConverged("the stiffness of the piece is not positive definite")
+        side = np.empty((0, own), order="F")
         if below.size:
-            side = dtrsm(1.0, panel, whole[own:, :own], side=1, lower=1, trans_a=1)
+            side = dtrsm(1.0, top, whole[own:, :own], side=1, lower=1, trans_a=1)
             rest = dsyrk(-1.0, side, beta=1.0, c=np.asfortranarray(whole[own:, own:]), lower=1, overwrite_c=1)
             updates[owner[below[0]]].append((below, rest))
-            panel = np.asfortranarray(np.concatenate([panel, side]))
-        panels.append(panel)
+        tops.append(dtrttf(top, uplo="L")[0])
+        sides.append(side)
         later.append(_unknowns(below))
-    return Fronts(panels, PER_NODE * np.asarray(firsts), later)
+    return Fronts(tops, sides, PER_NODE * np.asarray(firsts), later)
 
 
 def _add(whole, update, at) -> None:

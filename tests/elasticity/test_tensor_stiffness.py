@@ -8,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, TITANIUM
 from scipy.sparse import csr_matrix
+from skfem import Basis, ElementQuad1, ElementVector, MeshQuad
+from skfem.models.elasticity import linear_elasticity
 
 from patchfem.core import PatchfemError
-from patchfem.elasticity.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance
+from patchfem.elasticity.elasticity import Layers, assemble, cell_stress, displacement, interface_compliance, lame
 from patchfem.elasticity.mapped import assemble_nodes
 from patchfem.elasticity.recovery import cells_of, indicator, recovery
 from patchfem.elasticity.substructure import assemble as assemble_mesh
@@ -75,6 +77,16 @@ def test_exact_a_bent_grid_is_the_same_piece_as_a_mesh_of_any_cells():
     assert np.abs(mises - wanted[1]).max() <= 1e-11 * mises.max()
     cells = cells_of(piece)
     assert np.isfinite(indicator(recovery(cells), u, stress).error).all()
+
+
+def test_exact_a_bent_grid_has_the_stiffness_of_scikit_fem_s_own_form():
+    nodes = bent()
+    piece = assemble_nodes(nodes, 0, COATED)
+    flat = nodes.reshape(-1, 2)
+    basis = Basis(MeshQuad(flat.T.copy(), piece.cells.T.copy()), ElementVector(ElementQuad1()), intorder=2)
+    whole = linear_elasticity(*lame(*COATED.substrate, COATED.plane)).assemble(basis)
+    free = basis.nodal_dofs[:, np.arange(135) % 9 < 8].T.ravel()
+    assert np.abs((whole[free][:, free] - piece.matrix).toarray()).max() <= 1e-14 * np.abs(whole.data).max()
 
 
 def test_refuses_a_folded_grid_and_a_matrix_that_is_no_grid():

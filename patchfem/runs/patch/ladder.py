@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import NotConverged, Outcome
-from ...elasticity.predicted import predicted_seconds
+from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from .condensed import condensed

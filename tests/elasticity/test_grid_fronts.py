@@ -6,7 +6,7 @@ from pieces import COATED
 
 from patchfem.elasticity.condense import condense
 from patchfem.elasticity.elasticity import assemble
-from patchfem.elasticity.predicted import counts, predicted_bytes, predicted_seconds
+from patchfem.elasticity.grid_fronts import counts, predicted_bytes, predicted_seconds
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
