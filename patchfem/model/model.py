@@ -112,6 +112,8 @@ def build(scene: Scene) -> Model:
         from .rig import rig_asked
 
         rig = rig_asked(scene)
+    if patch is not None and (scene.wear is not None or (rig is not None and rig.load_varies)):
+        patch = replace(patch, sweeps="wear" if scene.wear is not None else "load")
     friction, heat, spread, pad = _law(scene)
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,

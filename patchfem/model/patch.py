@@ -48,14 +48,13 @@ class PatchModel:
     """Two pieces and what presses them.
 
     length [m] of the interface, which is where both faces can touch; width, height [m], the last of a piece that names
-    none; pairs: equal patches that share the load; plane:
-    "strain" or "stress"; substrate: of the pieces that name none. element_size [m] pins an even interface; None lets
-    the tolerance choose; mesh: file of the two pieces; still: nothing of the patch moves, so that all the time there is
-    may be spent on it. load [N] or approach
-    [m], the other None. offset [m] and line_moment [N m] of a load line; rotates: the upper piece is free to turn;
-    spring [N m/rad] and slide_spring [N/m, None: rigid] of the holder. skin: asperities; strips: (count, roll [rad]);
-    shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by part, as the
-    scene writes it.
+    none; pairs: equal patches that share the load; plane: "strain" or "stress"; substrate: of the pieces that name
+    none. element_size [m] pins an even interface; None lets the tolerance choose; still: nothing of the patch moves, so
+    that all the time there is may be spent on it; sweeps: what moves the edges of the contact on the way, "load",
+    "wear" or ""; mesh: file of the two pieces. load [N] or approach [m], the other None. offset [m] and line_moment
+    [N m] of a load line; rotates: the upper piece is free to turn; spring [N m/rad] and slide_spring [N/m, None: rigid]
+    of the holder. skin: asperities; strips: (count, roll [rad]); shear: the pieces are compliant tangentially;
+    gives_way: the effect that lets the patch slip part by part, as the scene writes it.
     """
 
     length: float
@@ -69,6 +68,7 @@ class PatchModel:
     gap: Gap
     element_size: float | None
     still: bool
+    sweeps: str
     mesh: Path | None
     load: float | None
     approach: float | None
@@ -141,7 +141,7 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
     line, holder, strips = contact.load_line, contact.holder, contact.strips
     return PatchModel(
         length, contact.width, contact.height, contact.pairs, contact.plane, contact.substrate, lower, upper,
-        gap_asked(contact, size, beside), contact.element_size, kind == "patch",
+        gap_asked(contact, size, beside), contact.element_size, kind == "patch", "",
         beside(contact.mesh) if contact.mesh is not None else None, contact.load,
         contact.approach.distance if contact.approach is not None else None,
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,

@@ -4,7 +4,7 @@ The coarsest grid follows from the patch alone. Every next one splits all its ce
 tolerance are those of a wider one and more. How far the ladder is climbed is decided in `ladder`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,8 @@ EDGE = 20  # cells of the coarsest grid along the contact, at its edges
 LEAST = 4e-9  # of the length: the shortest cell of the coarsest grid, some tens of picometres
 JUMP = 8  # cells at a step of the gap in one cell at an edge
 MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay even
+SWING = (0.5, 1.5)  # of the mean load, between which edges are resolved where the load varies
+WORN = 1 / 48  # of the interface, a column of the coarsest grid where wear may move the edges anywhere
 SEARCHES = 8  # of the contact, each on columns graded to what the one before found
 
 
@@ -45,12 +47,14 @@ class Found:
         return self.span[1] - self.span[0]
 
 
-def base_grids(asked, sweep=()) -> list:
+def base_grids(asked) -> list:
     """The coarsest grids of a `PatchModel`, one where its pieces are alike, graded to the contact that they find.
 
-    sweep: other patch models that the same grids shall serve, such as the extremes of a load that varies; the columns
-    are then fine over the band that each edge sweeps.
+    Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
+    SWING of the load; where wear does, no column is longer than WORN of the interface.
     """
+    sweep = [replace(asked, load=share * asked.load) for share in SWING
+             if asked.sweeps == "load" and asked.load is not None]
     cell = asked.size if asked.gap.profile is not None else asked.length / SEARCH_CELLS
     layout = Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
     for _ in range(SEARCHES):
@@ -71,6 +75,8 @@ def _layout(asked, seen: list) -> Layout:
     most = asked.length / 12 if asked.gap.profile is None else 4 * asked.size
     if max(len(one.places) for one in seen) > MOST_PLACES:
         return Layout(-half, half, (), span, *(2 * [min(asked.length / 64, most)]), 0.0)
+    if asked.sweeps == "wear":
+        most = min(most, asked.length * WORN)
     inside = min(wide / 6, asked.length / 24, most)
     least = max(min(wide / EDGE, thick / 4 if thick else np.inf), LEAST * asked.length)
     bands = _bands([one.places for one in seen], least)
