@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+BEARING = 1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
 BEHIND = 0.247  # cells that the edge lies behind: Hertz contact on square cells, eight meshes (.241 to .250)
 
 

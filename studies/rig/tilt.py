@@ -1,7 +1,7 @@
 """What does a tilt of one piece change?
 
 A tilt of 0.1 mrad leaves 22 % of the patch in contact and 1 mrad 3 %. The patch's shear stiffness falls from 4.05e8 to
-2.30e8 and 1.22e8 N/m, and half of the friction has given way after 95, 213 and 301 nm of slide: always far below the
+2.29e8 and 1.20e8 N/m, and half of the friction has given way after 95, 218 and 339 nm of slide: always far below the
 micrometre of the bonds and the micrometres of the motion. So the rig at 5 g hardly notices: its amplitude falls from
 15.32 ± 0.04 um to 14.81 ± 0.04 and 14.25 ± 0.05 um, its loop area from 2.043 ± 0.006 mJ to 1.962 ± 0.006 and
 1.872 ± 0.008 mJ.

@@ -101,8 +101,8 @@ def main(coefficients=COEFFICIENTS, cycles=CYCLES, motion=200, tolerance="1e-2",
     """Rows of the rig, new and worn with each coefficient; printed as a table, drawn where a path is given."""
     rows = [worn_rig(each, cycles, motion, tolerance) for each in coefficients]
     new = {name: rows[0].history[name][0] for name in SHOWN}
-    still = np.zeros_like(rows[0].x)
     pair = runner.run(scene.loads(RIG, SCENE, [f"drive.cycles={motion}"]), estimate=False).patch.pair
+    still = np.zeros(pair.grid.x.size)
     rows.insert(0, Row(0.0, new, onset(still, motion, pair), 0.0, {}, rows[0].x, rows[0].pressure[[0, 0]]))
     print(f"{'kappa':>8} {'depth um':>9} {'contact %':>9} {'peak MPa':>9} {'K_n N/um':>9} {'K_t N/um':>9} "
           f"{'amp um':>8} {'loop mJ':>8} {'onset g':>8}")

@@ -18,8 +18,8 @@ from .values import found_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
 MOST_COLUMNS = 120  # of the coarsest grid
-SLOPE = 0.5  # growth of the cells of the coarsest grid per distance
-EDGE = 20  # cells of the coarsest grid along the contact, at its edges
+SLOPE = 0.9  # growth of the cells of the coarsest grid per distance
+EDGE = 10  # cells of the coarsest grid along the contact, at its edges
 LEAST = 4e-9  # of the length: the shortest cell of the coarsest grid, some tens of picometres
 JUMP = 8  # cells at a step of the gap in one cell at an edge
 MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay even

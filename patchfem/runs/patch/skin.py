@@ -3,9 +3,8 @@
 import numpy as np
 
 from ...contact import skin, skin_laws
+from ...contact.edges import BEARING
 from ...core import Compliance, Pressure, frozen_array
-
-BEARING = 1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
 
 
 def skin_law(asked):

@@ -8,7 +8,6 @@ from ...contact import edges
 from ...core import Outcome
 from ...elasticity.threads import one_thread
 from .press import Patch
-from .skin import BEARING
 
 
 def peak_pressure(x, sigma, skin=None) -> float:
@@ -80,7 +79,7 @@ def found_ends(patch: Patch) -> list:
     if patch.strips is not None:
         return []
     if patch.skin is not None:
-        return edges.faded(patch.x, patch.skin.pressure, BEARING)
+        return edges.faded(patch.x, patch.skin.pressure, edges.BEARING)
     own, bare = patch.pieces.normal, patch.pair.compliance.normal
     softness = None if own is bare else np.diag(own) - np.diag(bare)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
