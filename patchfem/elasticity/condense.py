@@ -17,7 +17,7 @@ from .tensor_stiffness import applied
 from .threads import one_thread
 
 RESIDUAL = 1e-8  # of a solve with random forces, relative to the forces, beyond which solutions are refined
-CORRECTION = 1e-3  # of the displacements by one step of refinement, relative, beyond which the factors are refused
+CORRECTION = 1e-2  # of the displacements by one step of refinement, relative, beyond which the factors are refused
 PARITY = np.array([-1.0, 1.0])  # of (along x, inward) in even motion
 
 
@@ -102,7 +102,7 @@ def condense(stencil, mirrored: bool) -> Condensed:
     """Condense a grid to its first row and check the factors with random forces on it.
 
     stencil: (nx, rows, 3, 3, 2, 2) [N/m per m]; mirrored: whether the grid is its own mirror image in x. NotConverged
-    where the stiffness is not positive definite or one step of refinement changes a solution by more than 1e-3. That
+    where the stiffness is not positive definite or one step of refinement changes a solution by more than 1e-2. That
     change is the error of the compliance too: refined in double precision it differs by as much and is no better.
     """
     columns = stencil.shape[0]

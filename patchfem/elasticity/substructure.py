@@ -67,7 +67,7 @@ def assemble(mesh, layers: Layers, factor: str | None = None) -> Substructure:
 
     mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
     factor: name of the factors, see `factor.factorise`. NotConverged when they do not solve the system: one step of
-    refinement moves the solution for random loads by more than 1e-3; a smaller move is its `rounding`.
+    refinement moves the solution for random loads by more than 1e-2; a smaller move is its `rounding`.
     """
     piece = Substructure(mesh, layers, factor)
     _ = piece.factor

@@ -25,6 +25,7 @@ JUMP = 8  # cells at a step of the gap in one cell at an edge
 MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay even
 SWING = (0.5, 1.5)  # of the mean load, between which edges are resolved where the load varies
 WORN = 1 / 48  # of the interface, a column of the coarsest grid where wear may move the edges anywhere
+CLOSER = 64  # cells along a contact of a node or two, in the next search
 SEARCHES = 8  # of the contact, each on columns graded to what the one before found
 
 
@@ -78,7 +79,8 @@ def _layout(asked, seen: list) -> Layout:
     if asked.sweeps == "wear":
         most = min(most, asked.length * WORN)
     inside = min(wide / 6, asked.length / 24, most)
-    least = max(min(wide / EDGE, thick / 4 if thick else np.inf), LEAST * asked.length)
+    # a point of contact is looked at closer and closer
+    least = max(min(wide / (EDGE if np.isfinite(max(one.cell for one in seen)) else CLOSER), thick / 4 if thick else np.inf), LEAST * asked.length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
     bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
