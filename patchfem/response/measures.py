@@ -5,8 +5,9 @@ Everything works on samples: values of an exact run and of a march differ only i
 
 import numpy as np
 
-from ..core import STICK, Outcome, Response
+from ..core import Outcome, Response
 
+SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
 
 
@@ -56,29 +57,29 @@ def interface_loop(slide, q: complex, f: complex, work: float, stiffness: float)
 def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
 
-    From uniform samples of the irreversible motion; sticking is |slip speed| < 1e-2 of the cycle's peak.
+    From uniform samples. The interface sticks while less than SHARE of its slide is irreversible, or it does not slide
+    at all; where that share passes SHARE is found between the middles of the steps.
     """
     slip = window.slip
     out = {"slip_amplitude": float(slip.max() - slip.min()) / 2}
-    speed = np.diff(slip)
-    if not speed.size:  # the run ended where it began
+    if slip.size < 2 or np.ptp(slip) <= slip_noise(window):  # it ended where it began, or never slipped
         return out | {"stick_fraction": 1.0}
-    cycles = max(1, len(speed) // steps_per_cycle)
-    rows = speed[len(speed) - cycles * steps_per_cycle:] if len(speed) >= steps_per_cycle else speed
-    times = window.time[len(speed) - len(rows):]
-    table = rows.reshape(cycles, -1)
-    peak = np.abs(table).max(axis=1, keepdims=True)
-    if np.ptp(slip) <= slip_noise(window):
-        return out | {"stick_fraction": 1.0}
-    share = np.abs(table) / np.where(peak > 0, peak, np.inf)
-    out["stick_fraction"] = float(np.mean(share < STICK))
-    level = share.ravel()
-    rise = np.flatnonzero((level[:-1] < STICK) & (level[1:] >= STICK))
-    if rise.size:
-        part = (STICK - level[rise]) / (level[rise + 1] - level[rise])
-        step = times[1] - times[0]
-        phases = 2 * np.pi / drive.period * (times[rise] + step * (0.5 + part))
-        out["slip_start_phase"] = circular_mean(phases)
+    cycles = max(1, (slip.size - 1) // steps_per_cycle)
+    kept = slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
+    slid, slide, time = np.abs(np.diff(slip[kept])), np.abs(np.diff(window.slide[kept])), window.time[kept]
+    still = slide <= ROUND * np.abs(window.slide).max(initial=0.0)
+    above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SHARE
+    before, after = above[:-1], above[1:]
+    rise = np.abs(after - before)
+    # share of each stretch between two middles that lies below, along the line between them
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
+    out["stick_fraction"] = float(below.mean()) if below.size else float(above[0] < 0)
+    rises = np.flatnonzero((before < 0) & (after >= 0))
+    if rises.size:
+        middles = (time[1:] + time[:-1]) / 2
+        at = middles[rises] - before[rises] / rise[rises] * np.diff(middles)[rises]
+        out["slip_start_phase"] = circular_mean(2 * np.pi / drive.period * at)
     return out
 
 

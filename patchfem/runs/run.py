@@ -10,6 +10,7 @@ from ..core import Measure, Outcome
 from ..model.model import Model
 from ..model.source import placed
 from .plan import Plan, plan, refuse_size
+from .results.loose import loose
 from .results.result import Result, worded
 
 __all__ = ["Kept", "Plan", "Result", "plan", "run"]
@@ -81,7 +82,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = worn(result, evolved, estimate)
     seconds["total"] = perf_counter() - begin
     apart = "strip" if model.patch is not None else "interface"
-    return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + _loose(result),
+    return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + loose(result),
                    extra=result.extra | {"notes": notes})
 
 
@@ -90,23 +91,3 @@ def _unloaded(model: Model) -> bool:
     if model.rig is not None and len(model.rig.names):
         return not any(one.load for one in model.rig.interfaces)
     return model.point is not None and model.point.load == 0
-
-
-def _loose(result: Result) -> list:
-    """Warnings of the measures whose error exceeds tolerance * |value| + floor, all in one line."""
-    model = result.plan.model
-    tolerance, asked, remedies = model.accuracy.tolerance, model.patch, []
-    wide = [name for name, m in result.measures.items()
-            if m.error is not None and m.error > tolerance * abs(m.value) + m.floor]
-    if not wide:
-        return []
-    if asked is not None and asked.mesh is not None:
-        remedies.append("split the elements of contact.mesh")
-    elif asked is not None and asked.chosen:
-        remedies.append("the mesh is the finest that the tolerance may choose, so these errors stay")
-    elif asked is not None:
-        remedies.append("lower contact.element_size")
-    finer = "harmonics" if result.extra.get("engine") == "harmonic" else "steps_per_cycle"
-    remedies += [f"raise accuracy.{finer}"] if model.kind in ("rig", "bench") else []
-    return [f"estimated error above the tolerance {tolerance:g} for {', '.join(sorted(wide))}; "
-            f"{' or '.join(remedies)}"]

@@ -17,7 +17,7 @@ def test_exact_a_number_behind_a_name_changes_no_row(name):
 def test_exact_errors_of_further_interfaces_know_the_step():
     fine, half, quarter = ({"stick_fraction_2": v, "slip_amplitude_2": 2 * v} for v in (0.5, 0.502, 0.51))
     found = with_errors(fine, step_error(fine, half, quarter, 400))
-    assert found["stick_fraction_2"].error == pytest.approx(0.004 + 4 / 400)
+    assert found["stick_fraction_2"].error == pytest.approx(0.004 + 0.25 / 400)
     assert found["slip_amplitude_2"].error == pytest.approx(0.008) and found["slip_amplitude_2"].unit == "m"
 
 

@@ -80,7 +80,8 @@ def _layout(asked, seen: list) -> Layout:
         most = min(most, asked.length * WORN)
     inside = min(wide / 6, asked.length / 24, most)
     # a point of contact is looked at closer and closer
-    least = max(min(wide / (EDGE if np.isfinite(max(one.cell for one in seen)) else CLOSER), thick / 4 if thick else np.inf), LEAST * asked.length)
+    along = EDGE if np.isfinite(max(one.cell for one in seen)) else CLOSER
+    least = max(min(wide / along, thick / 4 if thick else np.inf), LEAST * asked.length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
     bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
@@ -88,7 +89,7 @@ def _layout(asked, seen: list) -> Layout:
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = JUMP if asked.singular_ends else 1
-    corner = max(min(thick / 8 if thick else np.inf, wide / EDGE / sharp), LEAST * asked.length)
+    corner = max(min(thick / 16 if thick else np.inf, wide / EDGE / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder

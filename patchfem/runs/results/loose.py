@@ -1,0 +1,65 @@
+"""Warnings of measures that are known less well than the tolerance asks: the worst one, how well, and what cures it."""
+
+from math import ceil, log2, log10
+
+from .patch_rows import TABLE
+
+LEAST_ELEMENTS = 1e-4  # of the length, an element that is still proposed
+
+
+def loose(result) -> list:
+    """A warning for the mesh and one for the motion, each with the measure that misses the tolerance most."""
+    model = result.plan.model
+    tolerance = model.accuracy.tolerance
+    wide = {name: m.error / (tolerance * abs(m.value) + m.floor) if m.value or m.floor else float("inf")
+            for name, m in result.measures.items()
+            if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
+    static = {name: times for name, times in wide.items() if name in TABLE}
+    moving = {name: times for name, times in wide.items() if name not in TABLE}
+    out = [_said(result, static, _finer_mesh(result, max(static.values())))] if static else []
+    return [*out, _said(result, moving, _finer_motion(result, max(moving.values())))] if moving else out
+
+
+def _said(result, wide: dict, remedy: str) -> str:
+    """The worst of the measures `wide` (name -> error over what is allowed), and how many others there are."""
+    name = max(wide, key=wide.get)
+    found, tolerance = result.measures[name], result.plan.model.accuracy.tolerance
+    known = f"to {abs(found.error / found.value):.2g} of its value" if abs(found.error) < abs(found.value) else \
+        f"no better than {found}"
+    others = f" ({len(wide) - 1} other measure{'s' * (len(wide) > 2)} beside it)" if len(wide) > 1 else ""
+    return f"{name} is known {known}, the tolerance is {tolerance:g}{others}; {remedy}"
+
+
+def _finer_mesh(result, times: float) -> str:
+    """What cures the errors of a mesh that are `times` as large as allowed."""
+    asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
+    if asked.mesh is not None:
+        return "split the elements of contact.mesh"
+    if not asked.chosen:
+        size = max(_rounded(asked.element_size / times**0.5), _rounded(LEAST_ELEMENTS * asked.length))
+        return f'leave out contact.element_size, or set it to "{1e6 * size:.3g} um"'
+    return f"the mesh stopped at {result.patch.x.size} interface nodes, where a finer one would take too long; " \
+           f"accuracy.tolerance = {_up(tolerance * times):g} is met"
+
+
+def _finer_motion(result, times: float) -> str:
+    """What cures the errors of a motion that are `times` as large as allowed."""
+    if result.extra.get("engine") == "harmonic":
+        return "raise accuracy.harmonics"
+    steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
+    if steps is None:
+        return "ask for more cycles (drive.cycles)" if result.plan.model.rig is not None else \
+            "raise accuracy.steps_per_cycle"
+    return f"set accuracy.steps_per_cycle = {int(steps) * 2**max(1, ceil(log2(times) / 2))}"
+
+
+def _rounded(size: float) -> float:
+    """A size rounded down to two digits."""
+    unit = 10.0 ** (ceil(log10(size)) - 2)
+    return int(size / unit * (1 + 1e-9)) * unit
+
+
+def _up(value: float) -> float:
+    """A value rounded up to one digit."""
+    unit = 10.0 ** (ceil(log10(value)) - 1)
+    return ceil(value / unit * (1 - 1e-9)) * unit
