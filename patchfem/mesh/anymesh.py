@@ -61,6 +61,21 @@ class PieceMesh:
         return self.points[self.interface, 1]
 
     @property
+    def row(self) -> float:
+        """Median height [m] of the cells along the interface: their area over the length of their edge there."""
+        at = np.full(len(self.points), -2)
+        at[self.interface] = np.arange(self.interface.size)
+        found = []
+        for cells, whole in ((self.triangles, 2.0), (self.quads, 1.0)):
+            place = at[cells]
+            for side in range(cells.shape[1]):
+                here = np.abs(place[:, side] - np.roll(place, -1, axis=1)[:, side]) == 1
+                here &= (place[:, side] >= 0) & (np.roll(place, -1, axis=1)[:, side] >= 0)
+                ends = self.points[cells[here][:, [side, (side + 1) % cells.shape[1]]]]
+                found.append(whole * _areas(self.points[cells[here]]) / np.hypot(*(ends[:, 1] - ends[:, 0]).T))
+        return float(np.median(np.concatenate(found)))
+
+    @property
     def length(self) -> float:
         """Extent of the interface [m]."""
         return float(np.ptp(self.x))

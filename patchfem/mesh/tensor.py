@@ -39,6 +39,11 @@ class TensorGrid:
         return float(self.depth[-1])
 
     @property
+    def row(self) -> float:
+        """Height of the first row [m]."""
+        return float(self.depth[1])
+
+    @property
     def coating(self) -> float:
         """Thickness of the coating [m], 0 without one."""
         return float(self.depth[self.coating_rows])

@@ -40,6 +40,11 @@ class Pair:
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
     @property
+    def row(self) -> float:
+        """Mean height [m] of the cells along the interface of both pieces."""
+        return float(self.grid.row + self.upper_grid.row) / 2
+
+    @property
     def rounding(self) -> float:
         """Relative error of the compliance by round-off [1], 0 where it is not felt."""
         return max(getattr(piece, "rounding", 0.0) for piece in (self.piece, self.upper))

@@ -20,7 +20,7 @@ POINT = 3  # nodes of a contact that no mesh of these cells resolves
 ROUND = 5e-12  # round-off, relative
 ALIKE = 1e-9  # relative error that nobody asks to be below
 DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
-OFFSET = 0.03  # cells by which an edge found between nodes lies off on cells that are not square
+OFFSET = 0.012  # cells by which an edge found between nodes may lie off
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
@@ -183,7 +183,7 @@ def _offset(patch: Patch) -> float:
     for grid, piece in ((patch.pair.grid, patch.pair.piece), (patch.pair.upper_grid, patch.pair.upper)):
         if grid.coating > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
-            out = max(out, edges.BEHIND * min(1.0, cell / grid.coating) * (1 - min(ratio, 1 / ratio)))
+            out = max(out, edges.behind(1.0) * min(1.0, cell / grid.coating) * (1 - min(ratio, 1 / ratio)))
     return out
 
 

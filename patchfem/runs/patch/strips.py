@@ -98,7 +98,7 @@ def _between_nodes(patch, weight) -> dict:
     for force, gap in zip(state.force, state.gap, strict=True):
         if not force.any():
             continue
-        found = edges.ends(normal, x, force, gap, softness)
+        found = edges.ends(normal, x, force, gap, softness, patch.pair.row)
         stretches, one = edges.intervals(x, force, found), np.ones(x.size)
         length += np.diff(stretches).sum()
         low, high = min(low, stretches[0, 0]), max(high, stretches[-1, 1])

@@ -83,7 +83,7 @@ def found_ends(patch: Patch) -> list:
     own, bare = patch.pieces.normal, patch.pair.compliance.normal
     softness = None if own is bare else np.diag(own) - np.diag(bare)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return edges.ends(own, patch.x, force, patch.pressure.gap, softness)
+    return edges.ends(own, patch.x, force, patch.pressure.gap, softness, patch.pair.row)
 
 
 def shear_stiffness(patch: Patch, found: list) -> float:

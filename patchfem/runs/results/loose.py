@@ -4,6 +4,7 @@ from math import ceil, log2, log10
 
 from .patch_rows import TABLE
 
+MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
 LEAST_ELEMENTS = 1e-4  # of the length, an element that is still proposed
 
 
@@ -11,7 +12,7 @@ def loose(result) -> list:
     """A warning for the mesh and one for the motion, each with the measure that misses the tolerance most."""
     model = result.plan.model
     tolerance = model.accuracy.tolerance
-    wide = {name: m.error / (tolerance * abs(m.value) + m.floor) if m.value or m.floor else float("inf")
+    wide = {name: min(m.error / max(tolerance * abs(m.value) + m.floor, 1e-300), MOST)
             for name, m in result.measures.items()
             if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
     static = {name: times for name, times in wide.items() if name in TABLE}
