@@ -54,7 +54,8 @@ class PatchModel:
     "wear" or ""; mesh: file of the two pieces. load [N] or approach [m], the other None. offset [m] and line_moment
     [N m] of a load line; rotates: the upper piece is free to turn; spring [N m/rad] and slide_spring [N/m, None: rigid]
     of the holder. skin: asperities; strips: (count, roll [rad]); shear: the pieces are compliant tangentially;
-    gives_way: the effect that lets the patch slip part by part, as the scene writes it.
+    gives_way: the effect that lets the patch slip part by part, as the scene writes it; mesh_tolerance: relative error
+    that a chosen mesh is to meet, None: the tolerance of the run.
     """
 
     length: float
@@ -81,6 +82,7 @@ class PatchModel:
     strips: tuple | None
     shear: bool
     gives_way: str
+    mesh_tolerance: float | None = None
 
     @property
     def alike(self) -> bool:
