@@ -126,6 +126,28 @@ def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
     assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
 
 
+def test_exact_a_load_line_beside_the_middle_rolls_a_rigid_pad():
+    """The pressure is N/A + N e y / I, the roll -N e / (k I), with I = L W^3 (1 - 1/count^2) / 12 of the strips."""
+    arm, count = 0.8e-3, 6
+    tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\noffset = "{arm} m"\n'
+    patch, found = solved(tables, material=RIGID)
+    spread = LENGTH * WIDTH**3 / 12 * (1 - 1 / count**2)
+    assert found["pressure_centre_lateral"] == pytest.approx(arm, rel=1e-9)
+    assert found["roll"] == pytest.approx(-LOAD * arm / (1e13 * spread), rel=1e-5)
+    outer = LOAD / (LENGTH * WIDTH) + LOAD * arm * patch.strips.offsets[-1] / spread
+    assert patch.strips.pressure[-1] == pytest.approx(outer, rel=1e-4)
+
+
+@pytest.mark.parametrize("count, arm", [(2, 1e-3), (6, 3e-3)])
+def test_always_the_bars_of_a_free_roll_hold_the_count_of_strips(count, arm):
+    tables = f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
+    keys = 'load = "26 lbf"\nelement_size = "0.5 mm"'
+    few, many = (run(plan(scene(tables.format(n), keys))).measures for n in (count, 48))
+    for name in ("roll", "pressure_peak", "contact_fraction", "approach"):
+        assert abs(few[name].value - many[name].value) <= few[name].error + many[name].error, name
+    assert few["pressure_centre_lateral"].value == pytest.approx(arm, rel=1e-9)
+
+
 def test_exact_strips_are_written_one_by_one(tmp_path):
     import xarray as xr
 
