@@ -71,7 +71,7 @@ EFFECTS = {
     "contact.crown": Effect(GAPS, "g += x^2/(2 radius)", means={
         "radius": "radius of the rounding: the gap grows as x^2/(2 radius)"}),
     "contact.profile": Effect("patchfem.surface.nodes", "g += z(x), levelled, averaged over each node's cells"),
-    "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R q - g - roll y_j per strip, one holder q"),
+    "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R_j q - g - roll y_j per strip, one holder q"),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",

@@ -1,58 +1,63 @@
 """Cost of accuracy in time: a scene run again and again with one knob turned, each run timed against its error."""
 
 from dataclasses import dataclass, replace
+from math import inf
+from statistics import median
 from time import perf_counter
 
 from ..core import NotConverged, PatchfemError
-from ..effects import has
 from ..model.model import Model
 from ..model.source import placed
+from ..runs.patch.ladder import solve_split
+from ..runs.patch.measures import measures
 from ..runs.plan import plan
-from ..runs.results.patch_rows import TABLE
 from ..runs.run import run
+from .knobs import KNOBS, Setting, knobs_of, settings
 
-KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
-LEVELS = 5  # values of a knob, each twice as fine as the one before
-MOST_CELLS = 1600  # columns of the finest mesh
-MOST_STEPS = 12800
-JUMPS = 8  # of wear, the middle of its curve
+__all__ = ["KNOBS", "Cost", "cheapest", "curve", "knobs_of", "sentence", "turned_by"]
+TIMINGS = 3  # of a run, whose median counts
+LONG = 10.0  # seconds of a run that is timed once
+NOISE = 1.1  # ratio of seconds up to which two runs cost the same
+STUCK = 0.9  # ratio of the least error over the largest from which a knob does not help
+UNTURNED = 1e-11  # relative change of a measure that a knob leaves as it is
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cost:
     """One run of a cost curve.
 
-    value: of the knob in SI, None where the tolerance chose; seconds of the whole run; values: measure -> value;
-    errors: measure -> distance to the best run, of the best run its own estimate.
+    value: of the knob in SI, None where the scene's tolerance chose; words: the setting in a sentence; seconds of the
+    whole run with its error estimates, the median of so many timings. By measure: values; errors, as the run states
+    them, in the unit of the value; floors of these; distances to the run `best`, which has none itself; units.
     """
 
     label: str
     value: float | None
+    words: str
     seconds: float
+    timings: int
     values: dict
     errors: dict
+    floors: dict
     units: dict
+    distances: dict
 
+    def off(self, name: str) -> float | None:
+        """Error of a measure: the larger of what the run states and its distance to the best; None without either."""
+        known = [part[name] for part in (self.errors, self.distances) if name in part]
+        return max(known, default=None)
 
-def knobs_of(model: Model) -> list:
-    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
-    jumps over cycles of wear."""
-    out = ["element_size"] if model.patch is not None else []
-    if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
-        engine = plan(model).engine
-        if engine in ("march", "bench"):
-            out.append("steps_per_cycle")
-            if model.soft and has(model.friction.law, "bonds"):
-                out.append("shear_modes")
-    if model.wear is not None and model.patch is not None:
-        out.append("jumps")
-    return out
+    def within(self, name: str, tolerance: float) -> bool:
+        """Whether the error of a measure is at most tolerance * |value| + floor."""
+        off = self.off(name)
+        return off is not None and off <= tolerance * abs(self.values[name]) + self.floors[name]
 
 
 def curve(model: Model, knob: str, say=None) -> list:
-    """Cost of every value of a knob, coarse to fine; a static patch ends with the mesh that its tolerance chooses.
+    """Cost of every value of a knob, coarse to fine.
 
-    PatchfemError for a knob that this scene does not have.
+    What its tolerance chooses stands behind the values that a scene pins. PatchfemError for a knob that this scene does
+    not have.
     """
     with placed(model.source):
         return _curve(model, knob, say)
@@ -62,95 +67,67 @@ def _curve(model: Model, knob: str, say) -> list:
     mine = knobs_of(model)
     if knob not in mine:
         raise PatchfemError(f"cost --over {knob}: this scene has the knobs {', '.join(mine) or 'none'}", "")
-    wanted = list(_turned(model, knob))
-    _timed(wanted[0][2], "first run, not counted", wanted[0][1], None)  # imports and compiling stay out of the times
-    runs = [_timed(turned, label, value, say) for label, value, turned in wanted]
+    wanted = settings(model, knob)
+    _tried(wanted[0], "first run, not counted", None)  # imports and compiling stay out of the times
+    runs = [_timed(one, one is not wanted[-1], say) for one in wanted]
     runs = [one for one in runs if one is not None]
     if len(runs) < 3:
         raise PatchfemError(f"cost --over {knob}: fewer than three values could be run", "")
-    if knob == "element_size" and model.kind == "patch" and model.patch.mesh is None:
-        chosen = _timed(_sized(model, None), "by tolerance", None, say, True)
-        if chosen is not None:
-            return [*(_beside(one, chosen) for one in runs), chosen]
-    from ..runs.patch.limits import limit
-
-    fine, coarse, coarsest = runs[:-4:-1]
-    left = {name: limit([coarsest.values[name], coarse.values[name], value], False).error
-            for name, value in fine.values.items() if name in coarse.values and name in coarsest.values}
-    return [*(_beside(one, fine) for one in runs[:-1]), replace(fine, errors=left)]
+    best = _best(runs)
+    return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
 
 
-def _beside(one: Cost, best: Cost) -> Cost:
-    return replace(one, errors={name: abs(value - best.values[name]) for name, value in one.values.items()
-                                if name in best.values})
+def _best(runs: list) -> Cost:
+    """The finest run; of it and of what the tolerance chooses the one that states most of the smaller errors."""
+    *_, fine, last = runs
+    if last.value is not None:
+        return last
+    shared = last.errors.keys() & fine.errors.keys()
+    return last if 2 * sum(last.errors[name] <= fine.errors[name] for name in shared) >= len(shared) else fine
 
 
-def _turned(model: Model, knob: str):
-    """Settings of a knob, coarse to fine: (label, value, (model, halvings of the file))."""
-    if knob == "element_size" and model.patch.mesh is not None:
-        for level in range(3):
-            yield f"file split {2**level} x", float(2**-level), (model, level)
-        return
-    if knob == "element_size":
-        length = model.patch.length
-        middle = round(length / model.patch.size)
-        for power in range(-3, LEVELS - 3):
-            cells = round(middle * 2.0**power)
-            if 8 <= cells <= MOST_CELLS:
-                yield f"{1e6 * length / cells:.4g} um", length / cells, (_sized(model, length / cells), 0)
-        return
-    if knob == "jumps":
-        for power in range(-2, LEVELS - 2):
-            value = max(1, round((model.wear.jumps or JUMPS) * 2.0**power))
-            yield str(value), float(value), (replace(model, wear=replace(model.wear, jumps=value)), 0)
-        return
-    from ..runs.rig.numerics import choose
-
-    now = getattr(model.accuracy, knob) or (choose(model).steps if knob == "steps_per_cycle" and model.kind == "rig"
-                                            else {"steps_per_cycle": 400, "shear_modes": 8}[knob])
-    for power in range(-2, LEVELS - 2):
-        value = max(1, round(now * 2.0**power))
-        if knob == "shear_modes" or 4 <= value <= MOST_STEPS:
-            accuracy = model.accuracy.model_copy(update={knob: value})
-            yield str(value), float(value), (replace(model, accuracy=accuracy), 0)
+def _distances(one: Cost, best: Cost) -> dict:
+    return {name: abs(value - best.values[name]) for name, value in one.values.items() if name in best.values}
 
 
-def _sized(model: Model, size: float | None) -> Model:
-    return replace(model, patch=model.patch.sized(size))
+def _timed(setting: Setting, coarse: bool, say) -> Cost | None:
+    """A setting run TIMINGS times, or once where that is long; None where it cannot be run.
+
+    coarse: a mesh of a file may be split once more for its estimate.
+    """
+    found, seconds = None, []
+    while found is None or (len(seconds) < TIMINGS and seconds[0] < LONG):
+        begin = perf_counter()
+        found = _tried(setting, setting.label, say, coarse)
+        if found is None:
+            return None
+        seconds.append(perf_counter() - begin)
+    if say is not None:
+        say(f"{setting.label}: {median(seconds):.2f} s" + (", timed once" if len(seconds) == 1 else ""))
+    known = {name: m for name, m in found.items() if m.value is not None}
+    return Cost(setting.label, setting.value, setting.words, median(seconds), len(seconds),
+                {name: m.value for name, m in known.items()},
+                {name: m.error for name, m in known.items() if m.error is not None},
+                {name: m.floor for name, m in known.items()}, {name: m.unit for name, m in known.items()}, {})
 
 
-def _timed(turned, label: str, value, say, estimate: bool = False):
-    model, level = turned if isinstance(turned, tuple) else (turned, 0)
-    begin = perf_counter()
+def _tried(setting: Setting, label: str, say, coarse: bool = True) -> dict | None:
+    """Measures of a setting, condensed anew; None where it does not converge or memory ends."""
     try:
-        if level or (model.kind == "patch" and model.patch.mesh is not None):
-            (values, units), errors = _split_file(model, level), {}
-        else:
-            found = run(plan(model), estimate=estimate, fresh=True).measures
-            values = {name: m.value for name, m in found.items() if m.value is not None}
-            errors = {name: m.error for name, m in found.items() if m.error is not None} if estimate else {}
-            units = {name: m.unit for name, m in found.items()}
+        if setting.level:
+            fine, *more = solve_split(setting.model.patch, setting.level, coarse)
+            return measures(fine, *more)
+        return run(plan(setting.model), fresh=True).measures
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")
         return None
-    seconds = perf_counter() - begin
-    if say is not None:
-        say(f"{label}: {seconds:.2f} s")
-    return Cost(label, value, seconds, values, errors, units)
-
-
-def _split_file(model: Model, level: int) -> tuple:
-    """Static measures on the mesh of a file with every edge halved `level` times."""
-    from ..runs.patch.ladder import solve_split
-
-    return solve_split(model.patch, level), {name: row.unit for name, row in TABLE.items()}
 
 
 def turned_by(runs: list) -> list:
     """Names of the measures that the knob changes at all, beyond 1e-11 of their value, in the order of the runs."""
     return [name for name, value in runs[0].values.items()
-            if any(one.errors.get(name, 0.0) > 1e-11 * abs(one.values[name]) for one in runs[:-1])]
+            if any(one.distances.get(name, 0.0) > UNTURNED * abs(one.values[name]) for one in runs)]
 
 
 def cheapest(runs: list, tolerance: float) -> dict:
@@ -160,10 +137,48 @@ def cheapest(runs: list, tolerance: float) -> dict:
     """
     out = {}
     for name in turned_by(runs):
-        good = []
-        for one in reversed(runs):
-            if name not in one.errors or one.errors[name] > tolerance * abs(one.values[name]):
-                break
-            good.append(one)
+        good = _confirmed(runs, lambda one, name=name: one.within(name, tolerance))
         out[name] = min(good, key=lambda one: one.seconds).label if good else None
     return out
+
+
+def _confirmed(runs: list, good) -> list:
+    """Runs for which good(run) holds and holds for every finer one that has an error; what the tolerance chooses
+    stands by itself."""
+    chain, alone, out = [one for one in runs if one.value is not None], [one for one in runs if one.value is None], []
+    for one in reversed(chain):
+        if not one.errors and not one.distances:  # a best run that only the others are measured against
+            continue
+        if not good(one):
+            break
+        out.append(one)
+    return out + [one for one in alone if good(one)]
+
+
+def sentence(runs: list, tolerance: float) -> str:
+    """What it costs to have all measures within a tolerance: the quickest run that has, or the measure that is worst in
+    the best one."""
+    names, percent = _stated(runs), f"{100 * tolerance:g} %"
+    good = _confirmed(runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values))
+    if good:
+        quickest = min(one.seconds for one in good)
+        one = next(one for one in reversed(runs) if one in good and one.seconds <= NOISE * quickest)
+        return f"all measures within {percent} costs {one.seconds:.2g} s: {one.words}"
+
+    known = [one for one in runs if one.errors or one.distances]
+    share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
+    if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
+        return f"no run has all measures within {percent}: {name} is within {100 * share:.2g} % whatever the setting"
+    return f"no run has all measures within {percent}: {name} is within {100 * share:.2g} % at best, which costs " \
+           f"{least.seconds:.2g} s: {least.words}"
+
+
+def _worst(one: Cost, names: list, tolerance: float) -> tuple:
+    """(error over what the tolerance of 1 would allow, name) of the measure of a run that is farthest from it."""
+    allowed = {name: abs(one.values[name]) + one.floors[name] / tolerance for name in names if one.off(name)}
+    return max(((one.off(name) / size if size else inf, name) for name, size in allowed.items()), default=(0.0, ""))
+
+
+def _stated(runs: list) -> list:
+    """Measures whose error any run states, or all where none does."""
+    return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(runs[-1].values)

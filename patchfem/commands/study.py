@@ -28,18 +28,21 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
     knobs = [over] if over else campaign.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
-    from ..export.cost import write
+    from ..export.cost import write, write_picture
 
-    target, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}
+    target, curves, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}, {}
     for knob in knobs:
-        runs = campaign.curve(found, knob, None if quiet else say)
+        runs = curves[knob] = campaign.curve(found, knob, None if quiet else say)
         names = [name for name in MAIN if name in campaign.turned_by(runs)]
-        best = campaign.cheapest(runs, found.accuracy.tolerance)
-        table, picture = write(target, knob, runs, found.accuracy.tolerance, names)
-        answer[knob] = {"runs": [{"label": one.label, "value": one.value, "seconds": one.seconds, "values": one.values,
-                                  "errors": one.errors} for one in runs], "cheapest": best}
+        table = write(target, curves)
+        picture = write_picture(target, knob, runs, found.accuracy.tolerance, names)
+        text = campaign.sentence(runs, found.accuracy.tolerance)
+        answer[knob] = {"runs": [{"label": one.label, "value": one.value, "seconds": one.seconds,
+                                  "timings": one.timings, "values": one.values, "errors": one.errors,
+                                  "distances": one.distances} for one in runs],
+                        "cheapest": campaign.cheapest(runs, found.accuracy.tolerance), "sentence": text}
         if not json_:
-            _print_cost(knob, runs, names, best, found.accuracy.tolerance)
+            _print_cost(knob, runs, names, text)
             print(f"results: {table} {picture}")
     if json_:
         print(json.dumps(answer))
@@ -96,13 +99,19 @@ def _fit_wear(found, to: str, free, out: Path | None, json_: bool, quiet: bool) 
     print(f"results: {target}")
 
 
-def _print_cost(knob: str, runs: list, names: list, best: dict, tolerance: float) -> None:
-    print(f"{knob:<16} {'seconds':>9}  " + "  ".join(f"{name[:16]:>16}" for name in names) + "   (relative errors)")
+def _print_cost(knob: str, runs: list, names: list, text: str) -> None:
+    """The table of a cost curve, in relative errors, and what it comes to."""
+    print(f"{knob:<16} {'seconds':>9}  " + "  ".join(f"{name[:18]:>18}" for name in names))
+    print(f"{'':<16} {'':>9}  " + "  ".join(f"{'stated (distance)':>18}" for _ in names))
     for one in runs:
-        cells = (one.errors.get(name) for name in names)
-        text = (f"{error / abs(one.values[name]):16.1e}" if error is not None and one.values[name] else f"{'-':>16}"
-                for name, error in zip(names, cells))
-        print(f"{one.label:<16} {one.seconds:9.3f}  " + "  ".join(text))
-    for name in names:
-        print(f"  {name}: " + (f"no setting meets {tolerance:g}" if best[name] is None else
-                               f"{best[name]} is the quickest within {tolerance:g}"))
+        cells = "  ".join(f"{_shares(one, name):>18}" for name in names)
+        print(f"{one.label:<16} {one.seconds:9.3f}  {cells}")
+    print(text)
+
+
+def _shares(one, name: str) -> str:
+    """Error that a run states and, in brackets, its distance to the best run, both relative to the value."""
+    size = abs(one.values.get(name, 0.0))
+    stated, away = (f"{part[name] / size:.1e}" if size and name in part else "-"
+                    for part in (one.errors, one.distances))
+    return f"{stated} ({away})"

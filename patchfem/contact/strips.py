@@ -1,9 +1,9 @@
 """Strips side by side over the width: one condensed slice, repeated under one rigid holder that may roll.
 
 Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own) and the compliance C. Strips do not
-feel each other: the shear between them is neglected. The motion q = (delta, -theta) of the holder is common, so the
-answer minimises the convex dual sum_j Phi_j(R q - g_j) + q.S q/2 - q.target, with R = (1, x) and S the spring of the
-rotation.
+feel each other: the shear between them is neglected. The motion q = (delta, -theta, -roll) of the holder is common, or
+as much of it as is free, so the answer minimises the convex dual sum_j Phi_j(R_j q - g_j) + q.S q/2 - q.target, with
+R_j = (1, x, y_j) and S the spring of the rotation.
 
 Every answer of `strips_solve` is checked again by `residuals` from the definitions alone.
 """
@@ -17,7 +17,7 @@ from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_arra
 from ..elasticity.threads import one_thread
 from .skin import _refuse
 from .skin_laws import ExponentialSkin, LinearSkin
-from .strips_solve import bare_parts, by_strip, loaded, skin_parts, smooth, softer
+from .strips_solve import bare_parts, by_strip, closing_alone, holder_motions, loaded, skin_parts, smooth, softer
 from .unilateral import LIMIT
 
 NEGLECTED = ("the strips over the width do not feel each other: the shear between them is neglected; fields and "
@@ -29,9 +29,9 @@ class StripsState:
     """Strips pressed by one holder; s strips of m nodes, forces of all pairs together.
 
     force: (s, m) [N], >= 0; pressure: (s, m) [Pa]; gap: (s, m) [m] left open, with a skin the separation of its mean
-    planes (below zero: crushed); stiffness: (s, m) [Pa/m] of the skin, None without one; offsets: y (s,) [m]; delta [m]
-    and theta [rad] of the holder; load [N]; moment sum f x and roll_moment sum f y [N m]; centre_x, centre_y [m] of the
-    pressure; fraction: share of the area that carries; residuals: relative, from the independent check.
+    planes (below zero: crushed); stiffness: (s, m) [Pa/m] of the skin, None without one; offsets: y (s,) [m]; delta
+    [m], theta and roll [rad] of the holder; load [N]; moment sum f x and roll_moment sum f y [N m]; centre_x, centre_y
+    [m] of the pressure; fraction: share of the area that carries; residuals: relative, from the independent check.
     """
 
     force: np.ndarray
@@ -41,6 +41,7 @@ class StripsState:
     offsets: np.ndarray
     delta: float
     theta: float
+    roll: float
     load: float
     moment: float
     roll_moment: float
@@ -109,15 +110,16 @@ def residuals(skin, c, x, weight, gap, force, delta: float, free: float, load=No
 def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.ndarray, gap: np.ndarray,
                  roll: float = 0.0, load: float | None = None, moment: float | None = None,
                  approach: float | None = None, rotation: float = 0.0, spring: float = 0.0, skin=None,
-                 start: StripsState | None = None) -> StripsState:
-    """Press strips by one holder with a prescribed roll.
+                 start: StripsState | None = None, lateral: float | None = None) -> StripsState:
+    """Press strips by one holder.
 
     c: closing compliance (m, m) [m/N] of each strip (`one_strip`); x: (m,) [m]; weight: nodal areas (m,) [m2] of one
     strip; offsets: y (s,) [m] (`strip_offsets`); gap: (m,) or (s, m) [m]; roll [rad] > 0 opens the gap at +y. Controls:
     `load` [N] of all strips with `rotation` [rad] held (already in the gap, only reported); `load` and `moment` sum f x
     [N m] with the rotation free, or held by the holder's `spring` [N m/rad] from `rotation` on; `approach` [m] with the
-    rotation held. skin: None (bare), or a law of `skin_laws`; rigid bodies (c = 0) need a skin. start: a neighbouring
-    answer. Where nothing touches the outcome is no_contact.
+    rotation held; beside a load `lateral` sum f y [N m] with the roll free, counted from `roll` on. skin: None (bare),
+    or a law of `skin_laws`; rigid bodies (c = 0) need a skin. start: a neighbouring answer. Where nothing touches the
+    outcome is no_contact.
 
     PatchfemError for other controls, a moment that no pressure carries, an exponential law without reference under an
     approach; NotConverged above a residual of 1e-9.
@@ -125,43 +127,80 @@ def press_strips(c: np.ndarray, x: np.ndarray, weight: np.ndarray, offsets: np.n
     offsets = np.atleast_1d(np.asarray(offsets, float))
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
     _refuse(skin, x, gap, load, None if spring and load is not None else moment, approach)
+    _refuse_roll(offsets, load, lateral)
     if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
         skin = replace(skin, reference=load / (weight.sum() * offsets.size))
     if load == 0:
-        return _state(skin, weight, x, offsets, np.zeros(gap.shape), gap - gap.min(), gap.min(), rotation, 0, {})
+        rest = (gap.min(), rotation, roll)
+        return _state(skin, weight, x, offsets, np.zeros(gap.shape), gap - gap.min(), rest, 0, {})
+    motions = holder_motions(x, offsets, moment is not None and load is not None, lateral is not None, spring)
     with one_thread():
         if load is None:
             force, _, count = by_strip(skin, softer(skin, c, weight), x, weight, gap - approach)
             s, motion = None, np.array([approach])
         else:
-            target = np.array([value for value in (load, moment) if value is not None])
-            force, s, motion, count = loaded(skin, c, x, weight, gap, target, spring, start, rotation)
-    delta, free = float(motion[0]), -float(motion[1]) if motion.size > 1 else 0.0
+            target = np.array([value for value in (load, moment, lateral) if value is not None])
+            before = None if start is None else (start.force, start.gap, _freed(
+                (start.delta, rotation - start.theta, roll - start.roll), moment, lateral))
+            force, s, motion, count = loaded(skin, c, x, weight, gap, motions, target, before)
+    delta, free = float(motion[0]), -float(motion[1]) if motion.size > 1 and moment is not None else 0.0
+    rolled = -float(motion[-1]) if lateral is not None else 0.0
+    gap = gap + rolled * offsets[:, None]
     checks = residuals(skin, c, x, weight, gap, force, delta, free, load, moment, spring)
-    bearing = (force > 1e-12 * force.max()).any(axis=0).sum()  # less is round-off
-    if motion.size > 1 and spring == 0 and not smooth(skin) and bearing < 2:
-        raise NotConverged("contact.strips: the contact set does not determine the rotation; lower "
-                           "contact.element_size or name contact.holder.rotational_stiffness")
-    if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
-        worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact.strips: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; lower contact.strips."
-                           "roll or raise the load")
+    if lateral is not None:
+        off = abs(force.sum(axis=1) @ offsets - lateral) / (load * np.ptp(offsets))
+        checks = MappingProxyType({**checks, "roll_balance": float(off)})
+    _refuse_loose(skin, force, checks, free_rotation=motion.size > 1 and moment is not None and spring == 0,
+                  free_roll=lateral is not None)
     opening = gap + free * x - delta + force @ c if s is None else s
     if skin is None:
         opening = np.where(force > 0, 0.0, np.maximum(opening, 0.0))
     elif isinstance(skin, LinearSkin):
         opening = np.where(force > 0, -force / (skin.k * weight), np.maximum(opening, 0.0))
-    return _state(skin, weight, x, offsets, force, opening, delta, rotation + free, count, checks)
+    return _state(skin, weight, x, offsets, force, opening, (delta, rotation + free, roll + rolled), count, checks)
 
 
-def _state(skin, weight, x, offsets, force, opening, delta, theta, count, checks) -> StripsState:
+def _freed(motion: tuple, moment, lateral) -> np.ndarray:
+    """The free ones of (delta, -theta, -roll)."""
+    return np.array([value for value, free in zip(motion, (True, moment is not None, lateral is not None), strict=True)
+                     if free])
+
+
+def _refuse_roll(offsets, load, lateral) -> None:
+    """PatchfemError where a free roll has no load, no second strip or no place for its moment."""
+    if lateral is None:
+        return
+    if load is None or offsets.size < 2:
+        raise PatchfemError("contact.strips.roll: a free roll wants a load and two strips at least")
+    if load > 0 and not offsets.min() < lateral / load < offsets.max():
+        raise PatchfemError(f"contact.strips.offset: the load line at {lateral / load:.6g} m lies beyond the middle of "
+                            f"the outermost strips at {offsets.max():.6g} m, which no pressure carries; raise "
+                            "contact.strips.count or lower the offset")
+
+
+def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> None:
+    """NotConverged where a free motion is not determined by what bears, or a residual is too large."""
+    bears = force > 1e-12 * force.max()  # less is round-off
+    if free_rotation and not smooth(skin) and bears.any(axis=0).sum() < 2:
+        raise NotConverged("contact.strips: the contact set does not determine the rotation; lower "
+                           "contact.element_size or name contact.holder.rotational_stiffness")
+    if free_roll and not smooth(skin) and bears.any(axis=1).sum() < 2:
+        raise NotConverged("contact.strips: the contact set does not determine the roll; raise contact.strips.count or "
+                           "prescribe contact.strips.roll")
+    if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
+        worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
+        raise NotConverged(f"contact.strips: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; lower contact.strips."
+                           "roll or raise the load")
+
+
+def _state(skin, weight, x, offsets, force, opening, motion, count, checks) -> StripsState:
     load, moment, roll_moment = float(force.sum()), float((force @ x).sum()), float(force.sum(axis=1) @ offsets)
     touch = load > 0
     stiffness = None if skin is None else frozen_array(skin.stiffness(opening) * (force > 0) if touch else force)
     share = float(((force > 0) * weight).sum() / (weight.sum() * offsets.size))
     centre = (moment / load, roll_moment / load) if touch else (0.0, 0.0)
     return StripsState(frozen_array(force), frozen_array(force / weight), frozen_array(opening), stiffness,
-                       frozen_array(offsets), float(delta), float(theta), load, moment, roll_moment, *centre, share,
+                       frozen_array(offsets), *map(float, motion), load, moment, roll_moment, *centre, share,
                        Outcome.DONE if touch else Outcome.NO_CONTACT, count, MappingProxyType(dict(checks)))
 
 
@@ -174,9 +213,9 @@ def strips_tangent(c: np.ndarray, weight: np.ndarray, state: StripsState, ratio:
     """
     if not state.load:
         return 0.0
-    rigid = np.ones((weight.size, 1))
+    alone = closing_alone(weight.size, len(state.offsets))
     with one_thread():
         if state.stiffness is None or np.isinf(ratio):
-            return float(bare_parts(c, rigid, state.force > 0)[1][0, 0])
+            return float(bare_parts(c, alone, state.force > 0)[1][0, 0])
         slope = ratio * weight * state.stiffness
-        return float(skin_parts(c, rigid, slope, slope)[1][0, 0])
+        return float(skin_parts(c, alone, slope, slope)[1][0, 0])

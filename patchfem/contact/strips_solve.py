@@ -5,6 +5,8 @@ linear skin, the law's tangent for the smooth skins, strips eliminated one by on
 q alone is led down the dual, its slope bracketed along each direction, with every strip solved under its own approach.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
@@ -27,71 +29,116 @@ def softer(skin, c, weight) -> np.ndarray:
     return c + np.diag(1 / (skin.k * weight)) if isinstance(skin, LinearSkin) else c
 
 
-def holder_motions(x, size: int, spring: float) -> tuple:
-    """Rigid motions (m, r) of size 1 at the ends, their spring (r, r), and the factors that turn q into (delta,
-    -theta)."""
-    half = np.abs(x).max() or 1.0
-    rigid = np.column_stack([np.ones(x.size), x / half])[:, :size]
-    return rigid, np.diag([0.0, spring / half**2])[:size, :size], np.array([1.0, half])[:size]
+@dataclass(frozen=True, eq=False, slots=True)
+class Motions:
+    """Rigid motions q (r,) of a holder as its strips feel them: strip j closes by R_j q with R_j = B T_j.
+
+    So what the compliance of one strip answers to B serves them all. base: B (m, b); shares: T (s, b, r); spring: S
+    (r, r) that resists q; scale: (r,), q over it is (delta [m], -theta [rad], -roll [rad]), of which those stand that
+    are free. All motions are of size 1 at the ends.
+    """
+
+    base: np.ndarray
+    shares: np.ndarray
+    spring: np.ndarray
+    scale: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number r of free motions."""
+        return self.shares.shape[2]
+
+    def closing(self, q) -> np.ndarray:
+        """Closing R_j q (s, m) of every node."""
+        return (self.shares @ q) @ self.base.T
+
+    def resultant(self, force) -> np.ndarray:
+        """Generalised force sum_j R_j^T f_j (r,) of nodal forces (s, m)."""
+        return np.einsum("jbr,jb->r", self.shares, force @ self.base)
+
+    def folded(self, strips, answer) -> np.ndarray:
+        """sum_j T_j^T a T_j (r, r) over some strips with the same answer a (b, b)."""
+        return np.einsum("jbr,bc,jcq->rq", self.shares[strips], answer, self.shares[strips])
 
 
-def bare_parts(c, rigid, active, gap=None) -> tuple:
+def holder_motions(x, offsets, turns: bool, rolls: bool, spring: float = 0.0) -> Motions:
+    """Motions of a holder over places x (m,) along the strips at `offsets` y (s,): the closing, the rotation where it
+    turns against `spring` [N m/rad], the roll where it rolls."""
+    half, wide, size = np.abs(x).max() or 1.0, np.abs(offsets).max() or 1.0, 1 + turns + rolls
+    base, shares, scale = np.ones((x.size, 1 + turns)), np.zeros((offsets.size, 1 + turns, size)), np.ones(size)
+    stiff, shares[:, 0, 0] = np.zeros((size, size)), 1.0
+    if turns:
+        base[:, 1], shares[:, 1, 1], scale[1], stiff[1, 1] = x / half, 1.0, half, spring / half**2
+    if rolls:
+        shares[:, 0, -1], scale[-1] = offsets / wide, wide
+    return Motions(base, shares, stiff, scale)
+
+
+def closing_alone(size: int, count: int) -> Motions:
+    """The common closing of `count` strips of `size` nodes."""
+    return Motions(np.ones((size, 1)), np.ones((count, 1, 1)), np.zeros((1, 1)), np.ones(1))
+
+
+def bare_parts(c, motions, active, gap=None) -> tuple:
     """Answers of bare strips to rigid motions, one entry per group of strips with the same active set, and their
     tangent.
 
-    Entries: (strips, nodes, C^-1 R, C^-1 g); tangent (r, r) of sum R^T f.
+    Entries: (strips, nodes, C^-1 B, C^-1 g); tangent (r, r) of sum R^T f.
     """
-    groups, parts, system = {}, [], np.zeros((rigid.shape[1], rigid.shape[1]))
+    groups, parts, base, system = {}, [], motions.base, np.zeros((motions.size, motions.size))
     for strip, row in enumerate(active):
         if row.any():
             groups.setdefault(row.tobytes(), []).append(strip)
     for strips in map(np.array, groups.values()):
         nodes = np.flatnonzero(active[strips[0]])
-        sides = rigid[nodes] if gap is None else np.column_stack([rigid[nodes], gap[np.ix_(strips, nodes)].T])
+        sides = base[nodes] if gap is None else np.column_stack([base[nodes], gap[np.ix_(strips, nodes)].T])
         answer = cho_solve(cho_factor(c[np.ix_(nodes, nodes)], lower=True, overwrite_a=True), sides)
-        parts.append((strips, nodes, *np.split(answer, [rigid.shape[1]], axis=1)))
-        system += strips.size * rigid[nodes].T @ parts[-1][2]
+        parts.append((strips, nodes, *np.split(answer, [base.shape[1]], axis=1)))
+        system += motions.folded(strips, base[nodes].T @ parts[-1][2])
     return parts, system
 
 
-def skin_parts(c, rigid, slope, missing) -> tuple:
+def skin_parts(c, motions, slope, missing) -> tuple:
     """Answers of strips with a skin to rigid motions, one entry per strip, and their tangent (r, r) of sum R^T f.
 
-    Entries: (strip, nodes, root D, (I + root D C root D)^-1 root D (R, missing)) with D = slope. Nodes of next to no
+    Entries: (strip, nodes, root D, (I + root D C root D)^-1 root D (B, missing)) with D = slope. Nodes of next to no
     slope follow the geometry.
     """
-    least, size = 1e-18 * slope.max(), rigid.shape[1]
-    parts, system = [], np.zeros((size, size))
+    least, size = 1e-18 * slope.max(), motions.base.shape[1]
+    parts, system = [], np.zeros((motions.size, motions.size))
     for strip, row in enumerate(slope):
         if not (nodes := np.flatnonzero(row > least)).size:
             continue
         root = np.sqrt(row[nodes])
         own = root[:, None] * c[np.ix_(nodes, nodes)] * root
         own[np.diag_indices_from(own)] += 1.0
-        sides = root[:, None] * np.column_stack([rigid[nodes], missing[strip, nodes]])
+        sides = root[:, None] * np.column_stack([motions.base[nodes], missing[strip, nodes]])
         answer = cho_solve(cho_factor(own, lower=True, overwrite_a=True), sides)
         parts.append((strip, nodes, root, answer))
-        system += sides[:, :size].T @ answer[:, :size]
+        system += motions.folded([strip], sides[:, :size].T @ answer[:, :size])
     return parts, system
 
 
-def _bordered(c, gap, rigid, target, spring, active) -> tuple:
-    """Forces (s, m) and motion q (r,) that close the active nodes: C f_j = R q - g_j, R^T sum f_j + S q = target."""
+def _bordered(c, gap, motions, target, active) -> tuple:
+    """Forces (s, m) and motion q (r,) that close the active nodes: C f_j = R_j q - g_j, sum R_j^T f_j + S q =
+    target."""
     force, nearest = np.zeros(gap.shape), gap[active].min()  # taken out first: the closing may be far smaller
-    parts, system = bare_parts(c, rigid, active, gap - nearest)
-    side = target + sum(rigid[nodes].T @ free.sum(axis=1) for _, nodes, _, free in parts)
-    motion = np.linalg.solve(system + spring, side)
+    parts, system = bare_parts(c, motions, active, gap - nearest)
+    for strips, nodes, _, free in parts:
+        force[np.ix_(strips, nodes)] = free.T
+    system = system + motions.spring
+    motion = np.linalg.solve(system, target + motions.resultant(force))
     for strips, nodes, lift, free in parts:
-        force[np.ix_(strips, nodes)] = lift @ motion - free.T
-    rest = np.linalg.solve(system + spring, target - rigid.T @ force.sum(axis=0) - spring @ motion)
+        force[np.ix_(strips, nodes)] = motions.shares[strips] @ motion @ lift.T - free.T
+    rest = np.linalg.solve(system, target - motions.resultant(force) - motions.spring @ motion)
     for strips, nodes, lift, _ in parts:  # round-off of a rotation that closes far less than it turns
-        force[np.ix_(strips, nodes)] += lift @ rest
+        force[np.ix_(strips, nodes)] += motions.shares[strips] @ rest @ lift.T
     return force, motion + rest + nearest * np.eye(1, target.size)[0]
 
 
-def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple | None:
+def _active_set(c, gap, motions, target, active, limit: int = 60) -> tuple | None:
     """Primal-dual active set of bare strips: forces, motion and steps; None where it does not settle."""
-    seen, bend, least = set(), np.abs(c).max(), 1 if spring.any() else target.size
+    seen, bend, least = set(), np.abs(c).max(), target.size - bool(motions.spring.any())
     span = 1e-13 * np.ptp(gap, axis=1, keepdims=True) + 1e-15 * np.ptp(gap)  # round-off of an opening
     for count in range(1, limit + 1):
         if active.sum() < least:
@@ -100,10 +147,10 @@ def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple
             return None
         seen.add(key)
         try:
-            force, motion = _bordered(c, gap, rigid, target, spring, active)
-        except np.linalg.LinAlgError:  # this set does not determine the rotation
+            force, motion = _bordered(c, gap, motions, target, active)
+        except np.linalg.LinAlgError:  # this set does not determine the motion
             return None
-        opening = gap - rigid @ motion + force @ c
+        opening = gap - motions.closing(motion) + force @ c
         noise = span + 1e-13 * bend * np.abs(force).sum(axis=1, keepdims=True)
         following = (active & (force > 0)) | (~active & (opening < -noise))
         if np.array_equal(following, active):
@@ -112,18 +159,19 @@ def _active_set(c, gap, rigid, target, spring, active, limit: int = 60) -> tuple
     return None
 
 
-def _tangent_step(c, rigid, target, spring, slope, missing, lack) -> tuple:
+def _tangent_step(c, motions, slope, missing, lack) -> tuple:
     """Newton step (df, dq, ds) of f = A P(s), s = missing + s + C f - R q, sum R^T f short by `lack`, slope -A P'."""
-    parts, system = skin_parts(c, rigid, slope, missing)
-    gain, size = np.zeros(slope.shape), target.size
-    side = lack + sum((root[:, None] * rigid[nodes]).T @ answer[:, size] for _, nodes, root, answer in parts)
-    motion = np.linalg.lstsq(system + spring, side, rcond=1e-14)[0]
+    parts, system = skin_parts(c, motions, slope, missing)
+    gain, size = np.zeros(slope.shape), motions.base.shape[1]
     for strip, nodes, root, answer in parts:
-        gain[strip, nodes] = root * (answer[:, :size] @ motion - answer[:, size])
-    return gain, motion, missing - rigid @ motion + gain @ c
+        gain[strip, nodes] = root * answer[:, size]
+    motion = np.linalg.lstsq(system + motions.spring, lack + motions.resultant(gain), rcond=1e-14)[0]
+    for strip, nodes, root, answer in parts:
+        gain[strip, nodes] = root * (answer[:, :size] @ (motions.shares[strip] @ motion) - answer[:, size])
+    return gain, motion, missing - motions.closing(motion) + gain @ c
 
 
-def _newton(skin, c, weight, gap, rigid, target, spring, s, q, limit: int = 60) -> tuple | None:
+def _newton(skin, c, weight, gap, motions, target, s, q, limit: int = 60) -> tuple | None:
     """Forces, separations, motion, steps of a smooth skin from (s, q) by the steps of `skin`; None: not settled."""
     mean = target[0] / (weight.sum() * len(gap))
     faint = skin.separation(np.array(0.01 * mean))
@@ -131,16 +179,16 @@ def _newton(skin, c, weight, gap, rigid, target, spring, s, q, limit: int = 60) 
         log, fall = skin.log_pressure(s)
         log = log + np.log(weight)
         force = np.exp(np.minimum(log, 600.0))
-        lack = target - rigid.T @ force.sum(axis=0) - spring @ q
+        lack = target - motions.resultant(force) - motions.spring @ q
         with np.errstate(over="ignore", invalid="ignore"):
             try:
-                gain, motion, change = _tangent_step(c, rigid, target, spring, force * fall,
-                                                     gap - rigid @ q + force @ c - s, lack)
+                gain, motion, change = _tangent_step(c, motions, force * fall,
+                                                     gap - motions.closing(q) + force @ c - s, lack)
             except (np.linalg.LinAlgError, ValueError):  # left the numbers
                 return None
         q, folds = q + motion, -change * fall
         share = np.exp(np.minimum(0.0, np.maximum(log, log + folds) - log.max()))
-        depth = np.ptp(gap) + np.abs(force @ c).max() + 2 * np.abs(q[1:]).max(initial=0.0)
+        depth = np.ptp(gap) + np.abs(force @ c).max() + 2 * np.abs(q[1:]).sum()
         noise = 1e-12 + 1e-15 * depth * fall[force > 1e-6 * force.max()].max()
         if max(np.abs(lack).max() / target[0], np.max(share * np.abs(folds))) <= noise:
             follow = np.exp(np.minimum(log + folds, 600.0))  # what carries next to nothing takes its law
@@ -167,7 +215,7 @@ def by_strip(skin, c, x, weight, gap) -> tuple:
     return force, force > 0, steps
 
 
-def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span: float) -> tuple:
+def _downhill(skin, c, x, weight, gap, motions, target, sink: float, span: float) -> tuple:
     """Descent of the dual: forces (s, m), motion q at its bottom, and steps, from `sink` [m] beyond the nearest node.
    """
     q, soft = np.zeros(target.size), 1e-9 * target[0] / span * np.eye(target.size)
@@ -175,18 +223,18 @@ def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span:
 
     def at(q) -> tuple:
         try:
-            force, slope, steps = by_strip(skin, c, x, weight, gap - rigid @ q)
+            force, slope, steps = by_strip(skin, c, x, weight, gap - motions.closing(q))
         except PatchfemError:  # deeper than any number
             return None, None, None, 0
-        return force, slope, target - rigid.T @ force.sum(axis=0) - spring @ q, steps
+        return force, slope, target - motions.resultant(force) - motions.spring @ q, steps
 
     (force, slope, lack, total), record = at(q), np.inf
     for _ in range(60):
         if force is None or (size := np.abs(lack).max()) <= 1e-12 * target[0]:
             break
         record = min(record, size)
-        system = (skin_parts(c, rigid, slope, slope) if smooth(skin) else bare_parts(c, rigid, slope))[1]
-        way = np.linalg.solve(system + spring + soft, lack)
+        system = (skin_parts(c, motions, slope, slope) if smooth(skin) else bare_parts(c, motions, slope))[1]
+        way = np.linalg.solve(system + motions.spring + soft, lack)
         low, high, length, best = 0.0, np.inf, 1.0, None
         for _ in range(60):
             *trial, steps = at(q + length * way)
@@ -207,67 +255,66 @@ def _downhill(skin, c, x, weight, gap, rigid, target, spring, sink: float, span:
     return np.zeros(gap.shape) if force is None else force, q, total
 
 
-def _first_set(x, gap, target) -> np.ndarray:
-    """Nodes (m,) of the rigid body resting on the gap (m,) at x (m,), widened to half of its height."""
-    lean = 0.0
-    if target.size > 1:
-        middle = min(max(target[1] / target[0], x.min()), x.max())
-        slopes = np.linspace(-1, 1, 41) * 4 * (np.ptp(gap) + 1e-300) / np.ptp(x)
-        lean = slopes[int(np.argmax([np.min(gap + slope * (x - middle)) for slope in slopes]))]
-    height = gap + lean * x
+def _first_set(gap, motions, target) -> np.ndarray:
+    """Nodes (s, m) of the rigid body resting on the gap (s, m), widened to half of its height."""
+    height = gap
+    for k in range(1, target.size):
+        place = motions.closing(np.eye(target.size)[k])
+        middle = min(max(target[k] / target[0], place.min()), place.max())
+        slopes = np.linspace(-1, 1, 41) * 4 * (np.ptp(height) + 1e-300) / np.ptp(place)
+        lean = slopes[int(np.argmax([np.min(height + slope * (place - middle)) for slope in slopes]))]
+        height = height + lean * place
     return height <= height.min() + 0.5 * (np.ptp(height) + 1e-300)
 
 
-def _bare_loaded(c, x, gap, rigid, target, spring, active=None) -> tuple:
-    """Forces, motion q, steps of bare strips under a load (and moment), by the active set or down the dual."""
+def _bare_loaded(c, x, gap, motions, target, active=None) -> tuple:
+    """Forces, motion q, steps of bare strips under a load (and moments), by the active set or down the dual."""
     if active is None:
-        place = np.broadcast_to(rigid[:, -1], gap.shape)
-        active = _first_set(place.ravel(), gap.ravel(), target).reshape(gap.shape)
-    if (found := _active_set(c, gap, rigid, target, spring, active)) is not None:
+        active = _first_set(gap, motions, target)
+    if (found := _active_set(c, gap, motions, target, active)) is not None:
         return found
     depth = np.abs(c).max() * target[0]
-    force, q, steps = _downhill(None, c, x, None, gap, rigid, target, spring, depth / len(gap), np.ptp(gap) + depth)
-    force, q, more = _active_set(c, gap, rigid, target, spring, force > 0) or (force, q, 0)
+    force, q, steps = _downhill(None, c, x, None, gap, motions, target, depth / len(gap), np.ptp(gap) + depth)
+    force, q, more = _active_set(c, gap, motions, target, force > 0) or (force, q, 0)
     return force, q, steps + more
 
 
-def _linearised(skin, c, x, weight, gap, rigid, target, spring) -> tuple:
+def _linearised(skin, c, x, weight, gap, motions, target) -> tuple:
     """First separations and motion: the law's tangent at the mean pressure, solved as a linear skin."""
     mean = target[0] / (weight.sum() * len(gap))
     rest = skin.separation(np.array([mean]))
     k = mean * skin.log_pressure(rest)[1][0]
     edge = rest[0] + mean / k  # where the tangent is zero
-    force, q, _ = _bare_loaded(c + np.diag(1 / (k * weight)), x, gap - edge, rigid, target, spring)
+    force, q, _ = _bare_loaded(c + np.diag(1 / (k * weight)), x, gap - edge, motions, target)
     stress = force / weight
-    low = np.where(force > 0, edge - stress / k, gap - rigid @ q + force @ c)
+    low = np.where(force > 0, edge - stress / k, gap - motions.closing(q) + force @ c)
     return np.where(stress > mean, skin.separation(np.maximum(stress, mean)), low), q
 
 
-def _smooth_loaded(skin, c, x, weight, gap, rigid, target, spring, first) -> tuple:
+def _smooth_loaded(skin, c, x, weight, gap, motions, target, first) -> tuple:
     """Forces, separations, motion q, steps of a smooth skin from `first` = (s, q), by Newton or down the dual."""
-    if (found := _newton(skin, c, weight, gap, rigid, target, spring, *first)) is not None:
+    if (found := _newton(skin, c, weight, gap, motions, target, *first)) is not None:
         return found
     rest = skin.separation(np.array([target[0] / (weight.sum() * len(gap))]))
     span = 1 / skin.log_pressure(rest)[1][0]
-    force, q, steps = _downhill(skin, c, x, weight, gap, rigid, target, spring, -rest[0], span)
-    s = gap - rigid @ q + force @ c
-    force, s, q, more = _newton(skin, c, weight, gap, rigid, target, spring, s, q) or (force, s, q, 0)
+    force, q, steps = _downhill(skin, c, x, weight, gap, motions, target, -rest[0], span)
+    s = gap - motions.closing(q) + force @ c
+    force, s, q, more = _newton(skin, c, weight, gap, motions, target, s, q) or (force, s, q, 0)
     return force, s, q, steps + more
 
 
-def loaded(skin, c, x, weight, gap, target, spring, start, rotation) -> tuple:
-    """Forces, separations, motion (delta or delta, -theta) and steps of strips under a load, and a moment where one is
-    given.
+def loaded(skin, c, x, weight, gap, motions, target, start=None) -> tuple:
+    """Forces, separations, free motions (delta, -theta, -roll) and steps of strips under a load, and moments of the
+    motions that are free.
 
-    Separations are None but for a smooth skin.
+    target: load [N] and moments [N m]; start: (forces, separations, motions) of a neighbouring answer. Separations are
+    None but for a smooth skin.
     """
-    rigid, spring, scale = holder_motions(x, target.size, spring)
-    target = target / scale
+    scale, target = motions.scale, target / motions.scale
     if not smooth(skin):
-        active = None if start is None else start.force > 0
-        force, q, count = _bare_loaded(softer(skin, c, weight), x, gap, rigid, target, spring, active)
+        active = None if start is None else start[0] > 0
+        force, q, count = _bare_loaded(softer(skin, c, weight), x, gap, motions, target, active)
         return force, None, q / scale, count
-    first = _linearised(skin, c, x, weight, gap, rigid, target, spring) if start is None else \
-        (start.gap, np.array([start.delta, rotation - start.theta])[:target.size] * scale)
-    force, s, q, count = _smooth_loaded(skin, c, x, weight, gap, rigid, target, spring, first)
+    first = _linearised(skin, c, x, weight, gap, motions, target) if start is None else (start[1], start[2] * scale)
+    force, s, q, count = _smooth_loaded(skin, c, x, weight, gap, motions, target, first)
     return force, s, q / scale, count

@@ -1,61 +1,109 @@
-"""Error against time of one knob: a table in a file and a picture."""
+"""Error against time of the knobs of a scene: a table in a file and a picture of each."""
 
 import csv
 from pathlib import Path
 
 from .drawing.pictures import drawing, styled
 
+AXES = {"element_size": "element size", "steps_per_cycle": "steps per cycle", "shear_modes": "shear modes",
+        "jumps": "jumps over the cycles of wear"}
+TOUCHING = 0.14  # share of the width within which two labels would touch
 
-def write(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> tuple:
-    """Write cost.csv and cost.svg into a folder that is made; returns both paths.
 
-    The table has one row per run with seconds, values and errors of `names`.
+def write(folder: Path, curves: dict) -> Path:
+    """Write cost.csv into a folder that is made, and return its path; curves: knob -> Costs coarse to fine.
+
+    One row per run: knob, setting, seconds, timings, and of every measure its value, the error that the run states and
+    its distance to the best run, in SI units; empty where there is none.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    table, picture = folder / f"cost_{knob}.csv", folder / f"cost_{knob}.svg"
+    names = list(dict.fromkeys(name for runs in curves.values() for one in runs for name in one.values))
+    table = folder / "cost.csv"
     with open(table, "w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
-        rows.writerow([knob, "seconds [s]", *(text for name in names for text in
-                                              (f"{name} [{runs[0].units[name]}]", f"error of {name}"))])
-        for one in runs:
-            rows.writerow([one.label, f"{one.seconds:.6g}", *(text for name in names for text in
-                           (repr(one.values.get(name)), repr(one.errors.get(name))))])
+        rows.writerow(["knob", "setting", "seconds", "timings",
+                       *(text for name in names for text in (name, f"error_{name}", f"distance_{name}"))])
+        for knob, runs in curves.items():
+            for one in runs:
+                rows.writerow([knob, one.label, f"{one.seconds:.6g}", one.timings,
+                               *(repr(part[name]) if name in part else "" for name in names
+                                 for part in (one.values, one.errors, one.distances))])
+    return table
+
+
+def write_picture(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> Path:
+    """Write cost_KNOB.svg into a folder that exists, and return its path; arguments as `draw`."""
+    picture = Path(folder) / f"cost_{knob}.svg"
     picture.write_text(draw(knob, runs, tolerance, names), encoding="utf-8")
-    return table, picture
+    return picture
 
 
 @styled
 def draw(knob: str, runs: list, tolerance: float, names: list):
     """Relative error of each measure against the seconds of a run, as SVG text.
 
-    knob: its name; runs: Costs coarse to fine; tolerance: a broken line; names: of the measures shown.
+    Left the errors that the runs state, right their distances to the best run. knob: its name; runs: Costs coarse to
+    fine; tolerance: a broken line; names: of the measures shown.
     """
-    figure, (axis,) = drawing(1, 5.0)
-    chain, alone = [one for one in runs if one.value is not None], [one for one in runs if one.value is None]
-    for number, name in enumerate(names):
-        points = [(one.seconds, _relative(one, name)) for one in chain]
-        points = [point for point in points if point[1]]
-        if not points:
-            continue
-        colour = f"C{number % 10}"
-        axis.loglog(*zip(*points), "o-", color=colour, label=name.replace("_", " "), markersize=4)
-        for one in alone:
-            if _relative(one, name):
-                axis.loglog(one.seconds, _relative(one, name), "*", color=colour, markersize=11)
-    for one in chain:
-        at = max((_relative(one, name) or 0.0) for name in names)
-        if at:
-            axis.annotate(one.label, (one.seconds, at), textcoords="offset points", xytext=(3, 5), fontsize=8)
-    axis.axhline(tolerance, color="0.4", linestyle="--", linewidth=1)
-    axis.annotate(f"tolerance {tolerance:g}", (0.995, tolerance), xycoords=("axes fraction", "data"), ha="right",
-                  va="bottom", fontsize=8, color="0.3")
-    star = "; star: the mesh that the tolerance chooses" if alone else ""
-    axis.set(xlabel="seconds of a run", ylabel="relative error", title=f"What accuracy costs: {knob}{star}")
-    axis.legend(fontsize=8)
+    figure, axes = drawing(2, 4.6, sharex=True, sharey=True)
+    for axis, part, title in ((axes[0], "errors", "error that the run states"),
+                              (axes[1], "distances", "distance to the best run")):
+        axis.set(xscale="log", yscale="log", xlabel="seconds of a run", title=title)
+        for number, name in enumerate(names):
+            _line(axis, runs, part, name, f"C{number % 10}")
+        axis.axhline(tolerance, color="0.4", linestyle="--", linewidth=1, label=f"tolerance {tolerance:g}")
+        axis.margins(x=0.1)
+    groups, (low, high) = _groups(runs), axes[0].get_ylim()
+    axes[0].set_ylim(low, high * (high / low)**(0.05 + 0.06 * max(len(group) for group in groups)))
+    for axis in axes:
+        _name_runs(axis, groups)
+    axes[0].set_ylabel("relative to the measure")
+    stars = "; star: by the scene's tolerance" if any(one.value is None for one in runs) else ""
+    figure.suptitle(f"What accuracy costs, by {_axis_of(knob, runs)}{stars}", fontsize=11)
+    shown = [axis.get_legend_handles_labels() for axis in axes]
+    handles = {label: handle for found in shown for handle, label in zip(*found, strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9)
     return figure
 
 
-def _relative(one, name: str):
-    value, error = one.values.get(name), one.errors.get(name)
-    return error / abs(value) if value and error else None
+def _axis_of(knob: str, runs: list) -> str:
+    return "tolerance of the mesh" if runs[0].words.startswith("element size by tolerance") else AXES[knob]
+
+
+def _line(axis, runs: list, part: str, name: str, colour: str) -> None:
+    """The errors or distances of a measure over the values of the knob, and a star for what the tolerance chose."""
+    for alone, mark in ((False, "o-"), (True, "*")):
+        points = [(one.seconds, getattr(one, part).get(name, 0.0) / abs(one.values[name])) for one in runs
+                  if (one.value is None) == alone and one.values.get(name)]
+        points = [point for point in points if point[1] > 0]
+        if points:
+            axis.plot(*zip(*points, strict=True), mark, color=colour, markersize=11 if alone else 4,
+                      label=name.replace("_", " ") if not alone else None)
+
+
+def _groups(runs: list) -> list:
+    """Runs sorted by their seconds, those together whose labels would touch."""
+    ordered = sorted(runs, key=lambda one: one.seconds)
+    near, out = (ordered[-1].seconds / ordered[0].seconds)**TOUCHING, [[ordered[0]]]
+    for one in ordered[1:]:
+        if one.seconds <= near * out[-1][0].seconds:
+            out[-1].append(one)
+        else:
+            out.append([one])
+    return out
+
+
+def _name_runs(axis, groups: list) -> None:
+    """The settings at the top above their runs, and ticks of the seconds that do not touch."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    for group in groups:
+        for one in group:
+            axis.axvline(one.seconds, color="0.85", linewidth=0.8, zorder=0)
+        text = "\n".join(one.label.removeprefix("tolerance ") for one in group)
+        axis.annotate(text, (group[0].seconds, 0.99), xycoords=("data", "axes fraction"), ha="center", va="top",
+                      fontsize=8, color="0.3")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda seconds, _: f"{seconds:g}"))
+    axis.xaxis.set_minor_formatter(NullFormatter())

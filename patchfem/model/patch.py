@@ -53,8 +53,10 @@ class PatchModel:
     that all the time there is may be spent on it; sweeps: what moves the edges of the contact on the way, "load",
     "wear" or ""; mesh: file of the two pieces. load [N] or approach [m], the other None. offset [m] and line_moment
     [N m] of a load line; rotates: the upper piece is free to turn; spring [N m/rad] and slide_spring [N/m, None: rigid]
-    of the holder. skin: asperities; strips: (count, roll [rad]); shear: the pieces are compliant tangentially;
-    gives_way: the effect that lets the patch slip part by part, as the scene writes it.
+    of the holder. skin: asperities; strips: (count, roll [rad], lateral place [m] of the load line or None where the
+    roll is held); shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by
+    part, as the scene writes it; mesh_tolerance: relative error that a chosen mesh is to meet, None: the tolerance of
+    the run.
     """
 
     length: float
@@ -81,6 +83,7 @@ class PatchModel:
     strips: tuple | None
     shear: bool
     gives_way: str
+    mesh_tolerance: float | None = None
 
     @property
     def alike(self) -> bool:
@@ -147,8 +150,8 @@ def patch_asked(contact: Contact, kind: str, beside) -> PatchModel:
         line.offset if line is not None else None, line.moment if line is not None else None, line is not None,
         (holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         (holder.tangential_stiffness or None) if holder is not None else None,
-        contact.asperities, (strips.count, strips.roll) if strips is not None else None, contact.shear is not None,
-        contact.gives_way)
+        contact.asperities, (strips.count, strips.roll, strips.offset) if strips is not None else None,
+        contact.shear is not None, contact.gives_way)
 
 
 def pieces_asked(contact: Contact) -> tuple:
@@ -184,6 +187,11 @@ def bars(patch: PatchModel, softness) -> float:
         total += (piece.height - piece.thickness) * softness(piece.substrate)
         total += piece.thickness * softness(piece.coating.material) if piece.coating else 0.0
     return total / (patch.pairs * patch.length * patch.width)
+
+
+def reach(width: float, count: int) -> float:
+    """Place [m] of the outermost of `count` strips over `width` [m], within which a load line can lie."""
+    return width / 2 * (1 - 1 / count)
 
 
 def block_shear(patch: PatchModel) -> float:

@@ -330,8 +330,9 @@ def _smooth_case(skin, c, x, weight, gap, control):
     if isinstance(skin, ExponentialSkin):
         skin = ExponentialSkin(skin.u0, MEAN)
     target = np.array([LOAD] + ([control["moment"]] if control else []))
-    motions, spring, scale = strips_solve.holder_motions(x, target.size, control.get("spring", 0.0))
-    return skin, c, x, weight, gap, motions, target / scale, spring
+    motions = strips_solve.holder_motions(x, strip_offsets(WIDTH, len(gap)), bool(control), False,
+                                          control.get("spring", 0.0))
+    return skin, c, x, weight, gap, motions, target / motions.scale
 
 
 # ---------------------------------------------------------------------------------------------------------- hard cases
@@ -461,3 +462,77 @@ def test_refuses_a_rotation_that_the_contact_set_leaves_open():
         press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0)
     state = press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0, spring=1e3)
     assert (state.force > 0).sum() == 4 and abs(state.theta) <= 1e-15
+
+
+# ----------------------------------------------------------------------------------------------------- the roll is free
+@each_skin
+@each_control
+def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, control):
+    c, x, weight, y = real(6, 30)
+    for seed, roll in ((3, 2e-5), (4, -1e-4)):
+        gap = random_gaps(np.random.default_rng(seed), x, 6, 1e-6)
+        held = press_strips(c, x, weight, y, gap, roll, LOAD, skin=skin, **control)
+        free = press_strips(c, x, weight, y, gap, 0.0, LOAD, skin=skin, lateral=held.roll_moment, **control)
+        assert free.roll == pytest.approx(roll, rel=1e-8) and max(free.residuals.values()) <= LIMIT
+        assert np.abs(free.force - held.force).max() <= 1e-9 * LOAD
+        again = press_strips(c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, start=free,
+                             **control)
+        assert again.roll == pytest.approx(roll, rel=1e-8) and again.iterations <= 2
+
+
+@each_skin
+def test_exact_a_free_roll_of_even_pieces_is_none_and_mirrors_with_its_load_line(skin):
+    c, x, weight, y = real(8, 30)
+    middle = press_strips(c, x, weight, y, 2e-5 * x, load=LOAD, skin=skin, lateral=0.0)
+    assert abs(middle.roll) <= 1e-15 and abs(middle.roll_moment) <= 1e-12 * LOAD * WIDTH
+    one, other = (press_strips(c, x, weight, y, 2e-5 * x, load=LOAD, skin=skin, lateral=side * 1e-3 * LOAD)
+                  for side in (1, -1))
+    assert one.roll < 0 and one.centre_y == pytest.approx(1e-3, rel=1e-9)
+    assert other.roll == pytest.approx(-one.roll, rel=1e-9)
+    assert other.force[::-1] == pytest.approx(one.force, rel=1e-8, abs=1e-12 * LOAD)
+
+
+def test_exact_a_free_roll_closes_a_lateral_wedge():
+    """Rigid pieces on a linear skin: the wedge closes, and a load line at e adds the pressure N e y / sum A y^2."""
+    c, x, weight, y = rigid(9, 5)
+    wedge, skin, arm = 3e-5 * y[:, None] + np.zeros(x.size), LinearSkin(1e13), 0.4e-3
+    shut = press_strips(c, x, weight, y, wedge, load=LOAD, skin=skin, lateral=0.0)
+    assert shut.roll == pytest.approx(-3e-5, rel=1e-12) and shut.pressure == pytest.approx(MEAN, rel=1e-10)
+    spread = 5 * weight[0] * (y**2).sum()
+    leant = press_strips(c, x, weight, y, wedge, load=LOAD, skin=skin, lateral=arm * LOAD)
+    assert leant.pressure[:, 0] == pytest.approx(MEAN + LOAD * arm * y / spread, rel=1e-10)
+    assert leant.roll == pytest.approx(-3e-5 - LOAD * arm / (spread * 1e13), rel=1e-10)
+
+
+@pytest.mark.parametrize("arm", [0.25, 0.35, 0.45])
+def test_order_2_a_far_load_line_leaves_a_triangle_of_pressure(arm):
+    """Beyond the kernel WIDTH/6 a rigid piece on a linear skin touches over 3 (WIDTH/2 - arm)."""
+    arm, wanted = arm * WIDTH, 3 * (0.5 - arm) * WIDTH
+    errors = []
+    for count in (40, 80, 160):
+        state = press_strips(*rigid(count), np.zeros(1), load=LOAD, skin=LinearSkin(1e13), lateral=arm * LOAD)
+        slope = 2 * LOAD / (1e13 * LENGTH * wanted**2)  # of the triangle: N = k L roll b^2 / 2
+        errors.append(abs(-state.roll / slope - 1))
+    assert errors[-1] <= 2e-3 and errors[-1] <= errors[0] / 8
+
+
+def test_exact_strips_that_roll_are_nodes_that_turn():
+    """Rigid pieces: n strips of one node under a free roll are one strip of n nodes under a free rotation."""
+    c, x, weight, y = rigid(1, 24)
+    for skin in (SKINS["linear"], SKINS["exponential"], SKINS["hertz"]):
+        turned = press_strips(c, x, weight, y, 1e-4 * x**2, load=LOAD, moment=1e-3 * LOAD, skin=skin)
+        rolled = press_strips(np.zeros((1, 1)), np.zeros(1), weight[:1], x, 1e-4 * x[:, None]**2, load=LOAD, skin=skin,
+                              lateral=1e-3 * LOAD)
+        assert rolled.roll == pytest.approx(turned.theta, rel=1e-10)
+        assert rolled.force[:, 0] == pytest.approx(turned.force[0], rel=1e-9, abs=1e-12 * LOAD)
+
+
+def test_refuses_a_free_roll_that_nothing_determines():
+    c, x, weight, y = real(4, 20)
+    with pytest.raises(PatchfemError, match=r"contact\.strips\.roll"):
+        press_strips(c, x, weight, y, 0 * x, approach=1e-7, lateral=0.0)
+    with pytest.raises(PatchfemError, match=r"contact\.strips\.offset"):
+        press_strips(c, x, weight, y, 0 * x, load=LOAD, lateral=y[-1] * LOAD)
+    ridge = np.where(np.arange(4) == 1, 0.0, 1.0)[:, None] + 0 * x
+    with pytest.raises(NotConverged, match="roll"):
+        press_strips(c, x, weight, y, ridge, load=LOAD, lateral=y[1] * LOAD)

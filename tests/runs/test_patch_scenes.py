@@ -1,6 +1,5 @@
-"""Effects of the static patch through their scenes: skins, strips, profiles, joined and rounded pieces, cost."""
+"""Effects of the static patch through their scenes: skins, strips, profiles, joined and rounded pieces."""
 
-import csv
 import json
 import os
 import re
@@ -125,6 +124,28 @@ def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
     assert found["contact_fraction"] == pytest.approx(1.0, rel=1e-12)
     weight = patch.pieces.interface.weight
     assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
+
+
+def test_exact_a_load_line_beside_the_middle_rolls_a_rigid_pad():
+    """The pressure is N/A + N e y / I, the roll -N e / (k I), with I = L W^3 (1 - 1/count^2) / 12 of the strips."""
+    arm, count = 0.8e-3, 6
+    tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\noffset = "{arm} m"\n'
+    patch, found = solved(tables, material=RIGID)
+    spread = LENGTH * WIDTH**3 / 12 * (1 - 1 / count**2)
+    assert found["pressure_centre_lateral"] == pytest.approx(arm, rel=1e-9)
+    assert found["roll"] == pytest.approx(-LOAD * arm / (1e13 * spread), rel=1e-5)
+    outer = LOAD / (LENGTH * WIDTH) + LOAD * arm * patch.strips.offsets[-1] / spread
+    assert patch.strips.pressure[-1] == pytest.approx(outer, rel=1e-4)
+
+
+@pytest.mark.parametrize("count, arm", [(2, 1e-3), (6, 3e-3)])
+def test_always_the_bars_of_a_free_roll_hold_the_count_of_strips(count, arm):
+    tables = f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
+    keys = 'load = "26 lbf"\nelement_size = "0.5 mm"'
+    few, many = (run(plan(scene(tables.format(n), keys))).measures for n in (count, 48))
+    for name in ("roll", "pressure_peak", "contact_fraction", "approach"):
+        assert abs(few[name].value - many[name].value) <= few[name].error + many[name].error, name
+    assert few["pressure_centre_lateral"].value == pytest.approx(arm, rel=1e-9)
 
 
 def test_exact_strips_are_written_one_by_one(tmp_path):
@@ -361,54 +382,6 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     assert f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %" in sentence
     wide = replace(asked(), width=60e-3)
     assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
-
-
-# ----------------------------------------------------------------------------------------------------------------- cost
-def test_exact_cost_times_every_value_and_measures_it_against_the_best(tmp_path, capsys):
-    from patchfem.__main__ import main
-
-    path = tmp_path / "a.toml"
-    path.write_text(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.254 mm"', material=STEEL,
-                                tables=TILT.format(5e-5) + "[accuracy]\ntolerance = 0.05\n"), "utf-8")
-    with pytest.raises(SystemExit) as end:
-        main(["cost", str(path), "--over", "element_size", "-o", str(tmp_path / "out"), "--json", "-q"])
-    answer = json.loads(capsys.readouterr().out)["element_size"]
-    assert not end.value.code
-    even, chosen = answer["runs"][:-1], answer["runs"][-1]
-    assert [one["value"] for one in even] == pytest.approx([LENGTH / n for n in (12, 25, 50, 100)])
-    assert chosen["value"] is None and all(one["seconds"] > 0 for one in answer["runs"])
-    for one in even:
-        gap = abs(one["values"]["normal_stiffness"] - chosen["values"]["normal_stiffness"])
-        assert one["errors"]["normal_stiffness"] == pytest.approx(gap)
-    errors = [one["errors"]["approach"] for one in even]
-    assert errors[-1] < errors[0] / 2
-    with open(tmp_path / "out" / "cost_element_size.csv", encoding="utf-8") as file:
-        assert len(list(csv.reader(file))) == 1 + len(answer["runs"])
-    assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
-
-
-def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
-    from patchfem.campaigns.cost import Cost, cheapest
-
-    def one(label, seconds, error):
-        return Cost(label, 1.0, seconds, {"a": 1.0}, {"a": error}, {"a": "1"})
-
-    runs = [one("lucky", 1, 1e-6), one("bad", 2, 1e-1), one("good", 3, 1e-3), one("best", 9, 1e-5)]
-    assert cheapest(runs, 1e-2) == {"a": "good"} and cheapest(runs, 1e-6) == {"a": None}
-    assert cheapest(runs, 0.2) == {"a": "lucky"}
-
-
-@pytest.mark.parametrize("words, said", [
-    (["--over", "colour"], "the knobs are element_size"), (["--over", "steps_per_cycle"], "has the knobs element_size"),
-])
-def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, capsys, words, said):
-    from patchfem.__main__ import main
-
-    path = tmp_path / "a.toml"
-    path.write_text(TEXT.format(keys='load = "26 lbf"', material=STEEL, tables=""), "utf-8")
-    with pytest.raises(SystemExit) as end:
-        main(["cost", str(path), *words])
-    assert end.value.code == 2 and said in capsys.readouterr().err
 
 
 def test_exact_nothing_touching_is_a_result_with_its_gap():

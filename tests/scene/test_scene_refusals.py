@@ -194,6 +194,16 @@ def test_refuses_load_lines_outside_the_patch():
     assert loads(text, sets=["contact.load_line.offset=1 mm", "contact.load=0 N"]).contact.load == 0.0
 
 
+def test_refuses_a_free_roll_without_a_load_or_a_second_strip():
+    at, text = "contact.strips.offset", PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
+    assert loads(text).contact.strips.offset == 1e-3
+    assert "keep it or contact.strips.roll" in only(text, "contact.strips.roll=1 mrad")
+    assert "raise contact.strips.count" in only(text, "contact.strips.count=1")
+    assert "|offset| < 0.0047625 m" in only(text, f"{at}=-4.7625 mm")
+    approach = text.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "1 um"\n'
+    assert "name contact.load in place of [contact.approach]" in only(approach)
+
+
 def test_refuses_approach_together_with_load():
     message = only(PATCH + '[contact.approach]\ndistance = "0.2 um"\n')
     assert message.startswith("a.toml:12: contact.approach: ") and "exclude each other" in message

@@ -10,19 +10,18 @@ from .condensed import condensed
 from .grading import base_grids
 from .measures import measures, met
 from .press import pressed, solve
-from .values import values
 
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
 LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 
 
-def solve_split(asked, level: int) -> tuple:
-    """Static measures of a patch on the mesh of its file with every edge halved `level` times."""
+def solve_split(asked, level: int, estimate: bool) -> tuple:
+    """A patch on the mesh of its file with every edge halved `level` times, and on coarser ones as `solve_all`."""
     low, high = bodies_of(asked)
     for _ in range(level):
         low, high = (None if body is None else _halved(body) for body in (low, high))
-    return values(solve(asked, low, high, True))
+    return _with_coarser(asked, low, high, estimate, True)
 
 
 def _halved(body):
@@ -41,13 +40,17 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     on disk.
     """
     if asked.chosen:
-        return climbed(asked, tolerance, estimate, fresh)
-    low, high = bodies_of(asked)
+        return climbed(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
+    return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
+
+
+def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
+    """A patch on given bodies and on coarser ones, as `solve_all`."""
     out = [solve(asked, low, high, fresh), None, None]
     if not estimate or low.x.size <= 8:
         return tuple(out)
     if plan_of(low) is None:
-        out[1] = solve(asked, _halved(low), _halved(high))
+        out[1] = solve(asked, *(None if body is None else _halved(body) for body in (low, high)))
         return tuple(out)
     for k in (1, 2):
         if low.x.size > 8:

@@ -8,6 +8,7 @@ import numpy as np
 from ...contact import edges
 from ...core import Measure, PatchfemError
 from ...mesh.nested import plan_of
+from ...model.patch import reach
 from ..results.patch_rows import TABLE
 from .limits import limit
 from .press import Patch, pressed, solve
@@ -52,14 +53,18 @@ def plane_band(asked, patch: Patch) -> list:
 def strip_error(asked, patch: Patch, found: dict) -> dict:
     """Measures `found` with what the number of strips adds to their errors.
 
-    That is the change to half as many strips on the mesh of `patch`, three times what second order leaves of it.
+    That is the change to half as many strips on the mesh of `patch`, three times what second order leaves of it; four
+    times the change to twice as many where half as many would not reach to the load line.
     """
-    count, roll = asked.strips
+    count, roll, offset = asked.strips
     if count < 2:
         return found
-    half = values(pressed(replace(asked, strips=(max(1, count // 2), roll)), patch.pair))
+    other, share = count // 2, 1.0
+    if offset is not None and abs(offset) >= reach(asked.width, other):
+        other, share = 2 * count, 4.0
+    beside = values(pressed(replace(asked, strips=(other, roll, offset)), patch.pair))
     here = values(patch)
-    return {name: replace(m, error=m.error + abs(here[name] - half[name])) for name, m in found.items()}
+    return {name: replace(m, error=m.error + share * abs(here[name] - beside[name])) for name, m in found.items()}
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:

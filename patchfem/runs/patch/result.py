@@ -31,7 +31,8 @@ def bodies(model) -> tuple:
 
 def measured(model, patch, coarse) -> dict:
     """Static measures of the patch of a model; those that miss a tolerance that chose the mesh are extrapolated."""
-    return measures(patch, *coarse, tolerance=model.accuracy.tolerance if model.patch.chosen else None)
+    tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
+    return measures(patch, *coarse, tolerance=tolerance if model.patch.chosen else None)
 
 
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:

@@ -17,13 +17,14 @@ def in_strips(asked, pieces: Compliance, gap, angle: float, moment, spring: floa
 
     The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
     """
-    (count, roll), interface = asked.strips, pieces.interface
+    (count, roll, offset), interface = asked.strips, pieces.interface
     skin = skin_of(asked)
     by = asked.approach
     one, _, weight = one_strip(pieces, count)
     state = press_strips(one, interface.x, weight, strip_offsets(asked.width, count), gap, roll,
                          asked.load if by is None else None, moment if by is None else None, by, angle,
-                         spring if by is None else 0.0, skin)
+                         spring if by is None else 0.0, skin,
+                         lateral=None if offset is None else asked.load * offset)
     mean = (borne(state.pressure) if smooth(skin) else state.pressure).mean(axis=0)
     answer = Pressure(frozen_array(mean), frozen_array(state.gap.min(axis=0)), state.delta, state.theta, state.load,
                       state.moment, state.outcome, state.iterations, state.residuals)
@@ -63,8 +64,8 @@ def strip_values(patch, peak_of) -> dict:
     state, count = patch.strips, len(patch.strips.offsets)
     weight = patch.pair.compliance.interface.weight / count
     out = {"contact_fraction": 0.0, "pressure_centre_lateral": state.centre_y, "roll_moment": state.roll_moment,
-           "pressure_peak": max(peak_of(patch.x, row) for row in state.pressure), "loaded_fraction": 0.0,
-           "normal_stiffness": 0.0, "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
+           "roll": state.roll, "pressure_peak": max(peak_of(patch.x, row) for row in state.pressure),
+           "loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
     if not state.load > 0:
         return out
     out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])

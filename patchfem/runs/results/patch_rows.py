@@ -19,5 +19,6 @@ ROWS = (
     Row("worn_volume", "m3", 0.0, "volume worn off both pieces together"),
     Row("worn_depth_max", "m", 1e-15, "largest worn depth on the interface, both pieces together"),
     Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, of strips that roll"),
+    Row("roll", "rad", 1e-12, "roll of the upper piece about x, positive opens at +y, of strips"),
 )
 TABLE = {row.name: row for row in ROWS}

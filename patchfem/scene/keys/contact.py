@@ -128,6 +128,7 @@ class Strips(Table):
 
     count: whole(1)
     roll: quantity("angle") = 0.0
+    offset: Place | None = None
 
 
 class Contact(Table):

@@ -66,6 +66,7 @@ MEANINGS = {
     "Strips": {
         "count": "number of equal strips side by side over the width",
         "roll": "rotation of the holder about x, which shifts the pressure sideways",
+        "offset": "lateral place of the load line; the upper piece is then free to roll",
     },
     "Normal": {
         "load": "normal force on the point, its mean where it oscillates",

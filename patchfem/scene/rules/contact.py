@@ -37,12 +37,30 @@ def _contact(draft: Draft) -> None:
             draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are wanted")
     if contact.step and contact.step.at is not None and flat and abs(contact.step.at) >= flat / 2:
         draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is wanted")
+    if contact.strips and draft.given("contact.strips.offset"):
+        _free_roll(draft, contact)
     if contact.asperities:
         _needs(draft, "contact.asperities", contact.asperities, "law", ASPERITIES)
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
             draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' beside [contact.approach] needs it "
                         "at first touch, where an approach starts")  # fmt: skip
+
+
+def _free_roll(draft: Draft, contact) -> None:
+    """A load line over the width leaves the roll free, which a load alone determines, and two strips at least."""
+    at, strips = "contact.strips.offset", contact.strips
+    if draft.given("contact.strips.roll"):
+        draft.say(at, "leaves the roll free: keep it or contact.strips.roll")
+    if draft.given("contact.approach"):
+        draft.say(at, "is the place of a load: name contact.load in place of [contact.approach]")
+    if strips.count is not None and strips.count < 2:
+        draft.say(at, f"{strips.count} strip does not feel a roll: raise contact.strips.count")
+    elif strips.count and contact.width and strips.offset is not None:
+        most = contact.width / 2 * (1 - 1 / strips.count)
+        if abs(strips.offset) >= most:
+            draft.say(at, f"{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {most:.6g} m "
+                          "is wanted; raise contact.strips.count or lower the offset")
 
 
 def _load_line(draft: Draft) -> None:

@@ -1,0 +1,117 @@
+"""Numerical settings of a model that can be turned: which it has, and its values from coarse to fine."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..effects import has
+from ..model.model import Model
+from ..runs.plan import plan
+
+KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
+LEVELS = 5  # values of a knob, each twice as fine as the one before
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # of a mesh that is chosen
+MOST_CELLS = 1600  # columns of the finest even mesh
+MOST_STEPS = 12800
+MIDDLE = {"shear_modes": 8, "jumps": 8}  # of the values where the scene pins none
+
+
+class Setting(NamedTuple):
+    """One value of a knob.
+
+    label: for tables; value: of the knob in SI, None where the scene's tolerance chooses; words: the setting in a
+    sentence; level: halvings of the edges of a mesh file.
+    """
+
+    label: str
+    value: float | None
+    words: str
+    model: Model
+    level: int = 0
+
+
+def knobs_of(model: Model) -> list:
+    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
+    jumps over cycles of wear."""
+    out = ["element_size"] if model.patch is not None else []
+    if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
+        if plan(model).engine in ("march", "bench"):
+            out.append("steps_per_cycle")
+            if model.soft and has(model.friction.law, "bonds"):
+                out.append("shear_modes")
+    if model.wear is not None and model.patch is not None:
+        out.append("jumps")
+    return out
+
+
+def settings(model: Model, knob: str) -> list:
+    """Settings of a knob, coarse to fine, that of the scene itself among them; one that its tolerance chooses is last
+    where the others are numbers."""
+    if knob == "element_size":
+        if model.patch.mesh is not None:
+            return [Setting(f"file split {2**level} x", float(2**-level), _split_words(level), model, level)
+                    for level in range(3)]
+        return _by_tolerance(model) if model.patch.chosen else _even(model)
+    return _counted(model, knob)
+
+
+def _split_words(level: int) -> str:
+    return f"contact.mesh with its edges halved {level} times" if level else "contact.mesh as it is"
+
+
+def _by_tolerance(model: Model) -> list:
+    """Meshes that tolerances choose; one named twice is that of the scene."""
+    own = model.accuracy.tolerance
+    return [Setting(f"tolerance {one:g}", one, "element size by tolerance" + (f" {one:g}" if one != own else ""),
+                    replace(model, patch=replace(model.patch, mesh_tolerance=one)))
+            for one in sorted({*TOLERANCES, own}, reverse=True)]
+
+
+def _even(model: Model) -> list:
+    """Even meshes, and of a static patch the mesh that its tolerance chooses."""
+    length, out = model.patch.length, []
+    middle = round(length / model.patch.size)
+    for power in range(-3, LEVELS - 3):
+        cells = round(middle * 2.0**power)
+        if 8 <= cells <= MOST_CELLS or not power:
+            label, size = f"{1e6 * length / cells:.4g} um", length / cells
+            turned = replace(model, patch=model.patch.sized(size)) if power else model
+            out.append(Setting(label, size, f"element size {label}", turned))
+    if model.kind == "patch":
+        chosen = replace(model, patch=model.patch.sized(None))
+        out.append(Setting("by tolerance", None, "element size by tolerance", chosen))
+    return out
+
+
+def _counted(model: Model, knob: str) -> list:
+    """Values of a knob that counts, around that of the scene."""
+    pinned, middle = _pinned(model, knob), _middle(model, knob)
+    words, out = "{} " + knob.replace("_", " "), []
+    for power in range(-2, LEVELS - 2):
+        value = max(1, round(middle * 2.0**power))
+        own = not power and (pinned or knob == "steps_per_cycle")
+        if own or knob != "steps_per_cycle" or 4 <= value <= MOST_STEPS:
+            turned = model if own else _with(model, knob, value)
+            out.append(Setting(str(value), float(value), words.format(value), turned))
+    if not pinned and knob != "steps_per_cycle":
+        out.append(Setting("by tolerance", None, words.format("").strip() + " by tolerance", model))
+    return out
+
+
+def _pinned(model: Model, knob: str) -> int | None:
+    return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
+
+
+def _middle(model: Model, knob: str) -> int:
+    if knob != "steps_per_cycle":
+        return _pinned(model, knob) or MIDDLE[knob]
+    if model.kind == "bench":
+        return model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
+    from ..runs.rig.numerics import choose
+
+    return choose(model).steps
+
+
+def _with(model: Model, knob: str, value: int) -> Model:
+    if knob == "jumps":
+        return replace(model, wear=replace(model.wear, jumps=value))
+    return replace(model, accuracy=model.accuracy.model_copy(update={knob: value}))

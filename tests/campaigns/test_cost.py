@@ -1,0 +1,100 @@
+"""Cost curves: what they state is what a run states, and the sentence follows from the runs."""
+
+import csv
+import json
+
+import pytest
+from command_line import cli
+from scene_texts import PIECE
+
+from patchfem.campaigns import knobs
+from patchfem.campaigns.cost import Cost, cheapest, curve, sentence
+from patchfem.export.cost import draw
+from patchfem.model.model import build
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+LENGTH = 12.7e-3
+TEXT = PIECE + """\
+load = "26 lbf"
+substrate = "steel"
+{keys}
+[contact.tilt]
+angle = "5e-5 rad"
+[accuracy]
+tolerance = {tolerance}
+"""
+
+
+def model(keys="", tolerance=0.05):
+    return build(loads(TEXT.format(keys=keys, tolerance=tolerance)))
+
+
+def made(label, seconds, error, distance=None, value=1.0):
+    return Cost(label, value, f"a knob at {label}", seconds, 3, {"a": 1.0, "b": 2.0}, {"a": error, "b": error},
+                {"a": 0.0, "b": 0.0}, {"a": "1", "b": "1"}, {} if distance is None else {"a": distance})
+
+
+@pytest.mark.parametrize("keys, own", [('element_size = "0.25 mm"', "249 um"), ("", "tolerance 0.03")])
+def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, own, monkeypatch):
+    monkeypatch.setattr(knobs, "TOLERANCES", (1e-1, 1e-2))
+    mine = model(keys, 0.03)
+    runs = {one.label: one for one in curve(mine, "element_size")}
+    stated = run(mine, fresh=True).measures
+    assert runs[own].errors == pytest.approx({name: m.error for name, m in stated.items()}, rel=1e-9)
+    assert runs[own].values == pytest.approx({name: m.value for name, m in stated.items()}, rel=1e-9)
+
+
+def test_exact_the_table_has_every_value_its_error_and_its_distance_to_the_best(tmp_path):
+    scene = tmp_path / "a.toml"
+    scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
+    said = cli("cost", scene, "--over", "element_size", "-o", tmp_path / "out", "--json", "-q")
+    assert said.code == 0, said.err
+    answer = json.loads(said.out)["element_size"]
+    *even, chosen = answer["runs"]
+    assert [one["value"] for one in even] == pytest.approx([LENGTH / n for n in (12, 25, 50, 100)])
+    assert chosen["value"] is None and chosen["distances"] == {} and {one["timings"] for one in answer["runs"]} == {3}
+    for one in even:
+        gap = abs(one["values"]["normal_stiffness"] - chosen["values"]["normal_stiffness"])
+        assert one["distances"]["normal_stiffness"] == pytest.approx(gap)
+    with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row, one in zip(rows, answer["runs"], strict=True):
+        found = {name.removeprefix("error_"): float(text) for name, text in row.items() if name.startswith("error_")}
+        assert row["setting"] == one["label"] and found == one["errors"]
+    assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
+
+
+def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
+    runs = [made("lucky", 1, 1e-6, 1e-6), made("bad", 2, 1e-1, 1e-1), made("good", 3, 1e-3, 1e-3),
+            made("best", 9, 1e-5)]
+    assert cheapest(runs, 1e-2) == {"a": "good"} and cheapest(runs, 1e-6) == {"a": None}
+    assert cheapest(runs, 0.2) == {"a": "lucky"}
+
+
+def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
+    runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
+    assert sentence(runs, 1e-2) == "all measures within 1 % costs 2 s: a knob at 4"
+    assert sentence(runs, 1e-3) == \
+        "no run has all measures within 0.1 %: a is within 0.2 % at best, which costs 5 s: a knob at 8"
+    still = [made("2", 1, 2e-2), made("4", 2, 2e-2), made("8", 5, 2e-2)]
+    assert sentence(still, 1e-2) == "no run has all measures within 1 %: a is within 2 % whatever the setting"
+    bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
+    assert sentence(bold, 1e-2) == "all measures within 1 % costs 2 s: a knob at 4"
+
+
+def test_exact_a_picture_does_not_join_two_kinds_of_error():
+    runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
+    stated, away = draw.figure("jumps", runs, 1e-2, ["a"]).axes
+    assert stated.lines[0].get_ydata() == pytest.approx([4e-2, 8e-3, 2e-3])
+    assert away.lines[0].get_ydata() == pytest.approx([3e-2, 6e-3])
+
+
+@pytest.mark.parametrize("words, said", [
+    (["--over", "colour"], "the knobs are element_size"), (["--over", "steps_per_cycle"], "has the knobs element_size"),
+])
+def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
+    scene = tmp_path / "a.toml"
+    scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
+    answer = cli("cost", scene, *words)
+    assert answer.code == 2 and said in answer.err
