@@ -171,7 +171,9 @@ def _least(patch: Patch, mine: dict) -> dict:
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
-    off = _offset(patch) * edge_cells(patch.x, patch.active).sum() * (1 + (count <= POINT)) if patch.skin is None else 0
+    # an edge of a contact of few nodes lies anywhere in its cell
+    near = max(_offset(patch), 1.0 if count <= POINT else 1 / count**2)
+    off = near * edge_cells(patch.x, patch.active).sum() if patch.skin is None else 0.0
     off += float(open_ends(patch))
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
             "contact_half_width": off / 2, "loaded_fraction": peak * fullness,
