@@ -18,8 +18,9 @@ from .values import found_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
 MOST_COLUMNS = 120  # of the coarsest grid
-SLOPE = 0.9  # growth of the cells of the coarsest grid per distance
-EDGE = 10  # cells of the coarsest grid along the contact, at its edges
+# of a static patch, and of one whose motion takes longer the more nodes there are
+SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance
+EDGE = {True: 20, False: 10}  # its cells along the contact, at the edges of the contact
 LEAST = 4e-9  # of the length: the shortest cell of the coarsest grid, some tens of picometres
 JUMP = 8  # cells at a step of the gap in one cell at an edge
 MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay even
@@ -63,7 +64,7 @@ def base_grids(asked) -> list:
         pair = condensed(asked, *grids)
         seen = [_loaded(pressed(each, pair)) for each in (asked, *sweep)]
         layout = _layout(asked, seen)
-        if max(one.cell / one.wide for one in seen) <= 1 / (EDGE - 1):
+        if max(one.cell / one.wide for one in seen) <= 1 / (EDGE[asked.still] - 1):
             break
     return _grids(asked, layout)
 
@@ -80,7 +81,7 @@ def _layout(asked, seen: list) -> Layout:
         most = min(most, asked.length * WORN)
     inside = min(wide / 6, asked.length / 24, most)
     # a point of contact is looked at closer and closer
-    along = EDGE if np.isfinite(max(one.cell for one in seen)) else CLOSER
+    along = EDGE[asked.still] if np.isfinite(max(one.cell for one in seen)) else CLOSER
     least = max(min(wide / along, thick / 4 if thick else np.inf), LEAST * asked.length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
@@ -89,12 +90,12 @@ def _layout(asked, seen: list) -> Layout:
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = JUMP if asked.singular_ends else 1
-    corner = max(min(thick / 16 if thick else np.inf, wide / EDGE / sharp), LEAST * asked.length)
+    corner = max(min(thick / 16 if thick else np.inf, wide / EDGE[asked.still] / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder
     bands += tuple((side * half, side * half, min(asked.height, asked.length) / 20) for side in (-1, 1))
-    return Layout(-half, half, bands, span, max(inside, least), most, SLOPE)
+    return Layout(-half, half, bands, span, max(inside, least), most, SLOPE[asked.still])
 
 
 def _bands(places: list, least: float) -> tuple:
@@ -142,7 +143,7 @@ def _grids(asked, layout: Layout) -> list:
     while x.size > MOST_COLUMNS + 1 and layout.bands:
         layout = layout.times(x.size / MOST_COLUMNS)
         x = columns(layout, asked.gap.jumps)
-    return [outlined(asked, piece, _grid(asked, x, piece), 1 + SLOPE) for piece in pieces]
+    return [outlined(asked, piece, _grid(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces]
 
 
 def _grid(asked, x, piece) -> TensorGrid:
@@ -154,6 +155,6 @@ def _grid(asked, x, piece) -> TensorGrid:
     bands = [(0.0, 0.0, top), (height, height, min(height, asked.length) / 60)]
     if thick:
         bands.append((thick, thick, max(thick / 4, top)))
-    layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE)
+    layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[asked.still])
     depth, coated = rows(layout, thick)
     return TensorGrid(frozen_array(x), depth, coated)

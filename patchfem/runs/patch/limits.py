@@ -7,7 +7,7 @@ DOUBTFUL = 2.5  # the best ratio of meshes that are not nested
 REGULAR = (2.6, 6.0)  # ratios of a series that falls by its order
 SLOWEST = 1.6  # ratio that the rest of a slowly falling series is taken with
 GROWING = 1.3  # ratio below which a series has not begun to fall
-SAFE = 1.5  # of the rest of a series that falls by a steady ratio; random scenes show 1.1 at most
+SAFE = 1.8  # of the rest of a series that falls by a steady ratio; random scenes show 1.4 at most
 WILD = 2.0  # of the largest change of one that does not
 
 
