@@ -62,7 +62,7 @@ def base_grids(asked) -> list:
     for _ in range(SEARCHES):
         grids = _grids(asked, layout)
         pair = condensed(asked, *grids)
-        seen = [_loaded(pressed(each, pair)) for each in (asked, *sweep)]
+        seen = [loaded(pressed(each, pair)) for each in (asked, *sweep)]
         layout = _layout(asked, seen)
         if max(one.cell / one.wide for one in seen) <= 1 / (EDGE[asked.still] - 1):
             break
@@ -110,7 +110,7 @@ def _coating(asked) -> float:
     return min((piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0)
 
 
-def _loaded(patch: Patch) -> Found:
+def loaded(patch: Patch) -> Found:
     """Extent of the contact of a patch; where nothing touches, the cells around the narrowest gap.
 
     Of a smooth skin the part that bears a thousandth of the largest pressure counts.

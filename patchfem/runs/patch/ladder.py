@@ -1,18 +1,24 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
 from ...core import NotConverged, Outcome
 from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
+from . import high_order
 from .condensed import condensed
 from .grading import base_grids
-from .measures import measures, met
+from .measures import measures, met, missed
 from .press import pressed, solve
 
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
 LEAST_LEVELS = 3  # nested meshes that show an order
+FINE = 1e-3  # tolerance that bilinear meshes meet cheaply
+HELPED = 3.0  # times nearer to the tolerance, from which cells of order 4 end the climb even if they miss it
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 
 
@@ -62,10 +68,11 @@ def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
 def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
     """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
 
-    The climb ends where the next mesh would take more than the work that is spent on a patch. Without an estimate it is
-    the third mesh, and nothing is solved on the others.
+    Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can; then
+    the mesh serves fields and motion. The climb ends where the next mesh would take more than the work that is spent on
+    a patch. Without an estimate it is the third mesh, and nothing is solved on the others.
     """
-    grids, out = base_grids(asked), []
+    grids, out, sharp = base_grids(asked), [], None
     while True:
         try:
             wanted = estimate or len(out) == LEAST_LEVELS - 1
@@ -78,9 +85,25 @@ def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False)
         if len(out) < LEAST_LEVELS:
             continue
         nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
-        if not estimate or nothing or seconds_of(grids) > SPENT[asked.still] or \
-                met(measures(*out, tolerance=tolerance), tolerance):
+        if not estimate or nothing:
             return tuple(out)
+        out[0], dear = replace(out[0], sharper=sharp or {}), seconds_of(grids)
+        found = measures(*out, tolerance=tolerance)
+        if sharp is None and not met(found, tolerance) and high_order.serves(asked) and \
+                (dear > SPENT[False] or (asked.still and met(found, FINE))):
+            before = missed(found, tolerance)
+            sharp = high_order.sharper(asked, out[0], partial(_enough, out, tolerance))
+            out[0] = replace(out[0], sharper=sharp)
+            found = measures(*out, tolerance=tolerance)
+            if missed(found, tolerance) <= before / HELPED:
+                return tuple(out)
+        if dear > SPENT[asked.still] or met(found, tolerance):
+            return tuple(out)
+
+
+def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
+    """Whether patches, fine to coarse, meet the tolerance with the measures that cells of order 4 add."""
+    return met(measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance)
 
 
 def seconds_of(bodies) -> float:

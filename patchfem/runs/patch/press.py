@@ -1,6 +1,6 @@
 """The static patch of a scene: the pieces condensed to their interface, the gap between them, and what presses them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -22,7 +22,8 @@ class Patch:
     [contact.shear], and of the holder's spring, which is the same on every entry; gap: (m,) [m] of the unloaded
     surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in strips, whose means over
     the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it is rigid in
-    shear; notes: sentences for the warnings.
+    shear; notes: sentences for the warnings; sharper: static measures by name as (value, error) that cells of order 4
+    gave in addition, {} where none were asked for them.
     """
 
     pair: Pair
@@ -38,6 +39,7 @@ class Patch:
     sharp: bool
     notes: tuple
     seconds: dict
+    sharper: dict = field(default_factory=dict)
 
     @property
     def x(self) -> np.ndarray:
@@ -107,6 +109,11 @@ def presser(asked, pair: Pair):
         return how(asked, soft, gap + worn)[1].sigma_n * bare.interface.weight
 
     return press
+
+
+def pressure_on(asked, pieces: Compliance, gap) -> Pressure:
+    """Pressure of bare pieces, of any cells, on the gap (m,) [m] under the load and the holder of a `PatchModel`."""
+    return _how(asked)(asked, pieces, gap)[1]
 
 
 def _how(asked):
