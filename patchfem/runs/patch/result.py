@@ -1,5 +1,7 @@
 """What a pressed patch hands back by itself, and the warnings that it deserves."""
 
+from dataclasses import replace
+
 from ...core import Outcome
 from ...model.pieces import bodies_of
 from ...model.source import placed
@@ -30,9 +32,17 @@ def bodies(model) -> tuple:
 
 
 def measured(model, patch, coarse) -> dict:
-    """Static measures of the patch of a model; those that miss a tolerance that chose the mesh are extrapolated."""
-    tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-    return measures(patch, *coarse, tolerance=tolerance if model.patch.chosen else None)
+    """Static measures of the patch of a model; those that miss a tolerance that chose the mesh are extrapolated.
+
+    A measure that is a difference of larger terms has the tolerance times those as floor: of the approach the rotation
+    times half the length, of the centre of pressure half the length, of the moment the load times that.
+    """
+    tolerance, arm = model.patch.mesh_tolerance or model.accuracy.tolerance, model.patch.length / 2
+    found = measures(patch, *coarse, tolerance=tolerance if model.patch.chosen else None)
+    terms = {"approach": abs(found["rotation"].value) * arm, "pressure_centre": arm,
+             "moment": found["normal_load"].value * arm}
+    return found | {name: replace(found[name], floor=max(found[name].floor, model.accuracy.tolerance * size))
+                    for name, size in terms.items()}
 
 
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:

@@ -20,7 +20,7 @@ MEANINGS = {
         "load": "total normal force on the interface, weight included; [contact.approach] may stand in its place",
         "pairs": "number of equal patches that share the load; forces and stiffnesses are reported for all of them",
         "plane": "plane strain or plane stress in the pieces",
-        "element_size": "length of the elements along an even interface; without it the tolerance chooses a graded mesh",
+        "element_size": "length of the elements along an even interface; without it the tolerance grades the mesh",
         "substrate": "what the pieces are made of: a name of the material table, or a table of young, poisson, density",
         "mesh": "a mesh file of both pieces, tagged as GUIDE.md says; made from the dimensions unless given",
     },
