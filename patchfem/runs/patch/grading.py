@@ -82,7 +82,9 @@ def _layout(asked, seen: list) -> Layout:
     inside = min(wide / 6, asked.length / 24, most)
     # a point of contact is looked at closer and closer
     along = EDGE[asked.still] if np.isfinite(max(one.cell for one in seen)) else CLOSER
-    least = max(min(wide / along, thick / 4 if thick else np.inf), LEAST * asked.length)
+    # cells of a band that an edge sweeps are many, and every one is a contact set of its own
+    fine = thick / 4 if thick and asked.sweeps != "load" else np.inf
+    least = max(min(wide / along, fine), LEAST * asked.length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
     bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
