@@ -9,7 +9,7 @@ from ...contact import edges
 from ...core import Measure, PatchfemError
 from ...mesh.nested import plan_of
 from ...model.patch import reach
-from ..results.patch_rows import TABLE
+from ..results.patch_rows import DECISIVE, TABLE
 from .limits import limit
 from .press import Patch, pressed, solve
 from .rounding import open_ends, unresolved_rounding
@@ -20,7 +20,6 @@ FEW = 12  # nodes of a contact below which their number is felt
 POINT = 3  # nodes of a contact that no mesh of these cells resolves
 ROUND = 5e-12  # round-off, relative
 ALIKE = 1e-9  # relative error that nobody asks to be below
-DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
 PREFERRED = 1.5  # times the error of bilinear meshes, up to which cells of order 4, which spare more, give the value
 OFFSET = 0.012  # cells by which an edge found between nodes may lie off
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out

@@ -2,7 +2,7 @@
 
 from math import ceil, log2, log10
 
-from .patch_rows import TABLE
+from .patch_rows import DECISIVE, TABLE
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
 LEAST_ELEMENTS = 1e-4  # of the length, an element that is still proposed
@@ -17,7 +17,8 @@ def loose(result) -> list:
             if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
     static = {name: times for name, times in wide.items() if name in TABLE}
     moving = {name: times for name, times in wide.items() if name not in TABLE}
-    out = [_said(result, static, _finer_mesh(result, max(static.values())))] if static else []
+    worst = max(static, key=static.get, default="")
+    out = [_said(result, static, _finer_mesh(result, worst, static[worst]))] if static else []
     return [*out, _said(result, moving, _finer_motion(result, max(moving.values())))] if moving else out
 
 
@@ -31,15 +32,17 @@ def _said(result, wide: dict, remedy: str) -> str:
     return f"{name} is known {known}, the tolerance is {tolerance:g}{others}; {remedy}"
 
 
-def _finer_mesh(result, times: float) -> str:
-    """What cures the errors of a mesh that are `times` as large as allowed."""
+def _finer_mesh(result, name: str, times: float) -> str:
+    """What cures the errors of a mesh that are `times` as large as allowed, most of the measure `name`."""
     asked, tolerance = result.plan.model.patch, result.plan.model.accuracy.tolerance
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     if not asked.chosen:
         size = max(_rounded(asked.element_size / times**0.5), _rounded(LEAST_ELEMENTS * asked.length))
         return f'leave out contact.element_size, or set it to "{1e6 * size:.3g} um"'
-    return f"the mesh stopped at {result.patch.x.size} interface nodes, where a finer one would take too long; " \
+    why = "where a finer one would take too long" if name in DECISIVE else f"which is fine enough for {DECISIVE[0]} " \
+        f"and the other measures that it is chosen for"
+    return f"the mesh stopped at {result.patch.x.size} interface nodes, {why}; " \
            f"accuracy.tolerance = {_up(tolerance * times):g} is met"
 
 

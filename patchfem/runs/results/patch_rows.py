@@ -21,4 +21,6 @@ ROWS = (
     Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, of strips that roll"),
     Row("roll", "rad", 1e-12, "roll of the upper piece about x, positive opens at +y, of strips"),
 )
+# what a mesh is chosen for
+DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
 TABLE = {row.name: row for row in ROWS}
