@@ -89,14 +89,21 @@ class Piece:
 
 
 def _remedy(piece: Piece) -> str:
-    """What to change where the stiffness of a piece cannot be factorised."""
-    ratio = piece.layers.coating[0] / piece.layers.substrate[0]
-    if piece.is_coating.any() and not 1e-3 < ratio < 1e3:
+    least = min(np.diff(piece.x).min(), np.diff(piece.depth).min())
+    return remedy(piece.layers, piece.is_coating.any(), least, (np.ptp(piece.x), piece.depth[-1]))
+
+
+def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
+    """What to change where the stiffness of a piece cannot be factorised.
+
+    coated: whether it has cells of a coating; least: its shortest cell [m]; size: its length and height [m].
+    """
+    ratio = layers.coating[0] / layers.substrate[0]
+    if coated and not 1e-3 < ratio < 1e3:
         return (f"the Young's moduli of coating and substrate differ {max(ratio, 1 / ratio):.2g} times: bring them "
                 f"nearer, make the coating thicker, or leave it out")
-    least = min(np.diff(piece.x).min(), np.diff(piece.depth).min())
-    return (f"the shortest cell is {least:.2g} m in a piece of {np.ptp(piece.x):.2g} x {piece.depth[-1]:.2g} m: "
-            f"ask for longer cells (contact.element_size) or a larger tolerance")
+    return (f"the shortest cell is {least:.2g} m in a piece of {size[0]:.2g} x {size[1]:.2g} m: ask for longer cells "
+            f"(contact.element_size, or those of contact.mesh)")
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:

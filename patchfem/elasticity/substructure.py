@@ -12,9 +12,10 @@ from scipy.sparse import csc_matrix
 from skfem import Basis, ElementQuad1, ElementTriP1, MeshQuad, MeshTri
 
 from ..core import NotConverged, frozen_array
+from ..mesh.anymesh import cell_edges
 from .condense import CORRECTION, RESIDUAL
 from .dissect import dissection
-from .elasticity import Layers, hooke, lame
+from .elasticity import Layers, hooke, lame, remedy
 from .factor import factorise
 from .mapped import stiffness
 from .threads import one_thread
@@ -85,8 +86,10 @@ def _assembled(mesh, layers: Layers, name: str | None) -> tuple:
         change = 0.0 if np.abs(rest).max() <= RESIDUAL * np.abs(load).max() else \
             np.abs(found.solve(rest)).max() / np.abs(u).max()
     if not change <= CORRECTION:
-        raise NotConverged(f"the stiffness of the piece is solved to {change:.1e} only, wanted {CORRECTION:.0e}: "
-                           "bring the Young's moduli of coating and substrate nearer, or mesh with longer cells")
+        ends = mesh.points[np.unique(np.sort(cell_edges(mesh)[0], axis=1), axis=0)]
+        least = np.hypot(*(ends[:, 1] - ends[:, 0]).T).min()
+        raise NotConverged(f"the stiffness of the piece is solved to {change:.1e} only, wanted {CORRECTION:.0e}; "
+                           + remedy(layers, mesh.is_coating.any(), least, np.ptp(mesh.points, axis=0)))
     return order, found, float(change)
 
 

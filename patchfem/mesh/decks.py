@@ -169,8 +169,18 @@ def _gather(sets: dict, name: str | None, members: list) -> None:
 
 
 def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, how: str) -> Tagged:
-    """The mesh with node numbers of the file turned into places; -1 for a number that the file does not define."""
+    """The mesh with node numbers of the file turned into places.
+
+    PatchfemError for a number that the file does not define, by that number.
+    """
     place = {number: k for k, number in enumerate(nodes)}
+
+    def places(what: str, numbers) -> list:
+        strange = next((n for n in numbers if n not in place), None)
+        if strange is not None:
+            raise PatchfemError(f"{what} names node {strange}, which the file does not define")
+        return [place[n] for n in numbers]
+
     sizes = {len(where) for where in nodes.values()}
     if sizes - {2} and sizes - {3}:
         raise PatchfemError("nodes need two or three coordinates, all of them alike")
@@ -182,7 +192,7 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
     cells, names, edges = {3: [], 4: []}, {3: [], 4: []}, {}
     for number, corners in elements.items():
         if len(corners) > 2:
-            cells[len(corners)].append([place.get(n, -1) for n in corners])
+            cells[len(corners)].append(places(f"element {number}", corners))
             names[len(corners)].append(name.get(number, ""))
     for tag in EDGES:
         numbers = list(node_sets.get(tag, ()))
@@ -191,7 +201,7 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
             if len(corners) != 2:
                 raise PatchfemError(f"{tag} holds element {number}, which is no line element")
             numbers += corners
-        edges[tag] = np.array([place.get(n, -1) for n in numbers], np.int64)
+        edges[tag] = np.array(places(tag, numbers), np.int64)
     points = np.array(list(nodes.values()), float) if nodes else np.empty((0, 2))
     return Tagged(points, np.array(cells[3], np.int64).reshape(-1, 3), np.array(cells[4], np.int64).reshape(-1, 4),
                   np.array(names[3] + names[4], str), edges, how)

@@ -4,6 +4,7 @@ Cells are tagged upper_substrate, upper_coating, lower_substrate, lower_coating;
 upper_far, lower_far. The lower piece lies at y <= 0, the upper one at y >= 0, and each has interface nodes of its own.
 """
 
+import re
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -144,6 +145,7 @@ def _load(path: Path):
 def _plausible(path: Path) -> None:
     """Raise PatchfemError when a section announces more entries than the file has bytes for."""
     content = path.read_bytes()
+    _numbered(path, content)
     for section, least in ((b"$Nodes", 6), (b"$Elements", 4)):
         at = content.find(section)
         line = content[at + len(section):at + len(section) + 80].split(b"\n")
@@ -151,3 +153,18 @@ def _plausible(path: Path) -> None:
         if numbers and max(numbers[:4]) * least > len(content):
             raise PatchfemError(f"{path}: {section.decode()[1:]} announces {max(numbers[:4])} entries, more than a "
                                 f"file of {len(content)} bytes can hold")
+
+
+def _numbered(path: Path, content: bytes) -> None:
+    """Raise PatchfemError where a cell of a text of format 2 names a node below 1, which counts from the last node back
+    to its reader."""
+    if not re.search(rb"\$MeshFormat\s+2\S* 0 ", content):
+        return
+    for line in content.partition(b"$Elements")[2].partition(b"$EndElements")[0].splitlines()[2:]:
+        words = line.split()  # number, kind, count of tags, the tags, the nodes
+        if len(words) < 4 or not words[2].isdigit():
+            continue
+        wrong = next((word for word in words[3 + int(words[2]):] if word[:1] == b"-" or word.strip(b"0") == b""), None)
+        if wrong is not None:
+            raise PatchfemError(f"{path}: cell {words[0].decode('ascii', 'replace')} names node "
+                                f"{wrong.decode('ascii', 'replace')}; nodes count from 1")

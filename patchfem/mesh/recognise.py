@@ -1,4 +1,4 @@
-"""The tensor grid behind a piece of any mesh, and how much of its far face is held."""
+"""The tensor grid behind a piece of any mesh, how much of its far face is held, and the holes inside it."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -63,10 +63,7 @@ def held_share(mesh: PieceMesh) -> tuple:
     The whole is every face of the border, from corner to corner, on which an edge is held, and the deepest face. An
     edge is held where both of its ends are.
     """
-    ends, _ = cell_edges(mesh)
-    key = np.sort(ends, axis=1)
-    _, first, times = np.unique(key, axis=0, return_index=True, return_counts=True)
-    border = ends[np.sort(first[times == 1])]
+    border = _border(mesh)
     border = border[~np.isin(border, mesh.interface).all(axis=1)]
     span = mesh.points[border[:, 1]] - mesh.points[border[:, 0]]
     length = np.hypot(*span.T)
@@ -76,6 +73,27 @@ def held_share(mesh: PieceMesh) -> tuple:
     deepest = depth >= depth.max() * (1 - CLOSE)
     whole = np.isin(face, np.unique(face[held | deepest]))
     return float(length[held].sum()), float(length[whole].sum())
+
+
+def holes(mesh: PieceMesh) -> tuple:
+    """Number of the holes inside a piece and the area [m2] of them all; a notch of its outline is none.
+
+    The area is the shoelace of each stretch of border, which runs clockwise round a hole. Holes that touch at a node
+    count as one, and one that touches the outline there as a notch.
+    """
+    border, count = _border(mesh), len(mesh.points)
+    links = coo_matrix((np.ones(len(border)), border.T), shape=(count, count))
+    (ax, ay), (bx, by) = mesh.points[border[:, 0]].T, mesh.points[border[:, 1]].T
+    loop = connected_components(links, False)[1][border[:, 0]]
+    area = np.bincount(loop, (ax * by - bx * ay) / 2)
+    return int((area < 0).sum()), float(-area[area < 0].sum())
+
+
+def _border(mesh: PieceMesh) -> np.ndarray:
+    """Edges (b, 2) that belong to one cell alone, counter-clockwise round it."""
+    ends, _ = cell_edges(mesh)
+    _, first, times = np.unique(np.sort(ends, axis=1), axis=0, return_index=True, return_counts=True)
+    return ends[np.sort(first[times == 1])]
 
 
 def _faces(mesh: PieceMesh, border, along) -> np.ndarray:

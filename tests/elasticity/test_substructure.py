@@ -16,7 +16,7 @@ from scipy.sparse.linalg import spsolve
 from patchfem.closed_forms.contact import layered_compliance
 from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press
-from patchfem.core import Compliance, Interface
+from patchfem.core import Compliance, Interface, NotConverged
 from patchfem.elasticity import elasticity
 from patchfem.elasticity.elasticity import Layers, lame
 from patchfem.elasticity.substructure import assemble, cell_stress, condense, displacement, joined
@@ -183,3 +183,16 @@ def test_always_twenty_thousand_unknowns_condense_within_a_second():
         condense(assemble(mesh, COATED))
         seconds.append(time.perf_counter() - begin)
     assert min(seconds) < 1.0
+
+
+def test_refuses_a_bare_piece_too_slender_for_its_cells_by_their_length_and_longer_ones_serve():
+    """A column of 0.1 mm x 20 m on cells of 1/96 and of 1/3 of its length; a unit of even load shortens it by
+    H/(E L) where nu = 0."""
+    young, nu, length, height = 200e9, 0.0, 1e-4, 20.0
+    layers = Layers((young, nu), (young, nu), "stress")
+    fine, coarse = (of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3))
+    with pytest.raises(NotConverged, match=r"shortest cell is 1e-06 m in a piece of 0\.0001 x 20 m: ask for longer"):
+        assemble(fine, layers)
+    normal, *_ = condense(assemble(coarse, layers))
+    share = coarse.tributary() / length
+    assert share @ normal @ share == pytest.approx(height / (young * length), rel=1e-3)

@@ -264,6 +264,8 @@ def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
     ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
     ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "more than the deck has"),
     ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),
+    ("*NODE\n1,0,0\n3,1,0\n*ELEMENT,TYPE=CPE3\n12,1,3,7\n", "element 12 names node 7, which the file does not define"),
+    ("*NODE\n1,0,0\n*NSET,NSET=upper_far\n1,9\n", "upper_far names node 9, which the file does not define"),
     ("*INCLUDE, INPUT=other.inp\n", "INCLUDE is not yet built"),
     ("*NODE\n1,zero,0\n", "not a readable .inp"),
     ("", "nothing is tagged .*ELSET"),

@@ -7,6 +7,7 @@ import time
 import meshio
 import numpy as np
 import pytest
+from any_mesh_cases import drawn, write_msh22
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -302,3 +303,18 @@ def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_p
     tags[deepest & (tags == CELL_TAGS["upper_coating"])] = CELL_TAGS["upper_substrate"]
     low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
     assert (low.coating_rows, high.coating_rows) == (SMALL.coating_rows, SMALL.coating_rows - 1)
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1"])
+def test_refuses_a_text_whose_cell_names_a_node_below_one(wrong, tmp_path):
+    """A reader that counts back from the end takes node 0 for the last one, which lies in the upper piece."""
+    path, mesh = tmp_path / "pair.msh", drawn("quads")
+    write_msh22(mesh, path, binary=False)
+    assert read_grid(path)
+    lines = path.read_text().split("\n")
+    first = lines.index("$Elements") + 2
+    for at in (first, first + len(mesh.quads) + len(mesh.edges) - 1):  # a quad, an edge
+        words = lines[at].split()
+        path.write_text("\n".join([*lines[:at], " ".join([*words[:-1], wrong]), *lines[at + 1:]]))
+        with pytest.raises(PatchfemError, match=rf"pair.msh: cell {words[0]} names node {wrong}; nodes count from 1"):
+            read_bodies(path)

@@ -9,7 +9,7 @@ from any_mesh_cases import FORMATS, GRID, drawn, of_grid
 from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.files import EDGE_TAGS, read_bodies
-from patchfem.mesh.recognise import held_share, tensor_grid
+from patchfem.mesh.recognise import held_share, holes, tensor_grid
 
 
 def bodies(m, folder, form):
@@ -82,3 +82,25 @@ def test_exact_the_held_share_follows_a_far_face_up_to_its_corners():
 def test_always_a_grid_is_recognised_whatever_its_numbers_are():
     assert tensor_grid(of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
     assert tensor_grid(of_grid(GRID, 0.2)) is None
+
+
+@pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
+def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_none(split):
+    """Two cells apart from one another inside the piece, then one more at its side."""
+    piece = of_grid(GRID, split, 3)
+    assert holes(piece) == (0, 0.0)
+    middle = np.concatenate([piece.points[cells].mean(axis=1) for cells in (piece.triangles, piece.quads)])
+    x, depth, turn = GRID.x, GRID.depth, len(piece.triangles)
+
+    def inside(column, row):
+        there = (middle[:, 0] > x[column]) & (middle[:, 0] < x[column + 1])
+        return there & (middle[:, 1] > depth[row]) & (middle[:, 1] < depth[row + 1])
+
+    def left_out(gone):
+        return replace(piece, triangles=piece.triangles[~gone[:turn]], quads=piece.quads[~gone[turn:]],
+                       is_coating=piece.is_coating[~gone])
+
+    gone = inside(2, 2) | inside(5, 1)
+    area = (x[3] - x[2]) * (depth[3] - depth[2]) + (x[6] - x[5]) * (depth[2] - depth[1])
+    assert holes(left_out(gone)) == (2, pytest.approx(area, rel=1e-12))
+    assert holes(left_out(gone | inside(0, 2))) == (2, pytest.approx(area, rel=1e-12))

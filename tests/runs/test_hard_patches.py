@@ -215,6 +215,16 @@ def test_exact_the_edge_strip_alone_is_a_narrow_patch():
 EXPONENTIAL = "contact.asperities.law=exponential"
 
 
+def test_exact_strips_across_a_step_that_bears_are_the_whole_patch_and_its_peak_has_no_bound():
+    """Level strips are pressed alike, so that their number changes nothing; nothing bounds the peak at the step."""
+    step = ("contact.step.height=1 um", "contact.step.at=2 mm")
+    found, alone = solved("contact.strips.count=4", *step, COARSE), solved(*step, COARSE)
+    for name in ("pressure_peak", "loaded_fraction"):
+        assert value(found, name) is None and found.measures[name].reason == alone.measures[name].reason
+    for name in ("approach", "contact_fraction", "normal_stiffness"):
+        assert value(found, name) == pytest.approx(value(alone, name), rel=1e-9)
+
+
 def test_exact_a_skin_far_softer_than_the_pieces_is_a_rigid_pad_on_it():
     """Decay length 1 mm: pressure exp(-gap/u0) under a wedge of 1.3 mm, the pieces give 1e-5 of that."""
     found = solved(EXPONENTIAL, "contact.asperities.decay_length=1 mm", "contact.tilt.angle=0.1 rad", COARSE)

@@ -78,6 +78,23 @@ def test_exact_a_mesh_held_in_part_has_one_answer_in_three_formats_and_says_so(k
     assert (approaches[0] > 3 * flat) == (kept == 2)
 
 
+def test_exact_a_mesh_with_a_hole_says_so_with_its_area(tmp_path):
+    """Two cells of 0.8 mm side by side left out of the lower piece."""
+    m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
+    middle = m.points[m.quads].mean(axis=1)
+    row = np.unique(middle[middle[:, 1] < 0, 1])
+    deep = row[len(row) // 2]
+    gone = np.flatnonzero((np.abs(middle[:, 0]) < 0.8e-3) & (middle[:, 1] == deep))
+    area = np.ptp(m.points[m.quads[gone[0]], 1]) * 1.6e-3
+    whole = tmp_path / "whole.vtu", tmp_path / "hole.vtu"
+    FORMATS["vtu"][1](m, whole[0])
+    m.quads, m.quad_tags = np.delete(m.quads, gone, axis=0), np.delete(m.quad_tags, gone)
+    FORMATS["vtu"][1](m, whole[1])
+    said = [[text for text in ran(HELD.format(path), False).extra["notes"] if "hole" in text] for path in whole]
+    assert gone.size == 2 and said == [[], [f"contact.mesh: the lower piece has 1 hole inside, {area:.3g} m2 in all; "
+                                            "draw the cells that are missing if none was meant"]]
+
+
 def test_exact_a_tall_piece_says_its_share_of_the_load_under_which_it_buckles():
     """Euler's column, clamped and free: pi^2 E' I/(4 H^2), I = width length^3/12."""
     text = '[contact]\nlength = "10 mm"\nwidth = "1 m"\nheight = "{} mm"\nload = "{} N"\nelement_size = "0.5 mm"\n' \

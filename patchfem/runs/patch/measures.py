@@ -51,7 +51,7 @@ def plane_band(asked, patch: Patch) -> list:
 
 
 def strip_error(asked, patch: Patch, found: dict) -> dict:
-    """Measures `found` with what the number of strips adds to their errors.
+    """Measures `found` with what the number of strips adds to their errors; those without a value stay as they are.
 
     That is the change to half as many strips on the mesh of `patch`, three times what second order leaves of it; four
     times the change to twice as many where half as many would not reach to the load line.
@@ -64,7 +64,8 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
         other, share = 2 * count, 4.0
     beside = values(pressed(replace(asked, strips=(other, roll, offset)), patch.pair))
     here = values(patch)
-    return {name: replace(m, error=m.error + share * abs(here[name] - beside[name])) for name, m in found.items()}
+    return {name: m if m.value is None else replace(m, error=m.error + share * abs(here[name] - beside[name]))
+            for name, m in found.items()}
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:

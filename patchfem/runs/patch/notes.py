@@ -18,7 +18,7 @@ def left_out(model, patch, coarse) -> list:
     computed.
     """
     asked = model.patch
-    out = [*half_held(patch.pair), *slender(asked, patch)]
+    out = [*drawn_otherwise(patch.pair), *slender(asked, patch)]
     if patch.sharper:
         out.append("static measures come from Gauss-Lobatto cells of order 4 where these have the smaller errors; the "
                    f"bilinear mesh of {patch.x.size} interface points serves fields and motion")
@@ -33,14 +33,18 @@ def left_out(model, patch, coarse) -> list:
     return out
 
 
-def half_held(pair) -> list:
-    """A note for each piece whose far face the mesh file holds in part."""
+def drawn_otherwise(pair) -> list:
+    """Notes for each piece whose far face the mesh file holds in part, or that has holes inside."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        if plan_of(body) is not None:  # all of its last row is held
+        if plan_of(body) is not None:  # whole, and all of its last row is held
             continue
-        from ...mesh.recognise import held_share
+        from ...mesh.recognise import held_share, holes
 
+        count, area = holes(body)
+        if count:
+            out.append(f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
+                       "all; draw the cells that are missing if none was meant")
         held, whole = held_share(body)
         if held < WHOLE * whole:
             out.append(f"contact.mesh: {side}_far holds {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} of "
