@@ -295,7 +295,8 @@ def solve(skin, c: np.ndarray, x: np.ndarray, weight: np.ndarray, gap: np.ndarra
         checks = residuals(skin, c, x, weight, gap, force, float(motion[0]), free, load, moment, spring)
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact.asperities: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}")
+        raise NotConverged(f"contact.asperities: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; make the skin "
+                           "softer (decay length, height deviation), or leave it out")
     stiffness = np.where(force > 0, skin.stiffness(s), 0.0) if touch else 0.0 * x
     return SkinState(frozen_array(force), frozen_array(force / weight), frozen_array(s), frozen_array(stiffness),
                      float(motion[0]), rotation + free, float(force.sum()), float(force @ x), count,

@@ -399,6 +399,13 @@ def test_refuses_an_answer_that_did_not_settle():
         solve(PEAKS, c, x, weight, 1e-4 * x, LOAD, limit=1)
 
 
+def test_refuses_an_answer_whose_residual_is_too_large_with_a_remedy(monkeypatch):
+    c, x, weight = bodies(40)
+    monkeypatch.setattr("patchfem.contact.skin.LIMIT", -1.0)  # below any residual
+    with pytest.raises(NotConverged, match=r"contact\.asperities: .* exceeds .*; make the skin softer"):
+        solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
+
+
 def test_always_the_independent_check_sees_a_wrong_force():
     c, x, weight = bodies(40)
     for skin in SKINS.values():
