@@ -5,7 +5,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ..core import PatchfemError, frozen_array
 from ..surface.files.read import read_profile
@@ -57,6 +56,8 @@ def _even(x, size: float) -> bool:
 
 def _smooth(trace: Profile, even) -> Profile:
     """The cubic spline through the heights of a trace on even nodes (k,) [m], SPLIT points a cell."""
+    from scipy.interpolate import CubicSpline
+
     fine = np.interp(np.arange(SPLIT * (even.size - 1) + 1) / SPLIT, np.arange(even.size), even)
     heights = CubicSpline(even, on_nodes(trace, even), bc_type="natural")(fine)
     return replace(trace, x=frozen_array(fine), z=frozen_array(heights), notes=())
