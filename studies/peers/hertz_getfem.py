@@ -8,14 +8,14 @@ looks nodes up across the faces, to 9e-5.
                      a/8                a/16               a/32
   rms error, nodal   2.7e-3             1.7e-4             8.0e-5      both programs
   rms error, gauss   3.1e-2             2.8e-3             4.5e-4      GetFEM's integral contact, sawtooth at the edge
-  one piece (mirror) 0.06 / 0.21 / 0.25 0.15 / 0.45 / 0.60 0.30 / 1.1 / 1.1 s cold, patchfem / nodal / gauss
-  both pieces        0.11 / 0.56 / 0.73 0.23 / 1.4 / 1.7   0.60 / 4.0 / 4.0 s
+  one piece (mirror) .016 / 0.22 / 0.28 .021 / 0.47 / 0.57 .043 / 1.2 / 1.2 s cold, patchfem / nodal / gauss
+  both pieces        .027 / 0.61 / 0.78 .040 / 1.5 / 2.0   .12 / 4.6 / 4.5 s
 
-So cold, with the same reduction, GetFEM takes 3 to 4 times as long on one piece and 5 to 8 times on two. At equal error
-its nodal form keeps these ratios, its integral contact takes 9 to 11 times (one piece) and 13 to 23 times (two) as
-long; against a patchfem that condenses one of two alike pieces, 9 to 14 times at the same mesh. Every further load or
-tilt costs patchfem 0.1 to 0.3 ms and GetFEM a new factorisation per Newton step, 800 to 3000 times as much on one piece
-and 2200 to 14000 times on two.
+So cold, with the same reduction, GetFEM takes 14 to 28 times as long on one piece and 22 to 49 times on two. At equal
+error its nodal form keeps these ratios, its integral contact takes 36 to 60 times (one piece) and 73 to 130 times (two)
+as long; against a patchfem that condenses one of two alike pieces, 38 to 110 times at the same mesh. Every further load
+or tilt costs patchfem 0.1 to 0.4 ms and GetFEM a new factorisation per Newton step, 800 to 3000 times as much on one
+piece and 2200 to 13000 times on two.
 
 Run: python studies/peers/hertz_getfem.py
 """
