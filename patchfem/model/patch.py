@@ -189,11 +189,6 @@ def bars(patch: PatchModel, softness) -> float:
     return total / (patch.pairs * patch.length * patch.width)
 
 
-def reach(width: float, count: int) -> float:
-    """Place [m] of the outermost of `count` strips over `width` [m], within which a load line can lie."""
-    return width / 2 * (1 - 1 / count)
-
-
 def block_shear(patch: PatchModel) -> float:
     """Shear stiffness [N/m] of the two pieces as blocks in series, layer by layer, all pairs together.
 

@@ -47,7 +47,7 @@ class Pair:
     @property
     def rounding(self) -> float:
         """Relative error of the compliance by round-off [1], 0 where it is not felt."""
-        return max(getattr(piece, "rounding", 0.0) for piece in (self.piece, self.upper))
+        return max(self.piece.rounding, self.upper.rounding)
 
     def forces(self, nodal) -> tuple:
         """Nodal forces (..., m) of the interface carried to the nodes of the lower and of the upper piece."""
@@ -82,7 +82,7 @@ def compliance_of(body, piece, fresh: bool) -> tuple:
     found = None if fresh else cache.fetch(key, body.x.size)
     if found is None:
         found = condense(piece)
-        if not getattr(piece, "rounding", 0.0):
+        if not piece.rounding:
             cache.keep(key, found)
     return found
 

@@ -34,8 +34,8 @@ SEARCHES = 8  # of the contact, each on columns graded to what the one before fo
 class Found:
     """What a search finds of a contact.
 
-    span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface or a step lies;
-    corners: ends of the interface that bear; cell: longest cell [m] in which it ends.
+    span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface, or the nodes of a
+    contact too small to tell; corners: ends of the interface that bear; cell: longest cell [m] in which it ends.
     """
 
     span: tuple
@@ -152,7 +152,8 @@ def _grid(asked, x, piece) -> TensorGrid:
     """Grid of one piece: rows as fine as the columns at the interface, at the coating's own face and at the holder."""
     thick, height = piece.thickness, piece.height
     top = float(np.diff(x).min())
-    # a tall piece bends: a row stays below a twenty-fourth of its height
+    # a row is at most a tenth of the length; in a piece taller than that it may be a twenty-fourth of the height, and
+    # never more than a sixth of it
     cap = min(max(asked.length / 10, height / 24), height / 6)
     bands = [(0.0, 0.0, top), (height, height, min(height, asked.length) / 60)]
     if thick:

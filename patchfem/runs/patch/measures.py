@@ -8,7 +8,7 @@ import numpy as np
 from ...contact import edges
 from ...core import Measure, PatchfemError
 from ...mesh.nested import plan_of
-from ...model.patch import reach
+from ...scene.keys.contact import outermost
 from ..results.patch_rows import DECISIVE, TABLE
 from .limits import limit
 from .press import Patch, pressed, solve
@@ -20,7 +20,6 @@ FEW = 12  # nodes of a contact below which their number is felt
 POINT = 3  # nodes of a contact that no mesh of these cells resolves
 ROUND = 5e-12  # round-off, relative
 ALIKE = 1e-9  # relative error that nobody asks to be below
-PREFERRED = 1.5  # times the error of bilinear meshes, up to which cells of order 4, which spare more, give the value
 OFFSET = 0.012  # cells by which an edge found between nodes may lie off
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
@@ -60,7 +59,7 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     if count < 2:
         return found
     other, share = count // 2, 1.0
-    if offset is not None and abs(offset) >= reach(asked.width, other):
+    if offset is not None and abs(offset) >= outermost(asked.width, other):
         other, share = 2 * count, 4.0
     beside = values(pressed(replace(asked, strips=(other, roll, offset)), patch.pair))
     here = values(patch)
@@ -79,9 +78,10 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     if not series:
         return _bounded(fine, {name: Measure(value, TABLE[name].unit, None, floors[name])
                                for name, value in mine.items()})
-    found, least, out = [values(one) for one in reversed(series)], _least(fine, mine), {}
+    missed_peak = unresolved_rounding(fine)
+    found, least, out = [values(one) for one in reversed(series)], _least(fine, mine, missed_peak), {}
     nested = all(_halved(a, b) for a, b in pairwise((fine, *series)))
-    rough = 2.0 if unresolved_rounding(fine) else 1.0  # of meshes that pass over a rounding none shows what it does
+    rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
     for name, value in mine.items():
         if not mine["normal_load"] > 0:
             out[name] = Measure(value, TABLE[name].unit, 0.0, floors[name])
@@ -94,8 +94,8 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
     for name, (value, error) in fine.sharper.items():
-        if error < PREFERRED * out[name].error:
-            out[name] = replace(out[name], value=value, error=min(error, out[name].error))
+        if error < out[name].error:
+            out[name] = replace(out[name], value=value, error=error)
     return _bounded(fine, out)
 
 
@@ -163,11 +163,11 @@ def _floors() -> dict:
     return {name: row.floor for name, row in TABLE.items()}
 
 
-def _least(patch: Patch, mine: dict) -> dict:
+def _least(patch: Patch, mine: dict, missed_peak: float) -> dict:
     """Errors that three meshes may agree to hide.
 
     They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
-    smaller than the cells, and round-off.
+    smaller than the cells (missed_peak [Pa], `unresolved_rounding`), and round-off.
     """
     length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
     count = max(int(patch.active.sum()), 1)
@@ -176,7 +176,7 @@ def _least(patch: Patch, mine: dict) -> dict:
     peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
     if count <= POINT and cell:
         peak = max(peak, _wedge(patch))
-    peak = max(peak, unresolved_rounding(patch) - mine["pressure_peak"])
+    peak = max(peak, missed_peak - mine["pressure_peak"])
     moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
     turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0

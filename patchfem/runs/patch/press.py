@@ -22,8 +22,9 @@ class Patch:
     [contact.shear], and of the holder's spring, which is the same on every entry; gap: (m,) [m] of the unloaded
     surfaces; skin: SkinState of a smooth skin, else None; strips: StripsState of a patch in strips, whose means over
     the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it is rigid in
-    shear; notes: sentences for the warnings; sharper: static measures by name as (value, error) that cells of order 4
-    gave in addition, {} where none were asked for them.
+    shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps; sharp: an end
+    of the interface is a corner that meets a face which goes on; notes: sentences for the warnings; sharper: static
+    measures by name as (value, error) that cells of order 4 gave in addition, {} where none were asked for them.
     """
 
     pair: Pair

@@ -5,6 +5,7 @@ from math import ceil, log2, log10
 from .patch_rows import DECISIVE, TABLE
 
 MOST = 1e9  # times that an error exceeds what is allowed, beyond which it does not matter
+MARGIN = 2.0  # on second order: where between its nodes a contact ends changes errors that much from size to size
 LEAST_ELEMENTS = 1e-4  # of the length, an element that is still proposed
 
 
@@ -38,12 +39,15 @@ def _finer_mesh(result, name: str, times: float) -> str:
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
     if not asked.chosen:
-        size = max(_rounded(asked.element_size / times**0.5), _rounded(LEAST_ELEMENTS * asked.length))
+        size = max(_rounded(asked.element_size / (MARGIN * times**0.5)), _rounded(LEAST_ELEMENTS * asked.length))
         return f'leave out contact.element_size, or set it to "{1e6 * size:.3g} um"'
-    why = "where a finer one would take too long" if name in DECISIVE else f"which is fine enough for {DECISIVE[0]} " \
-        f"and the other measures that it is chosen for"
-    return f"the mesh stopped at {result.patch.x.size} interface nodes, {why}; " \
-           f"accuracy.tolerance = {_up(tolerance * times):g} is met"
+    nodes, wider = result.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
+    if asked.strips is not None:  # strips leave an error of second order, as the mesh does
+        return f"the mesh ({nodes} interface nodes) and the strips share it; set contact.strips.count = " \
+               f"{ceil(asked.strips[0] * times**0.5)}, or {wider}"
+    if name not in DECISIVE:
+        return f"the mesh ({nodes} interface nodes) was not chosen for it; {wider}"
+    return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
 
 
 def _finer_motion(result, times: float) -> str:
@@ -52,8 +56,7 @@ def _finer_motion(result, times: float) -> str:
         return "raise accuracy.harmonics"
     steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
     if steps is None:
-        return "ask for more cycles (drive.cycles)" if result.plan.model.rig is not None else \
-            "raise accuracy.steps_per_cycle"
+        return f"accuracy.tolerance = {_up(result.plan.model.accuracy.tolerance * times):g} would be met"
     return f"set accuracy.steps_per_cycle = {int(steps) * 2**max(1, ceil(log2(times) / 2))}"
 
 

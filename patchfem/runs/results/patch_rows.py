@@ -4,7 +4,7 @@ from ...core import Row
 
 ROWS = (
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together"),
-    Row("contact_fraction", "1", 0.0, "share of the interface under pressure; its floor is one cell of the mesh"),
+    Row("contact_fraction", "1", 0.0, "share of the interface under pressure, its ends found between the nodes"),
     Row("pressure_peak", "Pa", 0.0, "largest normal stress on the interface"),
     Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch, positive where it lies at +x"),
     Row("rotation", "rad", 1e-12, "rotation of the upper piece about the middle of the patch, positive opens at +x"),

@@ -123,6 +123,11 @@ class Shear(Table):
     """Tangential compliance of the pieces; it has no keys."""
 
 
+def outermost(width: float, count: int) -> float:
+    """Place [m] of the middle of the outermost of `count` equal strips over `width` [m]; a load line lies within it."""
+    return width / 2 * (1 - 1 / count)
+
+
 class Strips(Table):
     """The patch as equal strips side by side over the width."""
 

@@ -1,5 +1,6 @@
 """Rules of [contact]: keys that exclude or need one another."""
 
+from ..keys.contact import outermost
 from .draft import ASPERITIES, Draft, _needs
 from .limits import NOT_YET_BUILT
 from .outlines import flat_of, outlines
@@ -57,7 +58,7 @@ def _free_roll(draft: Draft, contact) -> None:
     if strips.count is not None and strips.count < 2:
         draft.say(at, f"{strips.count} strip does not feel a roll: raise contact.strips.count")
     elif strips.count and contact.width and strips.offset is not None:
-        most = contact.width / 2 * (1 - 1 / strips.count)
+        most = outermost(contact.width, strips.count)
         if abs(strips.offset) >= most:
             draft.say(at, f"{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {most:.6g} m "
                           "is wanted; raise contact.strips.count or lower the offset")

@@ -1,0 +1,66 @@
+"""What a static patch says of its own numbers: none where none is bounded, bars that hold, remedies that cure."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scene_texts import COATING, PIECE
+
+import patchfem as pf
+from patchfem.export.folder import summary_of
+
+RIG = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
+STEP = RIG + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'
+# fraction, peak [Pa], normal and tangential stiffness [N/m]: elements of order 5, a program of its own
+TILTED = {"0.1 mrad": (.2193469, 8317717.0, 5.349995e8, 2.289488e8),
+          "1 mrad": (.02391931, 60.84458e6, 1.698824e8, 1.196733e8),
+          "10 mrad": (.001675519, 792.5162e6, 9.617997e7, 8.402835e7)}
+DECISIVE = ("contact_fraction", "pressure_peak", "normal_stiffness", "tangential_stiffness")
+
+
+def test_always_null_beside_a_step_that_bears():
+    """A punch with a sharp corner has no largest pressure: null with the reason, in the result and in its summary."""
+    found = pf.run(STEP)
+    peak = found.measures["pressure_peak"]
+    assert peak.value is None and "edge of the step" in peak.reason and found.measures["normal_stiffness"].value > 0
+    written = summary_of(found)["measures"]["pressure_peak"]
+    assert written["value"] is None and "edge of the step" in written["reason"]
+
+
+def test_always_a_number_behind_a_skin():
+    """A skin yields at its peaks, so the same step leaves a largest pressure."""
+    skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
+    found = pf.run(STEP + skin)
+    assert found.measures["pressure_peak"].value > 0 and found.measures["pressure_peak"].error is not None
+
+
+@pytest.mark.parametrize("angle", TILTED)
+def test_bars_of_a_tilted_rig_patch_hold_an_independent_program(angle):
+    """The patch that a motion takes, on its own chosen mesh."""
+    found = pf.run(RIG + f'[contact.tilt]\nangle = "{angle}"\n').measures
+    for name, truth in zip(DECISIVE, TILTED[angle]):
+        assert abs(found[name].value - truth) <= found[name].error + 2e-6 * truth, (name, found[name])
+
+
+def test_exact_a_parabola_read_from_a_file_is_a_crown(tmp_path):
+    """Each on the mesh that it chose."""
+    x = np.linspace(-6.35e-3, 6.35e-3, 255)
+    rows = "\n".join(f"{a:.17g},{a * a / 20:.17g}" for a in x)
+    (tmp_path / "shape.csv").write_text("x [m],z [m]\n" + rows + "\n")
+    (tmp_path / "scene.toml").write_text(RIG + '[contact.profile]\nfile = "shape.csv"\n')
+    read, crown = pf.run(tmp_path / "scene.toml"), pf.run(RIG + '[contact.crown]\nradius = "10 m"\n')
+    for name in DECISIVE:
+        one, other = read.measures[name], crown.measures[name]
+        assert abs(one.value - other.value) <= one.error + other.error, (name, one, other)
+
+
+def test_a_warning_names_an_element_size_that_cures_it():
+    """The remedy of a warning about a pinned mesh, followed, leaves no warning about the mesh."""
+    text = RIG.replace('load = "26 lbf"', 'load = "26 lbf"\nelement_size = "{}"') + '[contact.crown]\nradius = "5 m"\n'
+    text += "[accuracy]\ntolerance = 1e-2\n"
+    said = [one for one in pf.run(text.format("0.4 mm")).warnings if "contact.element_size" in one]
+    assert len(said) == 1
+    size = re.search(r'set it to "([^"]+)"', said[0]).group(1)
+    assert not [one for one in pf.run(text.format(size)).warnings if "tolerance" in one]
