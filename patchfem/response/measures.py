@@ -6,6 +6,7 @@ Everything works on samples: values of an exact run and of a march differ only i
 import numpy as np
 
 from ..core import Outcome, Response
+from ..dynamics.second_book import gap, sampled_work
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
@@ -108,15 +109,12 @@ def work_check(work, pairs, jumps: bool = False) -> float:
     the step that follows.
     """
     parts = np.diff(work)
-    power, total = np.abs(parts).sum(), 0.0
+    total = 0.0
     for slide, force in pairs:
-        move, ends = np.diff(slide), force[:-1] + force[1:]
-        if jumps:
-            way = np.sign(move)
-            turned = (way != 0) & (way != np.append(0.0, way[:-1]))
-            ends[turned] = 2 * parts[turned] / move[turned]
-        total += float(ends @ move) / 2
-    return float(abs(total - work[-1]) / power) if power > 0 else 0.0
+        move = np.diff(slide)
+        after = np.divide(parts, move, out=np.zeros_like(move), where=move != 0) if jumps else None
+        total += float(sampled_work(slide, force, after).sum())
+    return gap(total, float(work[-1]), float(np.abs(parts).sum()))
 
 
 def drift(time, slide, period: float) -> float:

@@ -11,6 +11,7 @@ from ...core import Response
 from ...friction.protocol import Element
 from ..contacts import arrays
 from ..contacts.dispatch import COULOMB, law_of, number_of
+from ..second_book import sampled_work
 from .hub import HERE, contact_of
 from .march import GOAL, Run
 from .models import SET_VALUED, ContactModel, coulomb_model
@@ -164,6 +165,15 @@ class JointsRun(Run):
 
     def _works(self, rows) -> np.ndarray:
         return rows[:-1, 2 * self.modes.omega.size + 6]
+
+    def _sampled(self, rows) -> np.ndarray:
+        n, out = 2 * self.modes.omega.size, np.zeros(len(rows) - 1)
+        if self.model.patch is not None:
+            out += sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4] if self.model.patch.set_valued else None)
+        for k in np.flatnonzero(self.rubs):
+            slide, _, force, _ = rows[:, n + 7 + 4 * k:n + 11 + 4 * k].T
+            out += sampled_work(slide, force, None if self.model.joints[k].element.kernels else force[:-1])
+        return out
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, e) [m/s] and slips (k, e) [m] of the patch and of all elements in booked rows."""

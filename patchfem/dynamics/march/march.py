@@ -9,6 +9,7 @@ import numpy as np
 from ...compiled import load
 from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
 from ..propagator import propagator
+from ..second_book import sampled_work
 from .models import ContactModel, load_kernels
 
 MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
@@ -154,6 +155,7 @@ class Run:
             self.state[:] = start.z, start.v
         self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
         self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 6
+        self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
         self.plant = plant_of(modes, self.prop)
         self.periodic = self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, BaseSine) else None
@@ -207,6 +209,7 @@ class Run:
             if self.outcome is not None:
                 break
         rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
+        self.second += self._sampled(rows).sum(), np.abs(self._works(rows)).sum()
         return first, self._booked(rows), self.ledger[8] - before
 
     def _steps(self, count: int, rows) -> tuple:
@@ -232,6 +235,12 @@ class Run:
         """Friction work [J] of the steps between the rows."""
         n = 2 * self.modes.omega.size
         return rows[:-1, n + 4] * np.diff(rows[:, n])
+
+    def _sampled(self, rows) -> np.ndarray:
+        """Friction work [J] of the steps between the rows, off their slides and forces alone."""
+        n = 2 * self.modes.omega.size
+        jumps = getattr(self.model, "set_valued", False)
+        return sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4] if jumps else None)
 
     def _make_room(self, steps: int) -> None:
         """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
@@ -287,6 +296,7 @@ class Run:
         """The energy ledger [J]."""
         names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
         book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
+        book |= {"booked": float(self.ledger[8]), "sampled": float(self.second[0]), "passed": float(self.second[1])}
         if hasattr(self.contact, "tally"):
             tally = self.contact.tally
             book |= {"created": float(tally[6]), "dissipated": float(tally[7]), "substeps": float(tally[8]),

@@ -5,7 +5,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
-from ..results.notes import unripe, warming
+from ..results.notes import two_books, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import FAR, ended, reach, travelled
 from . import bench
@@ -36,7 +36,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed created {created:.3g} J, {100 * created / power:.2g} % of the work "
                     "that went to and fro: reading = \"stretch\" creates none"]
-    warnings = [*warnings, *warming(model, patch, fine)]
+    warnings = [*warnings, *warming(model, patch, fine), *two_books(found, fine.engine.name, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])

@@ -1,9 +1,13 @@
 """Sentences of a run on its law: how it warms, ripens and creeps."""
 
+from math import ceil, log2
+
 import numpy as np
 
 from ...core import Outcome
 from ...friction.bonds.parameters import ripening
+
+BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -37,3 +41,19 @@ def creeping(law, outcome, found) -> list:
         return []
     return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds that are damaged at any "
             "stretch do so under a biased load; friction.breakaway of half the swing of the force over mu N stops it"]
+
+
+def two_books(values: dict, engine: str, steps: int | None) -> list:
+    """Warning, as a list, of friction work that the samples of a run do not show as its ledger books it.
+
+    values: measures; engine: of the run; steps: per cycle, None of an engine without steps. The trapezoidal rule is of
+    second order.
+    """
+    found = values.get("work_check")
+    if found is None or found.value is None or found.value <= BOOKS:
+        return []
+    remedy = "raise accuracy.harmonics" if engine == "harmonic" else \
+        f"set accuracy.steps_per_cycle = {steps * 2**ceil(log2(found.value / BOOKS) / 2)}" if steps else \
+        "compare with accuracy.method = \"march\""
+    return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
+            f"differs from that of the energy ledger; {remedy}"]

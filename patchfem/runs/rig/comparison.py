@@ -11,6 +11,7 @@ from ...dynamics.comparison import point_laws
 from ...dynamics.comparison.point_laws import Coulomb
 from ...dynamics.march.march import hermite_extremes
 from ...dynamics.march.models import load_kernels
+from ...dynamics.second_book import gap, sampled_work
 from ...effects import has, module_of
 from ...friction.record import law_from
 from ...response import run_events
@@ -59,9 +60,11 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     book = _book(done)
     span = kept.time[-1] - kept.time[0]
     work = float(np.trapezoid(kept.force, kept.slide)) * drive.period / span if span > 0 else 0.0
-    spent = book["friction"]
+    spent, known = book["friction"], {}
+    if model.friction is not None:
+        known["work_check"] = _work_check(response, book)
     values = measures_of(seen(model, patch, kept, extremes[-last:], book, n, loop=sampled_loop(kept, drive, work),
-                              ledger=np.array([[spent], [0.0], [spent], [0.0]])))
+                              ledger=np.array([[spent], [0.0], [spent], [0.0]]), known=known))
     stuck, own = False, {}
     if model.friction is not None:
         values |= other_measures(kept, drive, n)
@@ -73,6 +76,17 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     return Solution(values, response, kept, window_amplitudes(extremes, window),
                steady_of(drive, *ends), outcome or (Outcome.STUCK if stuck else None), [], book,
                perf_counter() - begin, None, {"reduce": 0.0, "load": 0.0}, notes=done.warnings, own=own)
+
+
+def _work_check(response, book: dict) -> float:
+    """Gap [1] between the friction work along the slides of all samples and that of the ledger, which is summed in
+    time."""
+    extra, sampled, passed = response.extra, 0.0, 0.0
+    slides = extra.get("slides", response.slide[:, None])
+    for slide, force in zip(slides.T, extra.get("forces", response.force[:, None]).T):
+        parts = sampled_work(slide, force)
+        sampled, passed = sampled + float(parts.sum()), passed + float(np.abs(parts).sum())
+    return gap(sampled, book["friction"], passed, book["power"] + book["peak_stored"])
 
 
 def _integrated(model, numerics, laws):

@@ -8,6 +8,7 @@ import numpy as np
 from ...core import BaseSine, Outcome, Start
 from ...dynamics.events.histories import simulate
 from ...dynamics.one_mode import sdof
+from ...dynamics.second_book import gap, sampled_work
 from ...effects import has
 from ...response import run_events
 from ...response.levels import Level
@@ -105,6 +106,8 @@ def _values(model, numerics, patch, drive, done) -> tuple:
                   "stick_fraction": min(done.stick / span, 1.0),
                   "slip_start_phase": circular_mean(starts) if starts.size and sinusoidal(drive) else None}
         loop = _loop(done, drive, span, apart)
+        if not apart:  # the loop of strips is that of their samples
+            known["work_check"] = _work_check(done)
     values = measures_of(seen(model, patch, window, extremes, done.ledger, 400, drive=drive, loop=loop, ledger=ledger,
                               known=known))
     if model.friction is None:
@@ -114,6 +117,15 @@ def _values(model, numerics, patch, drive, done) -> tuple:
         values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
     others = any(run_events.moving(window, drive, done.log)[1:])
     return values, done.stick >= span * (1 - 1e-12) and not others
+
+
+def _work_check(done) -> float:
+    """Gap [1] of the friction work of the first interface in the window: by the trapezoidal rule on its samples, both
+    sides of every jump among them, against the quadrature of the pieces between events."""
+    window, (_, weight, _, rate, force) = done.window, done.loop
+    power, energy = weight * force * rate, done.ledger["power"] + done.ledger["peak_stored"]
+    sampled = sampled_work(window.slide, window.force).sum()
+    return gap(float(sampled), float(power.sum()), float(np.abs(power).sum()), energy)
 
 
 def _loop(done, drive, span: float, apart: bool) -> tuple | None:

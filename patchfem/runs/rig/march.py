@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...dynamics.march import march as hub
+from ...dynamics.second_book import gap
 from ...effects import has
 from ...response import run_events
 from ...response.measures import step_harmonic, window_amplitudes, window_ends
@@ -68,10 +69,12 @@ class _Read:
         if self.model.friction is None:
             return measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps))
         if stuck and self.contact.set_valued:  # what moves in round-off does not slide
-            known = dict.fromkeys(("slip_start_phase", "equivalent_stiffness", "equivalent_damping"))
+            known |= dict.fromkeys(("slip_start_phase", "equivalent_stiffness", "equivalent_damping"))
             known["stick_fraction"] = 1.0
             moving = self.model.rig.modes.mass * peak_speed(drive, self.model.rig.start)**2
             book = book | {"power": book["power"] + moving}  # its energies are round-off of such a one
+        energy = book["power"] + book["peak_stored"]
+        known["work_check"] = gap(book["sampled"], book["booked"], book["passed"], energy)
         found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps,
                                  loop=self._loop(part), ledger=ledger, known=known))
         if self.contact.set_valued and found["slip_amplitude"] < self.held:  # what moves is round-off

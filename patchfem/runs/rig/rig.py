@@ -13,7 +13,7 @@ from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
 from ..bench.averaged import limit_tractions
-from ..results.notes import creeping, unripe, warming
+from ..results.notes import creeping, two_books, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import ended, travelled
 from . import levels
@@ -57,6 +57,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         fields = rig_fields(model, numerics, patch, raw)
     extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
+    warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
     if patch is not None:
         warnings = [*warnings, *travelled(patch, raw.response.slide)]

@@ -13,6 +13,7 @@ from ...dynamics.harmonic.forces import Group
 from ...dynamics.harmonic.laws import Interlock, Spring
 from ...dynamics.harmonic.point import point as periodic_point
 from ...dynamics.harmonic.stability import with_stability
+from ...dynamics.second_book import gap, sampled_work
 from ...response.rows import measures_of
 from .interface import contact_model
 from .solution import Solution, sampled_loop, seen
@@ -72,6 +73,10 @@ class Balance:
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         known = {"drift_per_cycle": 0.0}
+        if self.model.friction is not None:
+            parts = sampled_work(response.slide, response.force)
+            energy = book["power"] + book["peak_stored"]
+            known["work_check"] = gap(float(parts.sum()), book["friction"], float(np.abs(parts).sum()), energy)
         values = measures_of(seen(self.model, self.patch, response, extremes, book, SAMPLES, drive=drive, known=known,
                                   loop=sampled_loop(response, drive, book["friction"])))
         if self.model.friction is not None:

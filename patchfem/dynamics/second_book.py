@@ -1,0 +1,34 @@
+"""The second book of energy: friction work off the samples alone, which the ledger of an engine must agree with.
+
+A ledger and the energy balance built from it share one path mean, so neither shows a mean that is wrong. The
+trapezoidal rule on slide and force as they are sampled knows nothing of it.
+"""
+
+import numpy as np
+
+ROUND = 1e-12  # of the energy that passes through a run, below which friction work is round-off
+
+
+def sampled_work(slide, force, after=None) -> np.ndarray:
+    """Friction work (k - 1,) [J] of the steps between samples, by the trapezoidal rule int F dq.
+
+    slide (k,) [m]; force (k,) [N], > 0 against positive slip; after (k - 1,) [N]: force of the step that follows a
+    sample, of friction that jumps where the slide starts or turns. It stands for the sample there, which may hold the
+    force before the jump.
+    """
+    move, ends = np.diff(slide), force[:-1] + force[1:]
+    if after is not None:
+        way = np.sign(move)
+        turned = (way != 0) & (way != np.append(0.0, way[:-1]))
+        ends = np.where(turned, 2 * after, ends)
+    return ends * move / 2
+
+
+def gap(sampled: float, booked: float, passed: float, energy: float = 0.0) -> float:
+    """Relative gap [1] of the two books: |sampled - booked| over the work that went to and fro; 0 where none did.
+
+    sampled, booked: friction work [J]; passed: sum of its sizes [J]; energy [J] that passed through the whole run, of
+    which ROUND counts besides, so that a stuck interface shows no round-off.
+    """
+    scale = passed + ROUND * energy
+    return float(abs(sampled - booked) / scale) if scale > 0 else 0.0

@@ -1,0 +1,82 @@
+"""The second book of energy of rigs: the trapezoidal rule on the samples against the ledger, in every engine."""
+
+import re
+
+import numpy as np
+import pytest
+
+from patchfem.dynamics.second_book import gap, sampled_work
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+RIG = '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n' \
+      'damping = 0.01\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 12\n'
+POINT = '[normal]\nload = "90 N"\n[friction]\nstatic = 0.3\n'
+LAWS = {
+    "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "4 um"\n', "tanh": 'law = "tanh"\nreference_speed = '
+    '"10 mm/s"\n', "bonds": 'law = "nonlocal"\nbond_length = "4 um"\n',
+    "list": 'law = "nonlocal"\nbond_length = "4 um"\norder = 0.5\n',
+    "printed": 'law = "nonlocal"\nbond_length = "4 um"\nreading = "report"\norder = 0\ninitial_bonds = 0\n',
+}  # fmt: skip
+PAIR = '[structure]\nmasses = ["1 kg", "0.5 kg"]\n[[structure.spring]]\nbetween = [1, 0]\nstiffness = "5e5 N/m"\n' \
+       '[[structure.spring]]\nbetween = [2, 1]\nstiffness = "2e5 N/m"\n[[structure.interface]]\nbetween = [1, 0]\n' \
+       'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2\nload = "20 N"\n[[structure.interface]]\nbetween = [2, 1]\n' \
+       'law = "elastic-plastic"\nbond_length = "10 um"\nstatic = 0.3\nload = "9 N"\n[drive]\nkind = "force"\n' \
+       'mass = 1\nforce = "15 N"\nfrequency = "60 Hz"\ncycles = 12\n'
+
+
+def checked(text, *sets):
+    found = run(loads(text, sets=sets), estimate=False)
+    return found.measures["work_check"].value, found
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_order_of_the_second_book_of_a_march_is_two(law):
+    """A ledger whose path mean were off by a constant share would stay off by it at any step."""
+    steps = (400, 1600) if law != "list" else (300, 900)
+    coarse, fine = (checked(POINT + LAWS[law] + RIG, f"accuracy.steps_per_cycle={n}")[0] for n in steps)
+    assert fine < 1e-3 and np.log(coarse / fine) / np.log(steps[1] / steps[0]) > 1.7
+
+
+@pytest.mark.parametrize("method, within", [("exact", 1e-12), ("march", 3e-4), ("newmark", 2e-3), ("harmonic", 1e-12)])
+def test_exact_coulomb_closes_both_books_in_every_engine(method, within):
+    """The samples of events hold both sides of a jump, and between them the force of a slip is constant."""
+    value, found = checked(POINT + 'law = "coulomb"\n' + RIG, f"accuracy.method={method}")
+    assert found.measures["loop_area"].value > 1e-3 and value < within
+
+
+def test_exact_a_march_that_holds_more_at_rest_closes_both_books():
+    """The jump from the static to the kinetic force at every start of a slip costs the check nothing."""
+    value, found = checked(POINT + 'law = "coulomb"\nkinetic = 0.15\n' + RIG, "accuracy.method=march",
+                           "drive.frequency=40 Hz", "drive.acceleration=4 g", "accuracy.steps_per_cycle=400")
+    assert found.measures["stick_fraction"].value > 0.02 and value < 1e-3
+
+
+def test_exact_several_interfaces_close_both_books_together():
+    value, _ = checked(PAIR, "accuracy.steps_per_cycle=800")
+    assert 0 < value < 5e-4
+
+
+def test_exact_a_stuck_interface_shows_no_round_off():
+    for method in ("exact", "march"):
+        assert checked(POINT + 'law = "coulomb"\n' + RIG.replace("5 g", "1 g"), f"accuracy.method={method}")[0] < 1e-4
+    assert gap(2e-17, 1e-17, 1e-17, 1.0) < 1e-4
+
+
+def test_exact_a_book_that_is_off_is_seen():
+    """The area of an ellipse, off by one part in a hundred."""
+    turn = np.linspace(0, 2 * np.pi, 4001)
+    parts = sampled_work(np.cos(turn), -np.sin(turn))
+    assert gap(parts.sum(), np.pi, np.pi) < 1e-6
+    assert gap(parts.sum(), 1.01 * np.pi, 1.01 * np.pi) == pytest.approx(0.01 / 1.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("text", [POINT + LAWS["bonds"] + RIG, POINT + 'law = "nonlocal"\nbond_length = "1 um"\n'
+                                  '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n'])
+def test_exact_the_remedy_of_a_gap_between_the_books_cures_it(text):
+    value, found = checked(text, "accuracy.steps_per_cycle=60")
+    said = [line for line in found.warnings if line.startswith("work_check")]
+    assert value > 1e-3 and len(said) == 1 and "limit 0.001" in said[0]
+    steps = re.search(r"steps_per_cycle = (\d+)", said[0])[1]
+    again, found = checked(text, f"accuracy.steps_per_cycle={steps}")
+    assert again < 1e-3 and not [line for line in found.warnings if line.startswith("work_check")]
