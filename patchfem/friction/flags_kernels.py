@@ -15,3 +15,9 @@ FAST = {"reassoc", "contract", "arcp"}
 def middle(num, mem, e, v, dt):
     """The `middle` of laws whose bonds do not grow: 0, as no such law asks for a bond length [m]."""
     return 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def closed(num, mem, e, free, beta):
+    """The `closed` of laws whose step has no closed form: (0 [m], 0 [N], False)."""
+    return 0.0, 0.0, False

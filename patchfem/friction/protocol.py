@@ -10,11 +10,12 @@ module with three compiled functions of one signature, num (e, k) and mem (e, k)
 mean(num, mem, e, q, dq, eps, dt) -> (path-mean force [N], its slope over dq [N/m]) over an increment dq [m] in dt [s];
 commit(num, mem, e, dq, force, v0, v1, dt, eps) -> energy dissipated [J], which moves the memory over that increment;
 state(num, mem, e, q, v) -> (force [N], stored energy [J], irreversible part of the slide q [m]).
-A law whose bonds grow has middle(num, mem, e, v, dt) -> eps [m] besides, the bond length of the step. num[e, 0] is left
-to the loops. What a law is carried by besides asks for more: press in varying loads; at_end(num, e, before, speed,
-travel) -> (force, slopes over speed and travel) at the end of a step in comparison methods; of form "flow" in harmonic
-balance flow(num, e, z, dq, dt) -> (stretch z [m] after, its slopes over z, dq and dt) and pull(num, e, z, v) -> (force,
-its slopes over z and v).
+closed(num, mem, e, free, beta) -> (dq, path-mean force, whether it is) is a step dq = free - beta force solved without
+an iteration; that of `flags_kernels` says that there is none. A law whose bonds grow has middle(num, mem, e, v, dt) ->
+eps [m] besides, the bond length of the step. num[e, 0] is left to the loops. What a law is carried by besides asks for
+more: press in varying loads; at_end(num, e, before, speed, travel) -> (force, slopes over speed and travel) at the end
+of a step in comparison methods; of form "flow" in harmonic balance flow(num, e, z, dq, dt) -> (stretch z [m] after, its
+slopes over z, dq and dt) and pull(num, e, z, v) -> (force, its slopes over z and v).
 """
 
 from typing import NamedTuple

@@ -107,6 +107,23 @@ def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
         assert force == pytest.approx(3 * (0.6 + 2 * dq), rel=1e-14) and slope == pytest.approx(6.0, rel=1e-6)
 
 
+def test_exact_a_step_of_one_element_needs_no_iteration():
+    """The closed form solves dq = free - beta F(dq) with the path mean F of the clip, soft or stiff."""
+    rng = np.random.default_rng(3)
+    for _ in range(400):
+        soft, most, start = 10.0**rng.uniform(-3, 9), 10.0**rng.uniform(-6, 2), rng.uniform(-1, 1)
+        free, beta = most * rng.normal() * 10.0**rng.uniform(-3, 3), 10.0**rng.uniform(-3, 3)
+        stiffness = soft / beta
+        num = parallel([stiffness], [most]).numbers[None]
+        mem = np.array([[0.0, 0.0, 0.0, most * (start if rng.random() < 0.8 else np.sign(start))]])
+        dq, force, done = elastic_plastic_kernels.closed(num, mem, 0, free, beta)
+        want = jenkins_numpy(dq, mem[0, 3:], np.array([stiffness]), np.array([most]))[0]
+        assert done and abs(dq - free + beta * force) <= 1e-14 * (abs(free) + beta * stiffness * most)
+        assert force == pytest.approx(want, abs=1e-13 * stiffness * (most + abs(dq)))
+    two = parallel([1.0, 2.0], [1.0, 1.0])
+    assert not elastic_plastic_kernels.closed(two.numbers[None], two.memory[None], 0, 1.0, 1.0)[2]
+
+
 @pytest.mark.parametrize("eps", [1.0, 0.02])
 def test_exact_rigid_points_are_single_points_together(eps):
     rng = np.random.default_rng(5)

@@ -5,10 +5,11 @@ from functools import cache
 from ... import compiled
 
 COULOMB = "friction.laws.coulomb_kernels"
-SIGNATURES = {"middle": "num, mem, e, v, dt", "mean": "num, mem, e, q, dq, eps, dt",
+SIGNATURES = {"closed": "num, mem, e, free, beta", "middle": "num, mem, e, v, dt",
+              "mean": "num, mem, e, q, dq, eps, dt",
               "commit": "num, mem, e, dq, force, v0, v1, dt, eps", "state": "num, mem, e, q, v",
               "at_end": "num, e, before, speed, travel"}
-MARCHED = ("middle", "mean", "commit", "state")  # what a march asks of a law
+MARCHED = ("closed", "middle", "mean", "commit", "state")  # what a march asks of a law
 HEAD = '''"""Laws side by side: num[e, 0] says which one is meant. Written by patchfem.dynamics.contacts.dispatch."""
 
 from numba import njit

@@ -8,9 +8,9 @@ from math import cos, pi, sin
 
 from numba import njit
 
-from ...friction.flags_kernels import LEAN, middle
+from ...friction.flags_kernels import LEAN, closed, middle
 
-__all__ = ["commit", "mean", "middle", "state"]
+__all__ = ["closed", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", **LEAN)

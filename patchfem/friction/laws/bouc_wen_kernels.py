@@ -10,9 +10,9 @@ from math import exp, expm1, log, log1p
 import numpy as np
 from numba import njit
 
-from ..flags_kernels import LEAN, middle
+from ..flags_kernels import LEAN, closed, middle
 
-__all__ = ["commit", "flow", "mean", "middle", "pull", "state"]
+__all__ = ["closed", "commit", "flow", "mean", "middle", "pull", "state"]
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w

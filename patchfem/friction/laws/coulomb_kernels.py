@@ -6,9 +6,9 @@ Twin: `coulomb.Coulomb`. num: static, kinetic force [N]; mem: the last force [N]
 import numpy as np
 from numba import njit
 
-from ..flags_kernels import LEAN, middle
+from ..flags_kernels import LEAN, closed, middle
 
-__all__ = ["at_end", "commit", "mean", "middle", "state"]
+__all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", **LEAN)

@@ -4,11 +4,13 @@ num: number t of elements, their stiffness (t,) [N/m], their yield slide (t,) [m
 stretch [m] averaged with stiffness * yield slide, then the stretch (t,) of every element [m].
 """
 
+from math import sqrt
+
 from numba import njit
 
 from ..flags_kernels import FAST, LEAN, middle
 
-__all__ = ["at_end", "commit", "mean", "middle", "state"]
+__all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -43,6 +45,29 @@ def mean(num, mem, e, q, dq, eps, dt):
         force += row[2 + j] * area
         slope += row[2 + j] * elastic * elastic
     return force / dq, 0.5 * slope / dq / dq
+
+
+@njit(error_model="numpy", **LEAN)
+def closed(num, mem, e, free, beta):
+    """(dq [m], path-mean force [N], whether it is) of a step dq = free - beta force of one element alone: no iteration.
+
+    free [m]: slide without friction; beta [m/N]. An element of stiffness k and stretch s that only stretches by dq
+    pulls with k (s + dq/2) on the mean. One that slips at its end +-m pulls with +-k m less what it lacked before:
+    dq^2 - (free -+ beta k m) dq = beta k (m -+ s)^2/2, of which the root of the sign of the slip is meant.
+    """
+    if num[e, 1] != 1:
+        return 0.0, 0.0, False
+    stiffness, most, start = num[e, 2], num[e, 3], mem[e, 3]
+    soft = beta * stiffness
+    dq = (free - soft * start) / (1 + 0.5 * soft)
+    if abs(start + dq) <= most:
+        return dq, stiffness * (start + 0.5 * dq), True
+    way = 1.0 if dq > 0 else -1.0
+    slides, left = way * free - soft * most, most - way * start  # along the slip
+    root = sqrt(slides * slides + 2 * soft * left * left)
+    # of two roots of opposite signs the one whose terms do not cancel, the other by their product
+    dq = 0.5 * (slides + root) if slides > 0 else soft * left * left / (root - slides)
+    return way * dq, way * stiffness * (most - 0.5 * left * left / dq), True
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)

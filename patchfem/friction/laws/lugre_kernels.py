@@ -9,9 +9,9 @@ from math import exp
 from numba import njit
 
 from ..bonds.point_kernels import shape
-from ..flags_kernels import LEAN, middle
+from ..flags_kernels import LEAN, closed, middle
 
-__all__ = ["commit", "flow", "mean", "middle", "pull", "state"]
+__all__ = ["closed", "commit", "flow", "mean", "middle", "pull", "state"]
 
 
 TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0

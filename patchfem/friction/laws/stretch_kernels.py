@@ -11,7 +11,9 @@ from math import exp
 from numba import njit
 
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import LEAN
+from ..flags_kernels import LEAN, closed
+
+__all__ = ["closed", "commit", "flow", "mean", "middle", "pull", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage

@@ -11,9 +11,9 @@ from numba import njit
 
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
 from ..flags_kernels import FAST, LEAN
-from .stretch_kernels import FREE, GROWTH, WEIGHT, middle
+from .stretch_kernels import FREE, GROWTH, WEIGHT, closed, middle
 
-__all__ = ["commit", "mean", "middle", "state"]
+__all__ = ["closed", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)

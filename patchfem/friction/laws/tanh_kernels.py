@@ -7,9 +7,9 @@ from math import tanh
 
 from numba import njit
 
-from ..flags_kernels import LEAN, middle
+from ..flags_kernels import LEAN, closed, middle
 
-__all__ = ["at_end", "commit", "mean", "middle", "state"]
+__all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]
 
 
 @njit(error_model="numpy", **LEAN)

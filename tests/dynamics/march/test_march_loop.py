@@ -194,6 +194,14 @@ def test_order_and_steady_amplitude_of_a_jenkins_oscillator(stiffness, want):
     assert rows[2] + (rows[2] - rows[1]) / 3 == pytest.approx(want, abs=2e-7)
 
 
+def test_always_a_stiff_element_takes_one_evaluation_a_step():
+    """Newton's method across its kinks took up to 30 where the element is far stiffer than the structure."""
+    model = jenkins_model([1e6 * OMEGA**2], [40.0 / (1e6 * OMEGA**2)])
+    done = march(one_mode(OMEGA, 0.003, 1.0), BaseSine(50.0, OMEGA), model, 4, 200)
+    assert done.ledger["iterations"] == 800 and done.ledger["worst_iterations"] == 1 and not done.message
+    assert done.ledger["friction"] > 0
+
+
 def test_exact_march_with_a_pressure_on_the_lower_piece_replayed():
     """The marched slide, walked again by the NumPy law under the shifted pattern, gives the marched force."""
     law = Bonds(0.4, 2e-6)
