@@ -12,8 +12,7 @@ without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averag
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
 drive is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its
-motion or the curve of them), "closed" (it is made of constants and sines), "endless" (it needs cycles or a duration to
-end).
+motion or the curve of them), "endless" (it needs cycles or a duration to end).
 """
 
 from importlib import import_module
@@ -116,12 +115,12 @@ EFFECTS = {
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
-    "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "steady closed endless", module=""),
-    "drive.waveform=step": _wave("a(t) = a, or the base jumps by X: z(0) = -base X", ("", _SIZE), "closed endless"),
+    "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "steady endless", module=""),
+    "drive.waveform=step": _wave("a(t) = a, or the base jumps by X: z(0) = -base X", ("", _SIZE), "endless"),
     "drive.waveform=sweep": _wave("a(t) = a sin(2 pi int f dt), f' or f'/f constant",
                                   ("from to", f"rate log_rate {_SIZE}"), "steady"),
     "drive.waveform=levels": _wave("a(t) = a_k sin(2 pi f t), level after level", ("frequency levels", ""),
-                                   "steady closed endless"),
+                                   "steady endless"),
     "drive.waveform=file": _wave("a(t) straight between the rows of a table", ("file", "")),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.events", "closed form between events"),

@@ -1,8 +1,11 @@
 """Drives beyond the plain sine: steps, levels and releases in closed form, sweeps, recorded signals.
 
 Every drive has `period` [s] of what counts as its cycle, `moving` (the base accelerates; False: a force over the modal
-mass), `segments` (core.Segment, () where no closed form exists) and `values(t)` [m s-2]. One without segments has
-`largest` [m s-2], `fastest`, its highest frequency over that of its cycle, and `duration` [s], after which it ends.
+mass), `segments` (core.Segment, () where it is not made of constants and sines) and `values(t)` [m s-2]. One without
+segments has `largest` [m s-2], `fastest`, its highest frequency over that of its cycle, `duration` [s], after which it
+ends, and for the event engine its local series: `breaks` (k,) [s], where its formula changes; `series(number, time,
+unit, terms)` [m s-2] after `number` of them, in (t - time)/unit, exact to round-off for 27 terms where unit <= 2/rate;
+`rate` [1/s]; `phase(t)` [rad].
 `MADE` has the function that makes the drive of each waveform.
 """
 
@@ -11,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import PatchfemError, Segment
+from .drive_series import chirp, steady
 from .drive_sizes import Asked, level_cycles
 
 
@@ -80,6 +84,21 @@ class Sweep:
         return ()
 
     @property
+    def breaks(self) -> np.ndarray:
+        """The end of the sweep [s], from which on its frequency stays."""
+        return np.array([self.duration])
+
+    @property
+    def rate(self) -> float:
+        """Rate [1/s] that sets the reach of the local series: the highest frequency, or the sweep's own haste."""
+        haste = max(1.0, abs(np.log(self.high / self.low))) if self.logarithmic else 1.0
+        return max(2 * np.pi * max(self.low, self.high), 40 * haste / self.duration)
+
+    def series(self, number: int, time: float, unit: float, terms: int) -> np.ndarray:
+        """Drive (terms,) [m s-2] as a series in (t - time)/unit; number: 0 during the sweep, 1 after it."""
+        return (steady if number else chirp)(self, time, unit, terms)
+
+    @property
     def period(self) -> float:
         """Period [s] of the frequency at the end of the sweep."""
         return 1 / self.high
@@ -139,8 +158,32 @@ class Recorded:
 
     @property
     def segments(self) -> tuple:
-        """Empty, as a recorded signal is marched."""
+        """Empty, as a recorded signal is made of its rows."""
         return ()
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times [s] of the rows after the first, where the slope changes."""
+        return self.time[1:]
+
+    @property
+    def rate(self) -> float:
+        """Zero: a straight line is its own series."""
+        return 0.0
+
+    def phase(self, t):
+        """Phase 2 pi t/period [rad] in the cycle of the rig at times t (k,) [s]."""
+        return 2 * np.pi * np.asarray(t, float) / self.period
+
+    def series(self, number: int, time: float, unit: float, terms: int) -> np.ndarray:
+        """Drive (terms,) [m s-2] as a series in (t - time)/unit, between row `number` and the next; 0 after the last.
+        """
+        out = np.zeros(terms)
+        if number < len(self.time) - 1:
+            low, high = float(self.value[number]), float(self.value[number + 1])
+            slope = (high - low) / float(self.time[number + 1] - self.time[number])
+            out[0], out[1] = low + slope * (time - float(self.time[number])), slope * unit
+        return out
 
     @property
     def largest(self) -> float:

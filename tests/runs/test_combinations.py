@@ -142,7 +142,6 @@ def test_always_the_words_stand_in_few_files():
     (SHAKEN, [*STIFFENS, "accuracy.method=newmark"], "accuracy.method",
      "'newmark' beside [structure.stiffening]: use 'march'; not yet built"),
     (SHAKEN, [*STIFFENS, "accuracy.method=exact"], "accuracy.method", "exists beside [structure.stiffening]; use 'mar"),
-    (SHAKEN, [*WAVES[3], "accuracy.method=exact"], "accuracy.method", "exists under a drive of waveform 'sweep'; use"),
     (POINT + RUBS + SHAKEN, [*BONDS, "accuracy.method=duhamel"], "accuracy.method",
      "'duhamel' with law 'nonlocal': use 'march', or use law 'coulomb'"),
     (PATCH + RUBS + SHAKEN, [*SHEAR, "accuracy.method=euler"], "accuracy.method", "an interface as a whole, not [cont"),

@@ -65,8 +65,7 @@ def done(tmp_path_factory):
     return of
 
 
-CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES
-         if not (engine.startswith("exact") and drive in ("sweep", "file"))]
+CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES]
 
 
 @pytest.mark.parametrize(("engine", "drive"), CASES)

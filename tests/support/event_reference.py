@@ -1,11 +1,36 @@
 """An independent twin of the exact engine: DOP853 with events and accelerations by trying every choice."""
 
+from collections.abc import Callable
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from patchfem.core import ModalBasis
+
+
+class Stretch(NamedTuple):
+    """A smooth stretch of any drive: from `start` [s], value(t); amplitude: its largest, omega: its fastest."""
+
+    start: float
+    value: Callable
+    amplitude: float
+    omega: float
+    constant: float = 0.0
+
+
+def stretches(drive, count: int) -> list:
+    """The first stretches of a drive without segments, each with its own formula beyond its ends."""
+    starts = [0.0, *map(float, drive.breaks)][:count]
+
+    def value(number):
+        if hasattr(drive, "time"):  # straight lines, the same beyond the row
+            t, v = (part[number:number + 2] for part in (drive.time, drive.value))
+            return lambda x: v[0] + (v[1] - v[0]) / (t[1] - t[0]) * (x - t[0]) if len(t) == 2 else 0.0
+        return lambda x: float(drive.values(x))
+
+    return [Stretch(start, value(k), drive.largest, drive.rate) for k, start in enumerate(starts)]
 
 
 def choose(faces, mass, pull, active, signs, static, kinetic, tol):
@@ -36,6 +61,8 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12):
     scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
 
     def accel(part, t):
+        if isinstance(part, Stretch):
+            return part.value(t)
         return part.constant + part.amplitude * np.sin(part.omega * (t - part.start) + part.phase)
 
     def pull(part, t, z, v):

@@ -16,18 +16,19 @@ GRID = np.linspace(0.0, 1.0, 9)
 class Batch:
     """Pieces of a run in order, k of them.
 
-    time, span, unit, theta, cycle, first: (k,); coefs: (k, TERMS, n); drive: (k, 3) constant, amplitude, omega; signs,
-    held, forces: (k, f) of the faces that rub; push: (k, n); react: (k, f, n).
+    time, span, unit, cycle, first: (k,); coefs: (k, TERMS, n); constant: (k,) of the drive that is part of
+    `push`; base: (k, TERMS) series of the whole drive [m s-2]; signs, held, forces: (k, f) of the faces that rub; push:
+    (k, n); react: (k, f, n).
     """
 
     time: np.ndarray
     span: np.ndarray
     unit: np.ndarray
-    theta: np.ndarray
     cycle: np.ndarray
     first: np.ndarray
     coefs: np.ndarray
-    drive: np.ndarray
+    constant: np.ndarray
+    base: np.ndarray
     signs: np.ndarray
     held: np.ndarray
     forces: np.ndarray
@@ -54,18 +55,34 @@ class Batch:
 
     def acceleration(self, owner, tau):
         """Drive [m s-2] at tau (..., j) [s] after the starts of the pieces `owner` (...,)."""
-        constant, size, omega = (self.drive[owner, j] for j in range(3))
         lift = (slice(None),) + (None,) * (tau.ndim - 1)
-        return constant[lift] + size[lift] * np.sin(self.theta[owner][lift] + omega[lift] * tau)
+        u, series, out = tau / self.unit[owner][lift], self.base[owner], np.zeros(tau.shape)
+        for k in range(TERMS - 1, -1, -1):
+            out = out * u + series[:, k][lift]
+        return out
 
 
 def gather(pieces) -> Batch:
     """Collect pieces of `engine.Engine`, a list of them, into a Batch."""
     scalar = [np.array([getattr(p, name) for p in pieces])
-              for name in ("time", "span", "unit", "theta", "cycle", "first")]
-    rest = [np.array([getattr(p, name) for p in pieces], float)
-            for name in ("coefs", "drive", "signs", "held", "forces", "push")]
-    return Batch(*scalar, *rest, np.array([p.flow.react for p in pieces]))
+              for name in ("time", "span", "unit", "cycle", "first")]
+    coefs, *rest = [np.array([getattr(p, name) for p in pieces], float)
+                    for name in ("coefs", "signs", "held", "forces", "push")]
+    constant, base = _drives(pieces, scalar[2])
+    return Batch(*scalar, coefs, constant, base, *rest, np.array([p.flow.react for p in pieces]))
+
+
+def _drives(pieces, unit) -> tuple:
+    """Constant (k,) and series (k, TERMS) of the drives of pieces with units (k,)."""
+    if not isinstance(pieces[0].drive, tuple):
+        return np.zeros(len(pieces)), np.array([p.drive for p in pieces])
+    constant, size, omega, theta = np.array([(*p.drive, p.theta) for p in pieces], float).T
+    turn, base = omega * unit, np.zeros((len(pieces), TERMS))
+    for k in range(TERMS):
+        base[:, k] = size * np.sin(theta + k * np.pi / 2)
+        size = size * turn / (k + 1)
+    base[:, 0] += constant
+    return constant, base
 
 
 def join(batches) -> Batch:
@@ -111,7 +128,7 @@ def at(batch: Batch, owner, tau, times, modes: ModalBasis, drive, live) -> Respo
     free = -(z * modes.omega**2) - v @ np.asarray(modes.dampers).T
     forces, slides, rates = np.zeros((times.size, count)), z @ faces.T, v @ faces.T
     if len(live):
-        sine = base - batch.drive[owner, 0]
+        sine = base - batch.constant[owner]
         pull = free + batch.push[owner] - np.outer(sine, modes.base)
         forces[:, live] = batch.forces[owner] + np.einsum("jfn,jn->jf", batch.react[owner], pull)
         stuck = batch.signs[owner] == 0
@@ -161,7 +178,7 @@ def loop_of(batch: Batch, modes: ModalBasis, live) -> tuple:
     face = np.asarray(modes.interfaces, float)[0]
     slide, rate, force = z @ face, v @ face, np.zeros(tau.shape)
     if len(live) and live[0] == 0:
-        sine = batch.acceleration(np.arange(len(batch)), tau) - batch.drive[:, :1]
+        sine = batch.acceleration(np.arange(len(batch)), tau) - batch.constant[:, None]
         pull = -(z * modes.omega**2) - v @ np.asarray(modes.dampers).T + batch.push[:, None] \
             - sine[..., None] * modes.base
         force = batch.forces[:, :1] + np.einsum("kn,kjn->kj", batch.react[:, 0], pull)
@@ -210,7 +227,7 @@ def absolute(batch: Batch, modes: ModalBasis, moving: bool):
     out = batch.coefs @ modes.output
     series = np.zeros_like(out)
     series[:, :-2] = out[:, 2:] * (ORDER[2:] * (ORDER[2:] - 1)) / batch.unit[:, None]**2
-    return _with_sine(series, batch, 1.0, 1.0) if moving else series
+    return series + batch.base if moving else series
 
 
 def pushing(batch: Batch, modes: ModalBasis, face: int):
@@ -220,14 +237,6 @@ def pushing(batch: Batch, modes: ModalBasis, face: int):
     rate[:, :-1] = coefs[:, 1:] * ORDER[1:, None] / batch.unit[:, None, None]
     series -= np.einsum("kjn,kn->kj", coefs * modes.omega**2 + rate @ np.asarray(modes.dampers, float).T, react)
     series[:, 0] += batch.forces[:, face] + np.einsum("kn,kn->k", batch.push, react)
-    return _with_sine(series, batch, 0.0, -(react @ modes.base))
-
-
-def _with_sine(series, batch: Batch, constant: float, share):
-    """Series (k, TERMS) with `share` of the drive's sine and `constant` of its constant added."""
-    turn, size = batch.drive[:, 2] * batch.unit, batch.drive[:, 1] * share
-    series[:, 0] += constant * batch.drive[:, 0]
-    for k in range(TERMS):
-        series[:, k] += size * np.sin(batch.theta + k * np.pi / 2)
-        size = size * turn / (k + 1)
+    series -= batch.base * (react @ modes.base)[:, None]
+    series[:, 0] += batch.constant * (react @ modes.base)  # `push` has it
     return series

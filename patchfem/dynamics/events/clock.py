@@ -4,24 +4,29 @@ Neither loses digits in long runs: after a million cycles the phase is as exact 
 """
 
 from fractions import Fraction
-from math import pi, sin
+from math import cos, inf, pi, sin
 
 from ...core import PatchfemError
+from .signals import TERMS
 
 TURN = 2 * pi
 
 
-class Clock:
-    """Clock of an exact run: the cycle and the offset in it [s].
+def clock_of(drive, cycles: float):
+    """The clock of a run of `cycles` of a drive: a `Clock` for one in segments, a `SeriesClock` for any other."""
+    return (Clock if drive.segments else SeriesClock)(drive, cycles)
 
-    drive: with segments in closed form; cycles: length of the run. Borders are those of the drive's segments and the
-    end. PatchfemError for a drive without a closed form.
+
+class Clock:
+    """Clock of an exact run under constants and sines: the cycle and the offset in it [s].
+
+    drive: with segments; cycles: length of the run. Borders are those of the drive's segments and the end. entries: how
+    many numbers say what the drive does from here on, `drive_now`.
     """
 
+    entries = 3
+
     def __init__(self, drive, cycles: float):
-        if not drive.segments:
-            raise PatchfemError("accuracy.method: this drive has no closed form, so there is no exact solution; use "
-                                "method = \"march\"")
         self.period, self.cycle, self.offset = drive.period, 0, 0.0
         self.segments = [(self.place(s.start), s) for s in drive.segments]
         if self.segments[0][0] != (0, 0.0):
@@ -76,6 +81,16 @@ class Clock:
         return max((self.border[1] if self.border[0] == self.cycle else self.period) - self.offset, 0.0)
 
     @property
+    def rate(self) -> float:
+        """Fastest rate of the drive [1/s], 2 over which its series reaches."""
+        return max(self.omega, 1 / self.period)
+
+    def drive_now(self, unit: float) -> tuple:
+        """The drive from here on: its constant, and a sin and a cos of its phase [m s-2]."""
+        theta = self.cycle_phase + self.omega * self.offset
+        return self.constant, self.amplitude * sin(theta), self.amplitude * cos(theta)
+
+    @property
     def over(self) -> bool:
         """Whether the end is reached."""
         return (self.cycle, self.offset) >= self.end
@@ -92,3 +107,55 @@ class Clock:
             return True
         self.base_phase()
         return False
+
+
+class SeriesClock(Clock):
+    """Clock of an exact run under a drive that gives its local series: a sweep or a recorded signal.
+
+    drive: with `breaks`, `series`, `rate` and `phase` of `structure.drives`. A border is where its formula changes;
+    only one where its value jumps counts as an arrival.
+    """
+
+    entries = TERMS
+    omega = constant = amplitude = 0.0
+
+    def __init__(self, drive, cycles: float):
+        self.period, self.cycle, self.offset = drive.period, 0, 0.0
+        self.drive, self.breaks, self.number = drive, drive.breaks, 0
+        self.end, self.memo = self.place(cycles * self.period), (None, None)
+        self._next()
+
+    def _next(self) -> None:
+        at = self.place(float(self.breaks[self.number])) if self.number < len(self.breaks) else (inf, 0.0)
+        self.border = min(at, self.end)
+
+    def drive_now(self, unit: float) -> tuple:
+        """The drive from here on as a series (TERMS,) [m s-2] in the time from now over `unit`."""
+        key = self.number, self.cycle, self.offset, unit
+        if self.memo[0] != key:
+            self.memo = key, self.drive.series(self.number, self.time, unit, TERMS)
+        return self.memo[1]
+
+    @property
+    def rate(self) -> float:
+        """Fastest rate of the drive [1/s], 2 over which its series reaches."""
+        return max(self.drive.rate, 1 / self.period)
+
+    @property
+    def theta(self) -> float:
+        """Phase of the drive [rad], in [0, 2 pi)."""
+        return float(self.drive.phase(self.time)) % TURN
+
+    def arrive(self) -> bool:
+        """Step onto the border or the end of the cycle just reached; True where the drive jumps there."""
+        if self.border[0] == self.cycle:
+            self.offset = self.border[1]
+        else:
+            self.cycle, self.offset = self.cycle + 1, 0.0
+        if (self.cycle, self.offset) != self.border or self.border == self.end:
+            return False
+        time = float(self.breaks[self.number])
+        before, after = (float(self.drive.series(self.number + k, time, self.period, TERMS)[0]) for k in (0, 1))
+        self.number += 1
+        self._next()
+        return abs(after - before) > 1e-12 * max(abs(before), abs(after))

@@ -6,12 +6,12 @@ released the terms that are zero there (velocity; acceleration too, at the kinet
 """
 
 from dataclasses import dataclass
-from math import asin, cos, inf, pi, sin
+from math import asin, inf, pi
 
 import numpy as np
 
 from ...core import ModalBasis, NotConverged, PatchfemError, Start
-from .clock import TURN, Clock
+from .clock import TURN, clock_of
 from .event_list import BORDER, Recorder, kind_of
 from .signals import EPS, ONE, ORDER, TERMS, first_root
 from .stick_sets import NOISE, Entry, StickSet, System, settle
@@ -21,10 +21,10 @@ from .stick_sets import NOISE, Entry, StickSet, System, settle
 class Piece:
     """A stretch of motion `span` [s] long from `time`: z(t) = sum coefs[k] ((t - time)/unit)^k, coefs (TERMS, n).
 
-    drive: (constant, amplitude, omega), theta its phase at the start; signs (i,) of slip, 0 stuck (at `held` [m]);
-    forces (i,) [N] of the faces that do not stick; push (n,) [m/s2] as in StickSet; flow: the StickSet; first: an
-    event stands at its start; ends: the event at its end, (face, sign of the slip that a release starts, 0: a stop), or
-    None.
+    drive: (constant, amplitude, omega) of a sine, or its series (TERMS,) [m/s2]; theta its phase at the start; signs
+    (i,) of slip, 0 stuck (at `held` [m]); forces (i,) [N] of the faces that do not stick; push (n,) [m/s2] as in
+    StickSet; flow: the StickSet; first: an event stands at its start; ends: the event at its end, (face, sign of the
+    slip that a release starts, 0: a stop), or None.
     """
 
     time: float
@@ -33,7 +33,7 @@ class Piece:
     span: float
     unit: float
     coefs: np.ndarray
-    drive: tuple
+    drive: tuple | np.ndarray
     signs: tuple
     held: np.ndarray
     forces: np.ndarray
@@ -61,8 +61,9 @@ class Engine:
         self.live = np.flatnonzero(self.static > 0)
         self.faces = faces[self.live]
         self.limit = self.static[self.live]
-        self.system = System(modes, self.faces, self.limit, self.kinetic[self.live])
-        self.clock, self.recorder, self.modes = Clock(drive, cycles), Recorder(), modes
+        self.clock, self.recorder, self.modes = clock_of(drive, cycles), Recorder(), modes
+        self.system = System(modes, self.faces, self.limit, self.kinetic[self.live], self.clock.entries)
+        self.sine = bool(drive.segments)
         n = modes.omega.size
         self.n = n
         self.z, self.v = (np.zeros(n), np.zeros(n)) if start is None else (np.array(start.z, float),
@@ -98,10 +99,10 @@ class Engine:
                 clock.offset, first = clock.offset + piece.span, False
             self._keep()
 
-    def _sine(self) -> tuple:
-        clock = self.clock
-        theta = clock.cycle_phase + clock.omega * clock.offset
-        return clock.amplitude * sin(theta), clock.amplitude * cos(theta)
+    @property
+    def omega(self) -> float | None:
+        """Angular frequency [rad/s] of a sine, None for a drive that gives its series."""
+        return self.clock.omega if self.sine else None
 
     def _resting(self, piece) -> list:
         """Faces without slip velocity after a piece: the stuck ones and those whose velocity is round-off."""
@@ -116,15 +117,15 @@ class Engine:
     def _enter(self, guess, resting) -> None:
         """Choose what every face does from here on, the ones `resting` having no slip velocity."""
         clock, before, system = self.clock, self.signs, self.system
-        self.unit = system.unit(clock.omega, clock.period)
+        self.unit = system.unit(clock.rate)
         if resting:
-            rest = system.stick_set(tuple(c in resting for c in range(len(guess))), clock.omega, self.unit)
+            rest = system.stick_set(tuple(c in resting for c in range(len(guess))), self.omega, self.unit)
             self.v = rest.project @ self.v
             resting = [c for c, tied in enumerate(rest.tied) if tied or c in resting]
-        entry = Entry(system, self.z, self.v, clock.constant, *self._sine())
-        self.choice = settle(system, entry, guess, resting, clock.omega, self.unit)
+        entry = Entry(system, self.z, self.v, *clock.drive_now(self.unit))
+        self.choice = settle(system, entry, guess, resting, self.omega, self.unit)
         signs = tuple(0 if h else s for s, h in zip(self.choice.signs, self.choice.held))
-        self.flow = system.stick_set(tuple(s == 0 for s in self.choice.signs), clock.omega, self.unit)
+        self.flow = system.stick_set(tuple(s == 0 for s in self.choice.signs), self.omega, self.unit)
         self.push = system.push(self.choice.given) - system.base * clock.constant
         slide, self.held = self.faces @ self.z, self.held.copy()
         for c, (old, new) in enumerate(zip(before, signs)):
@@ -157,15 +158,14 @@ class Engine:
         self._enter(tuple(guess), resting)
 
     def _fill(self):
-        """Current vector (v, pull, sine, cosine) of the motion."""
-        return self.system.rows @ np.concatenate((self.z, self.v, (self.clock.constant, *self._sine()),
-                                                  self.choice.given))
+        """Current vector (v, pull, drive) of the motion."""
+        return self.system.rows @ np.concatenate((self.z, self.v, self.clock.drive_now(self.unit), self.choice.given))
 
     def _piece(self, first: bool) -> tuple:
         """Next Piece and the event at its end: (face, sign of its slip after it as first guess) or None."""
         clock, flow, n = self.clock, self.flow, self.n
         span, event = min(self.unit, clock.left), None
-        if flow.frozen:
+        if flow.frozen and self.sine:
             coefs = np.zeros((TERMS, n))
             wait, face, sign = self._release()
             if wait < span:
@@ -188,9 +188,9 @@ class Engine:
                     if when < span or (when == span and event is None):
                         span, event = when, (c, sign)
         coefs[0] = self.z
-        piece = Piece(clock.time, clock.cycle, clock.theta, span, self.unit, coefs,
-                      (clock.constant, clock.amplitude, clock.omega), self.signs, self.held, self.choice.given,
-                      self.push, flow, first, event)
+        drive = (clock.constant, clock.amplitude, clock.omega) if self.sine else clock.drive_now(self.unit)
+        piece = Piece(clock.time, clock.cycle, clock.theta, span, self.unit, coefs, drive, self.signs, self.held,
+                      self.choice.given, self.push, flow, first, event)
         self.orders = {}
         return piece, event
 

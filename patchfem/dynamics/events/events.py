@@ -1,4 +1,4 @@
-"""Coulomb friction exactly from event to event: any modes, any number of interfaces, sines, constants and free motion.
+"""Coulomb friction exactly from event to event: any modes, any number of interfaces, any drive and free motion.
 
 Between events the motion is the exponential of its linear system, summed to round-off piece by piece (signals,
 stick_sets); `run` gives it as phases, one from each event to the next.
@@ -44,10 +44,13 @@ class Phase:
 
 def _reaction(piece, row: int, system):
     """Series (TERMS,) of the friction [N] of a stuck face."""
-    sine, cosine = (piece.drive[1] * f(piece.theta) for f in (sin, cos))
+    if isinstance(piece.drive, tuple):
+        now, later = piece.drive[1] * sin(piece.theta), [piece.drive[1] * f(piece.theta) for f in (sin, cos)]
+    else:
+        now, later = piece.drive[0], piece.drive[1:]
     v = piece.coefs[1] / piece.unit
-    pull = piece.push - system.square * piece.coefs[0] - system.dampers @ v - system.base * sine
-    return piece.flow.watch[row] @ np.concatenate([v, pull, [sine, cosine]])
+    pull = piece.push - system.square * piece.coefs[0] - system.dampers @ v - system.base * now
+    return piece.flow.watch[row] @ np.concatenate([v, pull, later])
 
 
 def _phase(pieces, count: int, live, system) -> Phase:

@@ -48,7 +48,7 @@ def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: i
     """Run `cycles` drive cycles from rest or `start` with friction forces [N]; keeps the last `window` cycles whole.
 
     static, kinetic: one for every interface or (i,). The outcome is set only where the output passes `travel` [m]; the
-    run ends there. PatchfemError for a drive without closed form.
+    run ends there.
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
@@ -214,12 +214,12 @@ def _largest(series, share) -> float:
 
 def _shift(batch, gone: float):
     """The first piece of a batch begun `gone` [s] later."""
-    coefs, time, span, theta = (getattr(batch, n).copy() for n in ("coefs", "time", "span", "theta"))
+    coefs, base, time, span = (getattr(batch, n).copy() for n in ("coefs", "base", "time", "span"))
     x, size = gone / batch.unit[0], batch.coefs.shape[1]
     move = np.array([[comb(k, j) * x**(k - j) if k >= j else 0.0 for k in range(size)] for j in range(size)])
-    coefs[0] = move @ coefs[0]
-    time[0], span[0], theta[0] = time[0] + gone, span[0] - gone, theta[0] + batch.drive[0, 2] * gone
-    new = {"coefs": coefs, "time": time, "span": span, "theta": theta}
+    coefs[0], base[0] = move @ coefs[0], move @ base[0]
+    time[0], span[0] = time[0] + gone, span[0] - gone
+    new = {"coefs": coefs, "base": base, "time": time, "span": span}
     return type(batch)(*(new.get(name, getattr(batch, name)) for name in type(batch).__slots__))
 
 

@@ -18,11 +18,12 @@ FEW, MANY = 4, 8  # interfaces at rest up to which every choice is tried at once
 
 
 class StickSet:
-    """Series of a motion with the faces of `mask` stuck, as linear maps of (v, pull, sine, cosine).
+    """Series of a motion with the faces of `mask` stuck, as linear maps of (v, pull, drive), 2n + d numbers.
 
     pull (n,) [m/s2] at the piece's start, friction of the slipping faces included: small accelerations keep their
-    digits, as they would not if every term were built from z. sine, cosine [m/s2]: a sin and a cos of the drive's
-    phase there. motion (TERMS, n, 2n + 2), its first term without z; watch (i, TERMS, 2n + 2): reaction [N] of a stuck
+    digits, as they would not if every term were built from z. drive [m/s2]: of a sine of angular frequency omega a sin
+    and a cos of its phase there, d = 2; with omega None the coefficients of its series from the second on, d = TERMS -
+    1. motion (TERMS, n, 2n + d), its first term without z; watch (i, TERMS, 2n + d): reaction [N] of a stuck
     face, slip rate [m/s] of another; hull: the same in Bernstein form. pinv (n, s), react (i, n): slides to
     coordinates, pull to reactions. tied (i,): faces that the stuck ones hold.
     """
@@ -30,7 +31,7 @@ class StickSet:
     __slots__ = ("flat", "frozen", "hull", "mask", "motion", "pinv", "project", "react", "size", "stuck", "tied",
                  "watch")
 
-    def __init__(self, system, mask: tuple, omega: float, unit: float):
+    def __init__(self, system, mask: tuple, omega: float | None, unit: float):
         faces, n, mass = system.faces, system.n, system.mass
         stuck = [c for c, held in enumerate(mask) if held]
         rows = faces[stuck]
@@ -50,53 +51,66 @@ class StickSet:
         rate = move[1:TERMS + 1] * ((ORDER + 1) / unit)[:, None, None]
         self.watch = np.stack([np.einsum("n,knj->kj", self.react[c], pull) if held else
                                np.einsum("n,knj->kj", faces[c], rate) for c, held in enumerate(mask)]) \
-            if mask else np.zeros((0, TERMS, 2 * n + 2))
+            if mask else np.zeros((0, TERMS, move.shape[2]))
         self.size = np.abs(self.watch)
         self.hull = np.einsum("bk,ckj->cbj", BERNSTEIN, self.watch)
-        self.flat = np.concatenate([self.motion.reshape(-1, 2 * n + 2), self.hull.reshape(-1, 2 * n + 2)])
+        width = move.shape[2]
+        self.flat = np.concatenate([self.motion.reshape(-1, width), self.hull.reshape(-1, width)])
 
-    def _series(self, system, omega: float, unit: float) -> tuple:
-        """Series of the motion (TERMS + 2, n, 2n + 2) and of the pull (TERMS, n, 2n + 2)."""
-        n = system.n
-        pull = np.zeros((TERMS, n, 2 * n + 2))
-        move = np.zeros((TERMS + 2, n, 2 * n + 2))
+    def _series(self, system, omega: float | None, unit: float) -> tuple:
+        """Series of the motion (TERMS + 2, n, 2n + d) and of the pull (TERMS, n, 2n + d)."""
+        n, drive = system.n, _drive_series(omega, unit)
+        pull = np.zeros((TERMS, n, 2 * n + drive.shape[1]))
+        move = np.zeros((TERMS + 2, n, pull.shape[2]))
         move[1, :, :n] = np.eye(n) * unit
-        drive, turn = [(-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)], omega * unit
         pull[0, :, n:2 * n] = np.eye(n)
         for k in range(TERMS):
             if k:
                 pull[k] = -system.square[:, None] * move[k] - system.dampers @ move[k + 1] * ((k + 1) / unit)
-                pull[k, :, 2 * n:] += turn * np.outer(system.base, drive[k % 4])
-                turn *= omega * unit / (k + 1)
+                pull[k, :, 2 * n:] -= np.outer(system.base, drive[k])
             move[k + 2] = self.project @ pull[k] * (unit * unit / ((k + 1) * (k + 2)))
         return move, pull
+
+
+def _drive_series(omega: float | None, unit: float) -> np.ndarray:
+    """Series (TERMS, d) of the drive after its value at first, per number that says what it does (see StickSet)."""
+    if omega is None:
+        return np.eye(TERMS)[:, 1:]
+    out, turn = np.zeros((TERMS, 2)), 1.0
+    for k in range(TERMS):
+        out[k] = turn * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][k % 4])
+        turn *= omega * unit / (k + 1)
+    return out
 
 
 class System:
     """Equations of motion of a basis with its interfaces that rub, and the stick sets met so far.
 
-    faces (i, n), static, kinetic (i,) [N] of the interfaces with friction.
+    faces (i, n), static, kinetic (i,) [N] of the interfaces with friction; entries: numbers that say what the drive
+    does, 3 of a sine (its constant, a sin, a cos) or the TERMS coefficients of its series.
     """
 
-    def __init__(self, modes, faces, static, kinetic):
+    def __init__(self, modes, faces, static, kinetic, entries: int = 3):
         self.n, self.mass = modes.omega.size, modes.mass
         self.square, self.dampers, self.base = modes.omega**2, np.asarray(modes.dampers, float), modes.base
         self.faces, self.static, self.kinetic = faces, static, kinetic
         damper = float(np.linalg.norm(self.dampers, 2)) if self.n else 0.0
         self.fastest = float(damper + np.sqrt(damper**2 + 4 * self.square.max())) / 2
         n, self._sets, self._push = self.n, {}, -faces.T / self.mass
-        self.given = slice(2 * n + 3, 2 * n + 3 + len(faces))
-        self.rows = np.zeros((2 * n + 2, self.given.stop))
+        self.given = slice(2 * n + entries, 2 * n + entries + len(faces))
+        self.rows = np.zeros((2 * n + entries - 1, self.given.stop))
         self.rows[:n, n:2 * n] = np.eye(n)
-        pull = np.concatenate([-np.diag(self.square), -self.dampers, np.outer(-self.base, [1, 1, 0]), self._push], 1)
-        self.rows[n:2 * n], self.rows[2 * n, 2 * n + 1], self.rows[2 * n + 1, 2 * n + 2] = pull, 1, 1
+        now = np.array([1, 1, 0]) if entries == 3 else np.eye(entries)[0]  # what of the drive acts at once
+        self.rows[n:2 * n] = np.concatenate([-np.diag(self.square), -self.dampers, np.outer(-self.base, now),
+                                             self._push], 1)
+        self.rows[2 * n:, 2 * n + 1:self.given.start] = np.eye(entries - 1)
         self.sizes = np.abs(self.rows)
 
-    def unit(self, omega: float, period: float) -> float:
-        """Length of a piece [s] under a drive of angular frequency omega."""
-        return REACH / max(self.fastest, omega, 1 / period)
+    def unit(self, rate: float) -> float:
+        """Length of a piece [s] under a drive of this rate [1/s]."""
+        return REACH / max(self.fastest, rate)
 
-    def stick_set(self, mask: tuple, omega: float, unit: float) -> StickSet:
+    def stick_set(self, mask: tuple, omega: float | None, unit: float) -> StickSet:
         """The (cached) stick set; mask: a bool per face."""
         key = mask, omega, unit
         if key not in self._sets:
@@ -111,14 +125,14 @@ class System:
 class Entry:
     """Input of a choice: the motion just after an event.
 
-    vector: (2n + 2,) = (v, pull without friction, sine, cosine); size: (2n + 2,) the magnitudes it was added from,
-    which set its round-off.
+    vector: (2n + d,) = (v, pull without friction, drive) of a StickSet; size: (2n + d,) the magnitudes it was added
+    from, which set its round-off. drive: what it does from here on, as `Clock.drive_now` gives it.
     """
 
     __slots__ = ("size", "vector")
 
-    def __init__(self, system, z, v, constant, sine, cosine):
-        state = np.concatenate((z, v, (constant, sine, cosine)))
+    def __init__(self, system, z, v, *drive):
+        state = np.concatenate((z, v, drive))
         end = state.size
         self.vector, self.size = system.rows[:, :end] @ state, system.sizes[:, :end] @ np.abs(state)
 
@@ -141,7 +155,7 @@ class Choice:
         self.signs, self.held, self.given, self.orders = signs, held, given, orders
 
 
-def settle(system: System, entry: Entry, signs, resting, omega: float, unit: float) -> Choice:
+def settle(system: System, entry: Entry, signs, resting, omega: float | None, unit: float) -> Choice:
     """Find the state of the faces just after an event.
 
     The faces `resting` have v = 0. signs: the first guess, for the others their slip. A choice holds when every stuck

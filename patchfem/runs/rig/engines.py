@@ -14,6 +14,7 @@ from ...model.model import Model
 from ...response.coarser import Rung, space_rung
 from ...response.errors import change, step_error
 from ...scene.rules import methods
+from ..effort import too_long
 
 
 class Variant(NamedTuple):
@@ -55,6 +56,11 @@ def no_closed_form(model: Model, steady: bool = False) -> str:
     waveform = "" if steady or rig.kind == "free" else rig.waveform
     return methods.no_closed_form(laws, model.soft, "under a load that changes" if rig.load_varies else "",
                                   rig.strips_slide_apart, waveform, spring)
+
+
+def _not_exact(model: Model) -> str:
+    """Why a run is better not exact; empty where it has an exact solution that costs no more than it is worth."""
+    return no_closed_form(model) or too_long(model)
 
 
 def set_valued(model: Model, numerics) -> bool:
@@ -134,7 +140,7 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
     return [Rung((), lambda fine: solution.errors)]
 
 
-EXACT = Engine("exact", no_closed_form, "exact run_exact", _no_rungs, _exact_in_space)
+EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
 HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0)
 COMPARED = ("duhamel", "newmark", "euler")

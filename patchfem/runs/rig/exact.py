@@ -1,4 +1,4 @@
-"""The exact engine of a rig: Coulomb friction from event to event, one mode by its own fast engine."""
+"""The exact engine of a rig: Coulomb friction from event to event, one mode under sines by its own fast engine."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -77,7 +77,7 @@ def _over_strips(done, patch):
 
 def _go(rig, drive, forces, cycles: float, window: int, start, progress, say):
     modes, travel = rig.modes, rig.travel
-    if modes.omega.size == 1 and len(modes.interfaces) == 1:
+    if modes.omega.size == 1 and len(modes.interfaces) == 1 and drive.segments:
         fast = cycles > sdof.COMPILED_FROM
         if fast:
             sdof.kernels(True, say)

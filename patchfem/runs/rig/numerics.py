@@ -9,10 +9,10 @@ from ...core import Missing
 from ...effects import has
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
-from ...structure.drive_sizes import fastest, omega_of, sinusoidal
+from ...structure.drive_sizes import omega_of, sinusoidal
+from ..effort import steps_per_cycle
 from .engines import COMPARED, engine_of
 
-MOST_STEPS = 6400  # finest automatic march, steps per cycle
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
@@ -40,12 +40,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     window = int(max(1, min(10, rig.cycles // 10)))
     if rig.levels:
         window = min(window, int(rig.level_cycles))
-    quickest = max(fastest(drive), float(rig.frequencies.max()) * drive.period)
-    if model.load_varies:
-        quickest = max(quickest, model.point.frequency * drive.period)
-    # errors fall with the square of the step; 400 steps per cycle of the fastest motion give about 1e-3
-    steps = accuracy.steps_per_cycle or int(np.clip(
-        2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * quickest), 100, MOST_STEPS))
+    steps = steps_per_cycle(model)
     if accuracy.steps_per_cycle is None and engine == "march":
         steps = max(steps, unique_steps(model))
     if not sinusoidal(drive) and accuracy.steps_per_cycle is None:

@@ -7,6 +7,7 @@ from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
+from ..effort import exact_effort
 from .numerics import choose, list_cost, quadrature_of
 
 
@@ -19,8 +20,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     """Engine, steps of all passes and seconds of a coupled run."""
     numerics, rig, f, soft = choose(model, per_point), model.rig, model.friction, bool(model.soft)
     if numerics.engine == "exact":
-        each = 1e-4 if unknowns["modes"] == 1 else 4e-4 + 1e-4 * unknowns["modes"]
-        return "exact", int(4 * numerics.cycles), each * numerics.cycles
+        return "exact", *exact_effort(model)
     if numerics.engine == "harmonic":
         points = 1 if rig.waveform == "sine" else 120
         return "harmonic", points, 0.3 + 0.05 * points

@@ -13,13 +13,14 @@ from ...response.outcome import changing_note, settle
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
 from ..bench.averaged import limit_tractions
+from ..effort import MOST_STEPS, refuse_endless
 from ..results.notes import creeping, two_books, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors
-from .numerics import MOST_STEPS, choose, refuse_costly
+from .numerics import choose, refuse_costly
 from .solution import curve_measures
 
 
@@ -39,6 +40,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
                     "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear]"]
     if numerics.engine == "march":
         refuse_costly(model, numerics)
+    if numerics.engine == "exact":
+        refuse_endless(model)
     raw, numerics, found = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
     extra |= raw.extra
     drive = extra.pop("at", drive)

@@ -94,7 +94,8 @@ def beside_load(cause: str) -> str:
 def no_closed_form(laws: list, soft: str, varies: str, apart: bool, waveform: str, spring: str) -> str:
     """Why a run has no exact solution; empty where it has one.
 
-    laws: names; waveform: "" where the engine drives by sines of its own; the others as in a Motion.
+    laws: names; waveform: "" where the engine drives by sines of its own; the others as in a Motion. Constants and
+    sines have closed forms, and a sweep or the rows of a record have series between the events.
     """
     odd = next((law for law in laws if "exact" not in LAWS[law].carries.split()), laws[0] if soft and laws else "")
     if odd:
@@ -103,8 +104,6 @@ def no_closed_form(laws: list, soft: str, varies: str, apart: bool, waveform: st
         return varies
     if apart and waveform == "levels":
         return "beside strips that yaw, level by level"
-    if waveform in WAVEFORMS and not waves(waveform, "closed"):
-        return f"under a drive of waveform '{waveform}'"
     return f"beside {spring}" if spring else ""
 
 

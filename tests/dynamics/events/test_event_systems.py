@@ -439,11 +439,6 @@ def test_exact_figure_16_range_after_3900():
     assert done.window.slide.min() == pytest.approx(-0.39299347, abs=2e-8)
 
 
-def test_refuses_drives_without_closed_form():
-    with pytest.raises(PatchfemError, match='use method = "march"'):
-        simulate(basis_of(1.0), drives.Sweep(1.0, 2.0, 5.0, 1.0), 1.0, 1.0, 3)
-
-
 def test_refuses_a_start_beyond_the_travel():
     with pytest.raises(PatchfemError, match=r"structure\.travel"):
         simulate(basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1)))

@@ -1,0 +1,181 @@
+"""The event engine under drives that give their local series: sweeps and recorded signals, against mpmath, DOP853 with
+events, the sine engine and the conservation of energy."""
+
+import mpmath
+import numpy as np
+import pytest
+from event_reference import basis_of, random_basis, run_reference, stretches
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from patchfem.core import BaseSine, Outcome, Start
+from patchfem.dynamics.events.event_list import BORDER
+from patchfem.dynamics.events.events import run
+from patchfem.dynamics.events.histories import simulate
+from patchfem.dynamics.events.signals import REACH, TERMS
+from patchfem.response.measures import energy_balance
+from patchfem.structure.drive_series import waves
+from patchfem.structure.drives import Recorded, Sweep
+
+SWEEPS = [Sweep(0.1, 0.3, 30.0, 1.0), Sweep(0.3, 0.1, 20.0, 1.0, None, True), Sweep(0.08, 0.4, 25.0, 0.0, 0.6),
+          Sweep(0.4, 0.05, 25.0, 0.0, 0.6, True), Sweep(0.05, 0.5, 0.5, 1.0), Sweep(1.0, 20.0, 9.0, 1.0, None, True)]
+
+
+class SeriesOfSine:
+    """A sine that hides its closed form."""
+
+    segments, breaks, moving, fastest = (), np.array([]), True, 1.0
+
+    def __init__(self, size, omega):
+        self.size, self.rate, self.period, self.largest = size, omega, 2 * np.pi / omega, size
+
+    def phase(self, t):
+        return self.rate * np.asarray(t, float)
+
+    def series(self, number, time, unit, terms):
+        return self.size * waves([self.rate * time % (2 * np.pi), self.rate * unit], terms)[0]
+
+    def values(self, t):
+        return self.size * np.sin(self.rate * np.asarray(t))
+
+
+def record(seed, rows=40, end=30.0):
+    rng = np.random.default_rng(seed)
+    time = np.sort(np.concatenate([[0.0, end], rng.uniform(0, end, rows - 2)]))
+    return Recorded(time, np.concatenate([[0.0], rng.normal(size=rows - 2), [0.7]]), 5.0)
+
+
+# the drive's own series
+
+def truth_of(sweep, t):
+    """The value of a sweep with 40 digits."""
+    mp = mpmath.mp
+    low, high, span, t = (mp.mpf(x) for x in (sweep.low, sweep.high, sweep.duration, t))
+    s = min(t, span)
+    rate = mp.log(high / low) / span
+    hertz = low * mp.exp(rate * s) if sweep.logarithmic else low + (high - low) * s / span
+    turns = low * mp.expm1(rate * s) / rate if sweep.logarithmic else s * (low + (high - low) * s / (2 * span))
+    turns += (t - s) * high
+    size = sweep.acceleration if sweep.displacement is None else sweep.displacement * (2 * mp.pi * hertz)**2
+    return size * mp.sin(2 * mp.pi * turns)
+
+
+@pytest.mark.parametrize("sweep", SWEEPS)
+def test_exact_series_of_a_sweep(sweep):
+    unit = REACH / sweep.rate
+    with mpmath.workdps(40):
+        for start, number in ((0.0, 0), (0.37 * sweep.duration, 0), (sweep.duration - unit, 0), (sweep.duration, 1)):
+            series = sweep.series(number, start, unit, TERMS)
+            for u in (0.0, 0.4, 0.99):
+                wanted = float(truth_of(sweep, start + u * unit))
+                grown = 2e-14 * sweep.largest * max(1, start * sweep.rate / 9)  # round-off of the phase
+                assert abs(np.polyval(series[::-1], u) - wanted) < grown
+
+
+def test_exact_series_of_a_record_is_what_it_gives_at_any_time():
+    drive = record(5)
+    for number, (t0, t1) in enumerate(zip(drive.time, drive.time[1:])):
+        t, u = t0 + 0.3 * (t1 - t0), np.array([0.0, 0.5, 1.0])
+        series = drive.series(number, t, t1 - t, 5)
+        np.testing.assert_allclose(np.polyval(series[::-1], u[:2]), drive.values(t + u[:2] * (t1 - t)), atol=1e-14)
+    assert not drive.series(len(drive.time) - 1, 31.0, 1.0, 5).any()
+
+
+# the motion
+
+@pytest.mark.parametrize("omegas, slides, ratio, faces", [
+    ([1.0], [1.0], 1.0, 1), ([1.0], [1.0], 0.4, 1), ([1.0, 2.3, 4.0], [1.0, 0.5, 0.3], 0.5, 1), (None, None, 0.6, 2)])
+def test_exact_a_sine_as_a_series_moves_like_the_sine(omegas, slides, ratio, faces):
+    modes = random_basis(np.random.default_rng(3), 3, 2) if omegas is None else \
+        basis_of(omegas, 0.003, [slides])
+    static = np.full(faces, 0.7)
+    one, two = (simulate(modes, drive, static, ratio * static, 12, 6)
+                for drive in (BaseSine(1.0, 1.0), SeriesOfSine(1.0, 1.0)))
+    size = np.abs(one.amplitudes).max()
+    np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=0, atol=1e-11 * size)
+    np.testing.assert_allclose(two.phasors, one.phasors, rtol=0, atol=1e-11 * size)
+    np.testing.assert_array_equal(two.log.what, one.log.what)
+    np.testing.assert_allclose(two.log.time, one.log.time, rtol=0, atol=1e-11)
+    np.testing.assert_allclose([two.ledger[k] for k in one.ledger], list(one.ledger.values()), rtol=1e-11, atol=1e-11)
+    assert two.acceleration == pytest.approx(one.acceleration, rel=1e-11)
+    assert two.stick == pytest.approx(one.stick, abs=1e-9)
+    np.testing.assert_allclose(two.force_peaks, one.force_peaks, rtol=1e-11)
+    np.testing.assert_allclose(np.interp(one.window.time, two.window.time, two.window.base_acceleration),
+                               one.window.base_acceleration, atol=1e-4)
+    wanted = [np.sum(w * f * v) for _, w, _, v, f in (one.loop, two.loop)]
+    assert wanted[0] == pytest.approx(wanted[1], rel=1e-11)
+
+
+def agrees(modes, drive, static, ratio, end, count):
+    """Events and states of a run against DOP853 with events; count: stretches of the drive that it meets."""
+    n = modes.omega.size
+    wanted = run_reference(modes, stretches(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n))
+    found = [p for p in run(modes, drive, static, ratio * static, end) if p.span > 1e-9]
+    assert len(found) > 4
+    times, states = [w[0] for w in wanted], np.array([w[2] for w in wanted])
+    size = np.abs(states).max()
+    for phase in found:
+        k = int(np.argmin(np.abs(np.array(times) - phase.time)))
+        assert abs(times[k] - phase.time) < 1e-9
+        np.testing.assert_allclose([s(0.0) for s in phase.modal], states[k], rtol=0, atol=1e-9 * size)
+    np.testing.assert_allclose([s(found[-1].span) for s in found[-1].modal], states[-1], rtol=0, atol=1e-9 * size)
+
+
+@pytest.mark.parametrize("number, ratio, faces", [(0, 1.0, 1), (3, 0.5, 2)])
+def test_exact_sweeps_against_dop853(number, ratio, faces):
+    modes = random_basis(np.random.default_rng(number), 2, faces)
+    agrees(modes, SWEEPS[number], np.full(faces, 0.4 if number == 0 else 0.15), ratio, 35.0 if number == 0 else 14.0, 2)
+
+
+def test_exact_records_against_dop853():
+    modes = random_basis(np.random.default_rng(8), 2, 1)
+    agrees(modes, record(2, 20, 20.0), np.array([0.25]), 0.6, 24.0, 99)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_exact_random_rigs_under_sweeps_and_records_against_dop853(seed):
+    rng = np.random.default_rng(100 + seed)
+    faces = int(rng.integers(1, 3))
+    modes = random_basis(rng, int(rng.integers(faces, 4)), faces)
+    drive = SWEEPS[seed % 4] if seed % 2 else record(seed)
+    agrees(modes, drive, rng.uniform(0.1, 0.6, faces), rng.uniform(0.3, 1.0), 35.0, 99)
+
+
+def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
+    """A rigid block without spring: it slips while the ramp is above the limit, in closed form."""
+    drive = Recorded(np.array([0.0, 1.0, 2.0]), np.array([0.0, -2.0, -2.0]), 1.0)
+    # from t = .5 on v = t^2 - t/2, from t = 1 on v = .5 + 1.5 (t - 1), from t = 2 on v = 2 - .5 (t - 2)
+    wanted = {0.5: 0.0, 1.0: 5 / 48, 2.0: 5 / 48 + 1.25, 6.0: 5 / 48 + 5.25, 9.0: 5 / 48 + 5.25}
+    for time, slide in wanted.items():
+        done = simulate(basis_of([0.0]), drive, 1.0, 0.5, time, 1)
+        assert done.response.slide[-1] == pytest.approx(slide, rel=1e-13)
+    np.testing.assert_allclose(done.log.time, [0.5, 2.0, 6.0], rtol=1e-13)  # release, the end of the record, stop
+
+
+def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():
+    done = simulate(basis_of([1.0]), record(4), 5.0, 5.0, 8.0, 2)
+    assert list(done.log.what) == [BORDER] and done.log.time[0] == pytest.approx(30.0)
+
+
+def test_always_the_energy_of_a_sweep_and_a_record_balances():
+    for drive in (SWEEPS[1], record(7)):
+        modes = random_basis(np.random.default_rng(1), 3, 2)
+        done = simulate(modes, drive, np.array([0.3, 0.2]), np.array([0.2, 0.2]), 40.0 / drive.period)
+        assert energy_balance(done.ledger) < 1e-12 and done.ledger["friction"] > 0
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.2, 0.9), st.floats(0.05, 1.0), st.integers(0, 10**6))
+def test_always_a_record_of_a_force_never_beyond_the_limit_moves_nothing(size, start, seed):
+    rng = np.random.default_rng(seed)
+    value = size * rng.uniform(-1, 1, 12)
+    drive = Recorded(np.linspace(0, 9, 12), value, 1.0)
+    done = simulate(basis_of([1.0]), drive, 1.0, start, 10.0)
+    assert not done.response.slide.any() and done.log.count <= 1
+
+
+def test_exact_a_sweep_past_the_travel_ends_there():
+    done = simulate(basis_of([1.0]), SWEEPS[0], 0.3, 0.3, 9.0, 2, travel=1.0, start=Start(np.zeros(1), np.zeros(1)))
+    assert done.outcome is Outcome.EXCEEDS_TRAVEL
+    assert abs(done.response.output[-1]) == pytest.approx(1.0, rel=1e-12)
