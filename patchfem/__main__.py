@@ -15,7 +15,7 @@ from .commands.look import export, view  # noqa: E402
 from .commands.profile import profile  # noqa: E402
 from .commands.run import run  # noqa: E402
 from .commands.scene import check, mesh, plan  # noqa: E402
-from .commands.shared import NotReached, Refused, say  # noqa: E402
+from .commands.shared import Ended, Refused, say  # noqa: E402
 from .commands.study import cost, fit  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -55,8 +55,8 @@ def _guarded(words: list) -> int:
     except (Refused, CycloptsError) as error:
         say(f"patchfem: {' '.join(str(error).split())}")
         return 2
-    except NotReached:
-        return 3
+    except Ended as end:
+        return end.code
     except KeyboardInterrupt:
         say("interrupted; nothing was replaced")
         return 130

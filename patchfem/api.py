@@ -89,13 +89,6 @@ def _without(sets: dict, kind: str) -> None:
         raise PatchfemError(f"a {kind} is made once: {', '.join(sets)} cannot be set in it; set it in the scene")
 
 
-def _folder():
-    """export.folder, which brings what draws and writes."""
-    from .export import folder
-
-    return folder
-
-
 class Measures(Mapping):
     """The measures of a run by name, read-only; also as attributes. It shows itself as a table."""
 
@@ -170,7 +163,9 @@ class Plots:
             if self._result.plan.kind == "patch" else "no motion was computed"
 
     def _drawn(self, names: tuple, lack: str) -> Figure:
-        found = _folder().figure(self._result, names)
+        from .export.shown import figure
+
+        found = figure(self._result, names)
         if found is not None:
             return found
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
@@ -196,12 +191,16 @@ class Result(found.Result):
 
     def to_xarray(self) -> Dataset:
         """Histories and fields with units and the scene they came from: the Dataset that result.nc holds."""
-        return _folder().dataset(self)
+        from .export.histories import contents
+
+        return contents(self).to_xarray()
 
     def save(self, folder: str | Path) -> Path:
         """Write the results folder that `patchfem run -o` writes, and give its path; an older one is replaced.
 
         PatchfemError for a folder that holds other files.
         """
-        _folder().save(self, Path(folder))
+        from .export.folder import save
+
+        save(self, Path(folder))
         return Path(folder)

@@ -2,22 +2,24 @@
 
 import json
 import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, NotReached, Out, Quiet, Refused, Sets, progress_bar, say, scene_of
+from .shared import Ended, Json, NotReached, Out, Quiet, Refused, Sets, progress_bar, say, scene_of
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
         json_: Json = False,
         resume: Annotated[bool, Parameter(negative=())] = False,
         fresh: Annotated[bool, Parameter(negative=())] = False,
+        no_page: Annotated[bool, Parameter(negative=())] = False,
         quiet: Quiet = False,
         verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
     """Run SCENE and write its results folder, by default out/<scene name>; --resume goes on with an interrupted run
-    that has [wear]; --fresh ignores kept operators."""
+    that has [wear]; --fresh ignores kept operators; --no-page leaves out report.html."""
     from ..export.folder import run_into
     from ..runs.plan import plan as make
 
@@ -30,20 +32,39 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
     target = out if out is not None else Path("out") / what.model.source.path.stem
     with progress_bar(quiet or json_) as progress:
         try:
-            answer = run_into(what, target, talk, progress, fresh, resume)
+            written = run_into(what, target, talk, progress, fresh, resume)
         except KeyboardInterrupt:
             if (target.with_name(target.name + ".partial") / "wear.npz").is_file():
                 talk(f"{target}: the wear so far is kept; go on with --resume")
             raise
-    if json_:
-        print(json.dumps(answer, ensure_ascii=False))
-    else:
-        _print_answer(answer, target, verbose)
+    answer = written.summary
+    try:
+        if json_:
+            print(json.dumps(answer, ensure_ascii=False), flush=True)
+        else:
+            _print_answer(answer, target, verbose, " (without report.html: --no-page)" if no_page else "")
+        if not no_page:
+            _draw(written, target)
+    except KeyboardInterrupt:
+        say(f"interrupted while the page was drawn; the results in {target} are whole, without report.html")
+        raise Ended(130) from None
     if answer["outcome"] == "not_converged":
         raise NotReached
 
 
-def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
+def _draw(written, target: Path) -> None:
+    """Draw the page last: whatever stops it, the results are in place and their place is said."""
+    from ..export.folder import write_page
+
+    try:
+        write_page(written, target)
+    except (OSError, MemoryError) as error:
+        why = getattr(error, "strerror", None) or "out of memory"
+        say(f"{target / 'report.html'}: {why}; the results are whole, only their page is missing")
+        raise Ended(4) from None
+
+
+def _print_answer(answer: dict, target: Path, verbose: bool, page: str) -> None:
     from ..core import Outcome
 
     print(f"{answer['outcome']}: {Outcome(answer['outcome']).sentence}")
@@ -57,8 +78,9 @@ def _print_answer(answer: dict, target: Path, verbose: bool) -> None:
         say(f"note: {text}")
     if verbose:
         say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
-    print(f"results: {target}")
+    print(f"results: {target}{page}")
     if (target / "fields.vtkhdf").is_file():
         place = shlex.quote(str(target))
         print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; before it, "
               f"`patchfem export {place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
+    sys.stdout.flush()

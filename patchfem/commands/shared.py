@@ -12,8 +12,19 @@ Out = Annotated[Path | None, Parameter(name=["-o", "--out"])]
 Quiet = Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())]
 
 
-class NotReached(Exception):
+class Ended(Exception):
+    """A verb has said all there is to say and ends with this exit code."""
+
+    def __init__(self, code: int):
+        super().__init__(f"exit code {code}")
+        self.code = code
+
+
+class NotReached(Ended):
     """The run is on disk and marked not_converged, exit code 3."""
+
+    def __init__(self):
+        super().__init__(3)
 
 
 class Refused(Exception):

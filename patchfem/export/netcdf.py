@@ -1,11 +1,16 @@
-"""result.nc: histories and interface frames as one netCDF4 file with CF attributes and provenance."""
+"""result.nc: histories and interface frames as one netCDF4 file with CF attributes and provenance.
+
+The file is the one that xarray would write, without xarray: its import takes longer than most runs.
+"""
 
 import hashlib
 import json
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import h5netcdf
+import h5py
 import numpy as np
-import xarray as xr
 
 LONG = {
     "relative_displacement": ("m", "displacement of the block relative to the base at its output"),
@@ -39,9 +44,33 @@ BETWEEN = {"relative_displacement": "displacement of the first mass of an interf
            "normal_load": "normal load on an interface"}
 
 
-def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None,
-            levels: dict | None = None, interfaces: tuple = ()) -> xr.Dataset:
-    """Dataset of a run.
+@dataclass(frozen=True, eq=False, slots=True)
+class Contents:
+    """What a netCDF file holds.
+
+    variables and coordinates: name -> (dimension or tuple of them, values, attributes); attributes: of the file.
+    """
+
+    variables: dict = field(default_factory=dict)
+    coordinates: dict = field(default_factory=dict)
+    attributes: dict = field(default_factory=dict)
+
+    def also(self, variables: dict | None = None, coordinates: dict | None = None,
+             attributes: dict | None = None) -> "Contents":
+        """These contents and more."""
+        return Contents(self.variables | (variables or {}), self.coordinates | (coordinates or {}),
+                        self.attributes | (attributes or {}))
+
+    def to_xarray(self):
+        """The contents as an xarray.Dataset."""
+        import xarray as xr
+
+        return xr.Dataset(self.variables, self.coordinates, self.attributes)
+
+
+def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None,
+           levels: dict | None = None, interfaces: tuple = ()) -> Contents:
+    """Contents of a run.
 
     histories: name -> (k,), or (i, k) of the interfaces so named, with "time"; modal: (names, (k, n)) or None; fields:
     name -> (f, m) with "time", or {}; x, weight: (m,) or None; strips: (offsets (s,) [m], pressure (s, m) [Pa]) of a
@@ -75,11 +104,11 @@ def dataset(histories: dict, modal, fields: dict, x, weight, strips: tuple | Non
     for name, (unit, values) in (levels or {}).items():
         text = {"level_drive": "acceleration of the base", "level_stuck": "whether the interface held"}
         data[name] = ("level", values, {"units": unit, "long_name": text.get(name, name.replace("_", " "))})
-    return xr.Dataset(data, coords)
+    return Contents(data, coords)
 
 
-def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, meanings, source: str) -> xr.Dataset:
-    """Add the table of events (e,) to a dataset.
+def with_events(data: Contents, time, interface, kind, slide, count: int, meanings, source: str) -> Contents:
+    """The contents with the table of events (e,).
 
     time [s]; interface: its number from 1, 0 for a border of the drive; kind: a flag of `meanings`; slide [m]; count:
     how many there were, the last of them are kept.
@@ -87,7 +116,7 @@ def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, mean
     flags = {"long_name": "what happened, up: towards positive slip", "flag_meanings": " ".join(meanings),
              "flag_values": np.arange(len(meanings), dtype=np.int8)}
     about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
-    return data.assign({
+    return data.also({
         "event_time": ("event", time, about),
         "event_interface": ("event", np.asarray(interface, np.int32),
                             {"units": "1", "long_name": "number of the interface (of the strip where strips yaw) "
@@ -96,8 +125,8 @@ def with_events(data: xr.Dataset, time, interface, kind, slide, count: int, mean
         "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event"})})
 
 
-def with_curve(data: xr.Dataset, curve: dict) -> xr.Dataset:
-    """Add a curve of steady motions (c,) to a dataset: frequency [Hz], level, amplitude [m], regime, multiplier, and
+def with_curve(data: Contents, curve: dict) -> Contents:
+    """The contents with a curve of steady motions (c,): frequency [Hz], level, amplitude [m], regime, multiplier, and
     its folds."""
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
@@ -114,15 +143,15 @@ def with_curve(data: xr.Dataset, curve: dict) -> xr.Dataset:
         over, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
         out["curve_fold"] = ("fold", np.asarray(curve["folds"], float),
                              {"units": unit, "long_name": f"{over} at which the curve turns back"})
-    return data.assign(out)
+    return data.also(out)
 
 
-def with_wear(data: xr.Dataset, history: dict, units: dict) -> xr.Dataset:
-    """Add the measures over the cycles of wear to a dataset: history name -> (j,), with `cycle`; units by name."""
+def with_wear(data: Contents, history: dict, units: dict) -> Contents:
+    """The contents with the measures over the cycles of wear: history name -> (j,), with `cycle`; units by name."""
     out = {f"wear_{name}": ("wear_cycle", values, {"units": units[name], "long_name": name.replace("_", " ")})
            for name, values in history.items() if name in units}
     count = {"units": "1", "long_name": "cycles of wear so far"}
-    return data.assign(out).assign_coords({"wear_cycle": ("wear_cycle", history["cycle"], count)})
+    return data.also(out, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
 
 
 def _attributes(name: str, dimensions: int = 1) -> dict:
@@ -132,12 +161,12 @@ def _attributes(name: str, dimensions: int = 1) -> dict:
     return {"units": unit, "long_name": text}
 
 
-def described(data: xr.Dataset, summary: dict, scene_text: str, versions: dict) -> xr.Dataset:
-    """Add the origin of the numbers to a dataset: program, scene, outcome, measures; no host name and no path.
+def described(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
+    """The contents with the origin of the numbers: program, scene, outcome, measures; no host name and no path.
 
     summary: the object of summary.json; scene_text: the resolved scene; versions: package -> version.
     """
-    return data.assign_attrs({
+    return data.also(attributes={
         "Conventions": "CF-1.11", "title": summary["title"], "source": f"patchfem {summary['patchfem']}",
         "outcome": summary["outcome"], "scene": scene_text,
         "scene_sha256": hashlib.sha256(scene_text.encode()).hexdigest(),
@@ -145,9 +174,38 @@ def described(data: xr.Dataset, summary: dict, scene_text: str, versions: dict) 
         "versions": json.dumps(versions)})
 
 
-def write(data: xr.Dataset, path: Path) -> None:
-    """Write a dataset as netCDF4 to `path`, whole beside it first and then renamed."""
-    encoding = {name: {"zlib": True, "complevel": 1} for name in data.data_vars if data[name].ndim}
-    partial = Path(path).with_name(Path(path).name + ".partial")
-    data.to_netcdf(partial, engine="h5netcdf", encoding=encoding)
+def write(data: Contents, path: Path) -> None:
+    """Write contents as netCDF4 to `path`, whole beside it first and then renamed.
+
+    The file is made in memory, so that a full disk is an OSError of one write and nothing is left open.
+    """
+    path = Path(path)
+    partial = path.with_name(path.name + ".partial")
+    with h5py.File(path.name, "w", driver="core", backing_store=False, track_order=True) as memory:
+        with h5netcdf.File(memory, "w") as file:
+            file.attrs.update(data.attributes)
+            _write_variables(file, data)
+        memory.flush()
+        image = memory.id.get_file_image()
+    partial.write_bytes(image)
     partial.replace(path)
+
+
+def _write_variables(file, data: Contents) -> None:
+    """Put variables and coordinates into an open file; coordinates that are no dimension are named by what has them."""
+    known = {name: ((dims,) if isinstance(dims, str) else tuple(dims), values, attributes)
+             for name, (dims, values, attributes) in (data.variables | data.coordinates).items()}
+    beside = {name: set(known[name][0]) for name in data.coordinates if known[name][0] != (name,)}
+    for dims, values, _ in known.values():
+        sizes = dict(zip(dims, np.shape(values)))
+        file.dimensions.update({name: size for name, size in sizes.items() if name not in file.dimensions})
+    for name, (dims, values, attributes) in known.items():
+        values = np.asarray(values)
+        named = [other for other, its in beside.items() if name in data.variables and its <= set(dims)]
+        how = {"fillvalue": np.nan} if values.dtype.kind == "f" else {}
+        if name in data.variables and values.ndim and values.size:
+            how |= {"compression": "gzip", "compression_opts": 1}
+        texts = values.dtype.kind in "UO"
+        one = file.create_variable(name, dims, h5py.string_dtype() if texts else values.dtype, **how)
+        one[...] = values.astype(object) if texts else values
+        one.attrs.update(attributes | ({"coordinates": " ".join(named)} if named else {}))

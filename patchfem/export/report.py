@@ -5,7 +5,6 @@ import tomllib
 from collections.abc import Callable
 from html import escape
 from math import isfinite, pi
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -131,7 +130,7 @@ def verdict(data: dict) -> str:
 
 
 def page(data: dict) -> str:
-    """The whole HTML page from the plain data of a run, as `folder.report_data` gives them."""
+    """The whole HTML page from the plain data of a run, as `shown.report_data` gives them."""
     summary = data["summary"]
     title = summary["title"] or data.get("name") or "patchfem run"
     parts = [f"<h1>{escape(title)}</h1><p class=soft>patchfem {escape(summary['patchfem'])} &middot; "
@@ -361,8 +360,3 @@ def _cost(data: dict) -> str:
             f"</table><p class=soft>{escape(parts)}.{shared}</p>"
             f"<p class=soft>Not in the scene, so neither imported nor computed: "
             f"{escape(', '.join(summary['not_in_scene']))}.</p>")
-
-
-def write_report(path: Path, data: dict) -> None:
-    """Write the report page of a run to `path`; data: as `folder.report_data` gives them."""
-    Path(path).write_text(page(data), encoding="utf-8")

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ..core import Missing, PatchfemError
 
-FILES = ("summary.json", "result.nc", "fields.vtkhdf", "report.html", "scene.resolved.toml", "fields.pvd",
+PAGE = "report.html"
+FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
          "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
          "compare.json", "surface_before.csv", "surface_after.csv", "profile.json")
 LOCK = ".writer"

@@ -2,7 +2,15 @@
 
 import json
 import math
+import sys
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from .. import __version__
+from ..effects import EFFECTS
+from ..runs.results.result import Result
+
+PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
 def measure_object(measure) -> dict:
@@ -34,3 +42,43 @@ def summary(version: str, title: str, kind: str, outcome: str, measures: dict, e
 def write_json(value: dict, path: Path) -> None:
     """Write `value` to `path` as strict JSON with a final newline; ValueError for NaN or infinity in it."""
     Path(path).write_text(json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def summary_of(result: Result) -> dict:
+    """The object of summary.json."""
+    what = result.plan
+    return summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
+                   effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
+                   result.seconds)
+
+
+def effects_of(result: Result) -> list:
+    """Effects of a run as [{"effect", "equations", "seconds"}].
+
+    The law and the modes share one loop, whose time stands with the law.
+    """
+    patch, out = result.patch, []
+    loop = result.seconds.get("march", result.seconds.get("bench", 0.0))
+    for name in result.plan.effects:
+        seconds = 0.0
+        if patch is not None and name == "contact":
+            seconds = sum(patch.seconds.get(k, 0.0) for k in ("assemble", "condense", "press"))
+        elif patch is not None and name.removeprefix("contact.") in patch.seconds:
+            seconds = patch.seconds[name.removeprefix("contact.")]
+        elif name == "contact.shear":
+            seconds = result.seconds.get("reduce", 0.0)
+        elif name.startswith("friction.law=") or (name == "structure" and result.plan.kind == "linear"):
+            seconds = loop
+        out.append({"effect": name, "equations": EFFECTS[name].equations, "seconds": round(float(seconds), 6)})
+    return out
+
+
+def versions() -> dict:
+    """Versions, by name, of the interpreter and of the packages that compute, those that are there."""
+    out = {"python": ".".join(map(str, sys.version_info[:3]))}
+    for name in PACKAGES:
+        try:
+            out[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return out

@@ -88,7 +88,7 @@ def test_exact_the_regime_in_words():
 
 
 def test_exact_a_curve_in_the_file():
-    data = netcdf.with_curve(xr.Dataset(), FOLDED)
+    data = netcdf.with_curve(netcdf.Contents(), FOLDED).to_xarray()
     names = data.curve_regime.attrs["flag_meanings"].split()
     assert [names[k] for k in data.curve_regime.values] == FOLDED["regime"].tolist()
     for name in ("frequency", "level", "amplitude", "multiplier"):

@@ -188,8 +188,8 @@ def test_always_the_heading_is_the_title_or_the_file():
 def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
     data = PAGES[name]()
     (tmp_path / "data").write_bytes(pickle.dumps(data))
-    code = ("import pickle, sys; from patchfem.export.report import write_report; "
-            "write_report(sys.argv[2], pickle.load(open(sys.argv[1], 'rb')))")
+    code = ("import pickle, sys; from patchfem.export.report import page; "
+            "open(sys.argv[2], 'w', encoding='utf-8').write(page(pickle.load(open(sys.argv[1], 'rb'))))")
     subprocess.run([sys.executable, "-c", code, tmp_path / "data", tmp_path / "page.html"], check=True,
                    env={"PYTHONHASHSEED": "7", "PATH": "", "MPLCONFIGDIR": str(tmp_path)})
     text = report.page(deepcopy(data))

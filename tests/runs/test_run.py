@@ -463,9 +463,9 @@ def test_exact_an_old_folder_survives_a_failing_run(written, tmp_path, monkeypat
     from patchfem.export import folder as results_folder
 
     def full(*_):
-        raise OSError(28, "No space left on device", "report.html")
+        raise OSError(28, "No space left on device", "summary.json")
 
-    monkeypatch.setattr(results_folder, "write_report", full)
+    monkeypatch.setattr(results_folder, "write_json", full)
     full_disk = cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5")
     assert full_disk.code == 4 and state() == before
     monkeypatch.undo()

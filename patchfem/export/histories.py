@@ -1,0 +1,88 @@
+"""What result.nc holds, taken from a finished run."""
+
+import numpy as np
+
+from ..model.structure import motions
+from ..response.events import MEANINGS
+from ..response.levels import KEPT
+from ..response.rows import TABLE
+from ..runs.results.result import Result
+from . import netcdf
+from .summary import summary_of, versions
+
+LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
+
+
+def contents(result: Result) -> netcdf.Contents:
+    """What result.nc holds, in SI: histories, interface frames, levels, events, curve, provenance."""
+    found, modal = histories(result)
+    patch, extra = result.patch, result.extra
+    x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
+    fields = {k: v for k, v in result.fields.items() if not k.startswith("holder_")}
+    strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
+    levels = _levels(extra["levels"]) if "levels" in extra else None
+    rig = result.plan.model.rig
+    names = list(rig.names) if found and rig is not None else []
+    data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names)
+    if "events" in extra:
+        e = extra["events"]
+        data = netcdf.with_events(data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source)
+    if "curve" in extra:
+        data = netcdf.with_curve(data, extra["curve"])
+    if "wear" in extra:
+        data = netcdf.with_wear(data, extra["wear"], {name: m.unit for name, m in result.measures.items()})
+    if "regime" in extra:
+        data = data.also(attributes={"regime": extra["regime"], "largest_multiplier": largest_multiplier(extra)})
+    return netcdf.described(data, summary_of(result), result.plan.model.source.resolved, versions())
+
+
+def largest_multiplier(extra: dict) -> float:
+    """Largest |Floquet multiplier|."""
+    return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
+
+
+def histories(result: Result) -> tuple:
+    """(histories name -> (k,) or (i, k), (names, (k, n)) of the modes or None) of a run, ({}, None) without motion."""
+    kind, r = result.plan.kind, result.response
+    if r is None:
+        return {}, None
+    if kind == "bench":
+        across = {"lateral_displacement": r.lateral, "lateral_force": r.lateral_force, "yaw_moment": r.yaw_moment}
+        return {"time": r.time, "relative_displacement": r.slide, "relative_velocity": r.rate,
+                "friction_force": r.force, "normal_load": r.load,
+                **dict(zip(LEDGER, r.ledger)),
+                **{name: values for name, values in across.items() if values is not None}}, None
+    out = {"time": r.time, "relative_displacement": r.output, "relative_velocity": r.output_rate,
+           "absolute_acceleration": r.acceleration, "base_acceleration": r.base_acceleration}
+    if kind == "rig" and "ledger" in r.extra:
+        out |= dict(zip(LEDGER, r.extra["ledger"]))
+    rig = result.plan.model.rig
+    if rig.names:
+        out |= _between(result)
+    elif kind == "rig":
+        still = np.full(r.time.size, result.measures["normal_load"].value)
+        out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
+    return out, (list(rig.modes.names), motions(rig.modes, r.modal))
+
+
+def _between(result: Result) -> dict:
+    """Histories (i, k) of the interfaces of a rig of masses, those of its output beside them."""
+    r = result.response
+    columns = {"relative_displacement": ("slides", r.slide), "relative_velocity": ("slide_rates", r.slide_rate),
+               "friction_force": ("forces", r.force)}
+    loads = np.array([one.load for one in result.plan.model.rig.interfaces])
+    return {"output_displacement": r.output, "output_velocity": r.output_rate,
+            "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
+            **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
+               for name, (many, one) in columns.items()}}
+
+
+def _levels(levels) -> dict:
+    """Columns of a run in levels: the drive, whether it held, every measure and its error."""
+    out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
+           "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
+    for name in KEPT:
+        if any(name in one.values for one in levels):
+            out[f"level_{name}"] = (TABLE[name].unit, np.array([one.values.get(name, np.nan) for one in levels]))
+            out[f"level_{name}_error"] = (TABLE[name].unit, np.array([one.errors.get(name, np.nan) for one in levels]))
+    return out

@@ -1,0 +1,59 @@
+"""What a finished run is shown by: the plain data of its page, its page and its pictures."""
+
+from ..runs.results.result import Result
+from ..structure.drive_sizes import largest
+from .histories import largest_multiplier
+from .report import page, picture
+from .summary import summary_of, versions
+
+
+def report_data(result: Result) -> dict:
+    """Plain arrays and texts of a run for the report page, by name; SI units throughout."""
+    model, r, w = result.plan.model, result.response, result.window
+    source = model.source
+    data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": source.resolved,
+            "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
+            "x": None if result.patch is None else result.patch.x, "versions": versions()}
+    if "curve" in result.extra:
+        data["curve"] = result.extra["curve"]
+    if "wear" in result.extra:
+        count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
+        data["wear"] = {"history": result.extra["wear"], "period": period,
+                        "states": {name: rows[:count + 1] for name, rows in result.fields.items()}}
+        data["fields"] = {name: rows[count:] for name, rows in result.fields.items()}
+        data["fields"]["time"] = data["fields"]["time"] - data["fields"]["time"][0]
+    if "levels" in result.extra:
+        data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors}
+                          for one in result.extra["levels"]]
+    if "regime" in result.extra:
+        data["steady"] = {"regime": result.extra["regime"], "multiplier": largest_multiplier(result.extra)}
+    if r is not None:
+        slow = result.plan.kind == "bench"
+        data["history"] = {"time": r.time, "displacement": r.slide if slow else r.output, "force": r.force}
+        data["loop"] = {"slide": w.slide, "force": w.force, "time": w.time}
+        if not slow:
+            data["window"] = {"time": w.time, "displacement": w.output, "acceleration": w.acceleration,
+                              "base": w.base_acceleration, "force": w.force, "slide": w.slide}
+            data["loop"] |= {"period": result.extra["period"]}
+    if model.measured is not None:
+        from ..inputs.measured import read_table
+
+        path, gain = model.measured
+        rig = model.rig
+        data["measured"] = {"rows": read_table(path), "frequency": rig.frequency if rig is not None else None,
+                            "gain": gain}
+        if rig is not None:
+            data["measured"]["input"] = largest(rig.drive)
+    return data
+
+
+def page_of(result: Result, bodies: dict) -> str:
+    """The HTML page of a run; bodies: the pressed pieces as `fields.bodies.write_fields` returns them."""
+    return page(report_data(result) | ({"bodies": bodies} if bodies else {}))
+
+
+def figure(result: Result, names: tuple):
+    """The first of the named pictures in which a run has something to show, as a matplotlib Figure; None without."""
+    data = report_data(result)
+    shown = (picture(name, data) for name in names)
+    return next((one.draw.figure(*one.values) for one in shown if one is not None), None)
