@@ -15,8 +15,10 @@ from ..scene.keys.quantities import KINDS
 from ..scene.ranges import ranges
 from ..scene.scene import Scene, SceneError
 from .fit_model import BenchModel
+from .fit_path import NOTHING, Beside, offsets_of
 
 MOST_PIECES = 64  # steps between two rows
+FEWER = 0.6  # share of the rows below which their correlation is said
 LOAD_UNITS = {"time": KINDS["time"], "displacement": KINDS["length"],
               "force": KINDS["force"], "friction_ratio": {"": 1.0, "1": 1.0}}
 
@@ -25,14 +27,16 @@ LOAD_UNITS = {"time": KINDS["time"], "displacement": KINDS["length"],
 class Fitted:
     """A fitted loop.
 
-    free: the ranges; found: the fit in their order; model: (k,) fitted reading at the rows of `loop`; held: (k,); rms
-    and held_rms (None where no row is held) in the unit of the reading; step_error: largest change of the model when
-    its steps are halved; sets: the --set strings that make the scene fitted; warnings: sentences.
+    free: the ranges; offsets: nuisance values; found: the fit in the order of both; model: (k,) fitted reading at the
+    rows of `loop`; held: (k,); rms and held_rms (None where no row is held) in the unit of the reading; step_error:
+    largest change of the model when its steps are halved; sets: the --set strings that make the scene fitted; warnings:
+    sentences.
     """
 
     scene: Scene
     loop: Loop
     free: list
+    offsets: list
     found: Fit
     model: np.ndarray
     held: np.ndarray
@@ -50,11 +54,13 @@ class Fitted:
         return self.found.outcome
 
 
-def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
+def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, beside: Beside = NOTHING) -> Fitted:
     """Fit the keys `free` ("table.key=low..high" texts) of a bench scene to the loop in the file `to`.
 
     The model starts unstressed in the first row and follows the measured rows, straight between them; rows named by
-    hold ("column=value,value") are driven through but only predicted. SceneError and PatchfemError name bad input.
+    hold ("column=value,value") are driven through but only predicted. beside: offsets that are free
+    as well, and whether the whole cycles of the record are driven once before it. SceneError and PatchfemError name bad
+    input.
     """
     begin = perf_counter()
     if scene.kind != "bench":
@@ -68,17 +74,19 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
     for one in hold:
         held |= loop.rows_of(one)
     used = np.count_nonzero(~held)
-    if used <= len(wanted):
-        raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(wanted)} values and their "
+    offsets = offsets_of(beside.offsets, loop)
+    everything = [*wanted, *(one.range for one in offsets)]
+    if used <= len(everything):
+        raise PatchfemError(f"{to}: {used} rows that are not held cannot determine {len(everything)} values and their "
                             "intervals")
-    bench = BenchModel(scene, loop, wanted, say)
+    bench = BenchModel(scene, loop, wanted, offsets, beside.warm, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
     def residual(values):
         return (bench(values) - loop.reading)[~held] / scale
 
     try:
-        found, step_error = _refined(bench, residual, wanted, say)
+        found, step_error = _refined(bench, residual, everything, say)
     except NotConverged:
         if bench.made == 0:
             raise bench.refused from None
@@ -87,10 +95,10 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None) -> Fitted:
     miss = model - loop.reading
     rms = [float(np.sqrt(np.mean(miss[rows]**2))) if rows.any() else None for rows in (~held, held)]
     sets = [*bench.sets, *(one.assigned(value) for one, value in zip(wanted, found.values))]
-    warnings = [*scene.remarks, *bench.notes, *remarks(found, [one.key for one in wanted]),
-                *_doubts(loop, miss, held, rms[0], step_error, scene)]
-    return Fitted(scene, loop, wanted, found, model, held, rms[0], rms[1], step_error, bench.pieces, sets, warnings,
-                  perf_counter() - begin)
+    warnings = [*scene.remarks, *bench.notes, *remarks(found, [one.key for one in everything])]
+    fitted = Fitted(scene, loop, wanted, offsets, found, model, held, rms[0], rms[1], step_error, bench.pieces, sets,
+                    warnings, perf_counter() - begin)
+    return replace(fitted, warnings=[*warnings, *_doubts(fitted, bool(offsets) or beside.warm)])
 
 
 def _refined(bench, residual, wanted, say) -> tuple:
@@ -99,7 +107,7 @@ def _refined(bench, residual, wanted, say) -> tuple:
     low, high = [one.low for one in wanted], [one.high for one in wanted]
     start, starts, before, agreed = _own_values(bench.scene, wanted), 3, (0, 0, ""), 0
     while True:
-        found = fit(residual, low, high, start=start, starts=starts, bars=bench.exact)
+        found = fit(residual, low, high, start=start, starts=starts, bars="series" if bench.exact else "")
         agreed = found.agreed if starts > 1 else agreed
         found = _counted(found, before)
         before = (found.evaluations, found.failures, found.reason)
@@ -112,7 +120,7 @@ def _refined(bench, residual, wanted, say) -> tuple:
         # a tenth of the tolerance: the steps are not to show in the fit
         if bench.pinned or change <= 0.1 * bench.scene.accuracy.tolerance * peak or bench.pieces >= MOST_PIECES:
             bench.pieces //= 2
-            last = _counted(fit(residual, low, high, start=found.values, starts=1), before)
+            last = _counted(fit(residual, low, high, start=found.values, starts=1, bars="series"), before)
             return replace(last, agreed=agreed), change
         if say:
             say(f"{bench.pieces} steps between two rows")
@@ -139,19 +147,20 @@ def _own_values(scene: Scene, wanted: list) -> list:
     return out
 
 
-def _doubts(loop: Loop, miss, held, rms: float, step_error: float, scene: Scene) -> list:
-    """Warnings where the rows are no sample of the model with independent noise."""
-    out, peak = [], float(np.abs(loop.reading).max())
-    inside = miss[~held] - miss[~held].mean()
-    if rms > 1e-6 * peak and inside.size > 20:
-        tied = float(inside[1:] @ inside[:-1] / (inside @ inside))
-        # independent rows of 21 and more correlate by 0.22 at one standard deviation
-        if tied > 0.3:
-            out.append(f"the residual is correlated from row to row ({tied:.2f}): the law misses something, and the "
-                       "intervals, which take rows as independent, are too narrow")
-    if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0]:
+def _doubts(fitted: Fitted, led: bool) -> list:
+    """Warnings where the rows are no sample of the model with independent noise.
+
+    led: the model does not start unstressed in the first row.
+    """
+    loop, held, rows, scene = fitted.loop, fitted.held, fitted.found.rows, fitted.scene
+    rms, step_error = fitted.rms, fitted.step_error
+    out, peak, used = [], float(np.abs(loop.reading).max()), np.count_nonzero(~held)
+    if rms > 1e-6 * peak and rows < FEWER * used:
+        out.append(f"the residual is correlated from row to row: its {used} rows tell as much as {max(rows, 1):.3g} "
+                   "independent ones, which the intervals count; the law or the instrument misses something")
+    if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0] and not led:
         out.append(f"the first row carries {abs(loop.reading[0]) / peak:.0%} of the peak, where the model starts "
-                   "unstressed: hold the first cycle out or begin the record at rest")
+                   "unstressed: name --warm-up, hold the first cycle out or begin the record at rest")
     if step_error > scene.accuracy.tolerance * peak:
         out.append(f"half the steps change the model by {step_error / peak:.1g} of the peak, more than the tolerance")
     return out

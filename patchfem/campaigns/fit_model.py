@@ -12,17 +12,20 @@ from ..runs.bench import bench as law_bench
 from ..runs.bench.engine import smooth_sum_of
 from ..runs.bench.watch import Watch
 from ..scene.scene import Scene, SceneError, loads
+from .fit_path import lead_in, whole_cycles
 
 
 class BenchModel:
     """The bench of a scene along the measured rows, as a function of the free values; a call gives the reading (k,).
 
-    scene: with its [slide]; loop: the measured one; wanted: ranges of the free values; say: function for a line of
-    progress, or None.
+    scene: with its [slide]; loop: the measured one; wanted: ranges of the free values; offsets: Offsets, whose values
+    come after those; warm: whether the whole cycles of the record are driven once before it; say: function for a line
+    of progress, or None.
     """
 
-    def __init__(self, scene: Scene, loop: Loop, wanted: list, say):
+    def __init__(self, scene: Scene, loop: Loop, wanted: list, offsets=(), warm: bool = False, say=None):
         self.scene, self.loop, self.wanted, self.say = scene, loop, wanted, say
+        self.offsets, self.warm = tuple(one.what for one in offsets), whole_cycles(loop) if warm else 0
         self.notes, self.sets, law = [], [], scene.friction
         self.time = self._paced()
         named = {one.key for one in wanted}
@@ -44,16 +47,19 @@ class BenchModel:
 
     def __call__(self, values) -> np.ndarray:
         """Reading (k,) at the rows; PatchfemError where the values make no scene."""
-        model = build(self.scene_at(values))
+        count = len(self.wanted)
+        beside = dict(zip(self.offsets, values[count:]))
+        model = build(self.scene_at(values[:count]))
         self.made += 1
         with placed(model.source):
-            return self._reading(model)
+            return self._reading(model, beside.get("displacement", 0.0)) + beside.get("force", 0.0)
 
-    def _reading(self, model: Model) -> np.ndarray:
+    def _reading(self, model: Model, offset: float) -> np.ndarray:
         patch = self._patch(model)
-        corner = np.arange(self.time.size) * self.pieces
+        time, slide, before = lead_in(self.time, self.loop.displacement, self.warm, offset)
+        corner = np.arange(time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
-        path = np.interp(number, corner, self.time), np.interp(number, corner, self.loop.displacement), 0, 0.0
+        path = np.interp(number, corner, time), np.interp(number, corner, slide), 0, 0.0
         run = law_bench.run(model, patch, 4, 0, path, Watch(smooth_sum_of(model, path[1]), self.say))
         if not run.load[0] > 0:
             raise PatchfemError("no load presses the pieces", "")
@@ -61,6 +67,7 @@ class BenchModel:
         if self.instant:  # a row stands between two straight legs: the mean of both sides
             after = run.force[np.minimum(corner + 1, number[-1])]
             out = np.where(corner == 0, after, (out + after) / 2)
+        out = out[before:]
         return out / run.load[0] if self.loop.quantity == "friction_ratio" else out
 
     def scene_at(self, values) -> Scene:

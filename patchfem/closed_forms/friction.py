@@ -128,11 +128,11 @@ def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
     amplitude/length > b, E = exp(-2 (x - b)) and z = (1 - (1 - 2 b) E)/(1 + E) the force is limit z and the area 4
     limit length (x - b + b^2 - b z - (1 + z - 2 b)(1 - E)/2). b = 0: 4 limit (amplitude - length tanh x), Dahl's loop.
     Up to x = b the loop is a line: no area, force limit x of a slide from rest. ValueError unless amplitude and length
-    are positive and 0 <= breakaway < 1.
+    are positive and 0 <= breakaway <= 1.
     """
     positive(amplitude=amplitude, length=length)
-    if not 0 <= breakaway < 1:
-        raise ValueError(f"breakaway must be in [0, 1), got {breakaway}")
+    if not 0 <= breakaway <= 1:
+        raise ValueError(f"breakaway must be in [0, 1], got {breakaway}")
     x, b = np.asarray(amplitude, float) / length, breakaway
     e = np.exp(-2 * np.maximum(x - b, 0.0))
     z = (1 - (1 - 2 * b) * e) / (1 + e)

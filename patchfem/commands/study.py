@@ -50,20 +50,25 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
 
 def fit(scene: Path, /, *, to: str, free: Annotated[tuple[str, ...], Parameter(negative=())],
         hold: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+        offset: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+        warm_up: Annotated[bool, Parameter(negative=())] = False,
         out: Out = None, set_: Sets = (),
         json_: Json = False,
         quiet: Quiet = False):
     """Fit keys of SCENE (--free table.key=low..high,...) to the measured loop --to FILE; rows that --hold names
-    (column=value,...) are only predicted. With [wear]: its coefficient, to a worn depth (--to compare.json, or --to
+    (column=value,...) are only predicted. --offset force,displacement: free besides, what the record adds to the force
+    and how far its first row lies from the unstressed place; --warm-up: its whole cycles are driven once before it,
+    unscored. With [wear]: its coefficient, to a worn depth (--to compare.json, or --to
     "worn_depth_max=2.5 um..3.5 um")."""
     found = scene_of(scene, set_)
     if found.wear is not None:
         _fit_wear(found, to, free, out, json_, quiet)
         return
     from ..campaigns.fit import fit_loop
+    from ..campaigns.fit_path import Beside
     from ..export.fit_folder import fit_into
 
-    fitted = fit_loop(found, Path(to), free, hold, None if quiet else say)
+    fitted = fit_loop(found, Path(to), free, hold, None if quiet else say, Beside(offset, warm_up))
     target = out if out is not None else Path("out") / f"{found.path.stem}-fit"
     answer = fit_into(fitted, target)
     if json_:

@@ -56,7 +56,8 @@ def lines_of(answer: dict) -> list:
     answer: the object of fit.json.
     """
     out = [f"{answer['outcome']}: {answer['rows']} rows of {answer['measured']}, {answer['evaluations']} evaluations"]
-    for key, one in answer["values"].items():
+    offsets = {f"offset of the {name}": one for name, one in answer["offsets"].items()}
+    for key, one in (answer["values"] | offsets).items():
         unit = "" if one["unit"] == "1" else f" {one['unit']}"
         if one["interval"] is None:
             bar = "not determined"

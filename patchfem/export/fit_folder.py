@@ -40,13 +40,16 @@ def answer_of(fitted: Fitted) -> dict:
     """The object of fit.json, in SI."""
     found, loop = fitted.found, fitted.loop
     values = {one.key: _value(one, found, k) for k, one in enumerate(fitted.free)}
+    offsets = {one.what: _value(one.range, found, k) for k, one in enumerate(fitted.offsets, len(values))}
+    named = [*fitted.free, *(one.range for one in fitted.offsets)]
     unit = "N" if loop.quantity == "force" else "1"
     clean = [[None if not np.isfinite(x) else x for x in row] for row in found.correlation.tolist()]
     held = None if fitted.held_rms is None else {"rows": int(fitted.held.sum()), "rms": fitted.held_rms}
-    unknown = [{one.key: x for one, x in zip(fitted.free, row) if x} for row in found.unknown.tolist()]
+    unknown = [{one.key: x for one, x in zip(named, row) if x} for row in found.unknown.tolist()]
     return {"patchfem": __version__, "title": fitted.scene.title, "measured": loop.path.name, "quantity": loop.quantity,
-            "outcome": str(fitted.outcome), "values": values, "unknown": unknown, "correlation": clean, "unit": unit,
-            "rows": int((~fitted.held).sum()), "rms": fitted.rms, "held": held,
+            "outcome": str(fitted.outcome), "values": values, "offsets": offsets, "unknown": unknown,
+            "correlation": clean, "unit": unit, "rows": int((~fitted.held).sum()),
+            "effective_rows": None if np.isnan(found.rows) else found.rows, "rms": fitted.rms, "held": held,
             "peak": float(np.abs(loop.reading).max()), "step_error": fitted.step_error,
             "steps_between_rows": fitted.pieces, "evaluations": found.evaluations, "failures": found.failures,
             "descents_agreed": found.agreed, "warnings": fitted.warnings, "seconds": round(fitted.seconds, 6)}
@@ -54,7 +57,9 @@ def answer_of(fitted: Fitted) -> dict:
 
 def _value(one: Range, found: Fit, k: int) -> dict:
     ends = found.intervals[k].tolist()
-    return {"value": float(found.values[k]), "unit": one.unit, "interval": ends if np.isfinite(ends).all() else None,
+    low, high = ends if np.isfinite(ends).all() else (None, None)
+    return {"value": float(found.values[k]), "unit": one.unit, "low": low, "high": high,
+            "interval": None if low is None else ends,
             "method": found.methods[k], "bounds": [one.low, one.high], "at_bound": found.at_bound[k] or None,
             "sensitivity": float(found.sensitivity[k])}
 

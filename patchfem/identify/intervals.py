@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from .correlation import effective_rows
 from .space import Counted
 
 SINGULAR = 1e-6  # of the largest singular value of the scaled Jacobian: below it a direction is unknown
@@ -16,7 +17,8 @@ SHARP = 1e-9  # of the range: intervals below it are at round-off, and linear
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Answer:
-    """Intervals of a fit: ends (n, 2), methods, open_ends (n, 2), correlation (n, n), sensitivity (n,), unknown (d, n).
+    """Intervals of a fit: ends (n, 2), methods, open_ends (n, 2), correlation (n, n), sensitivity (n,), unknown (d, n),
+    rows.
 
     They mean what they mean in `Fit`.
     """
@@ -27,21 +29,25 @@ class Answer:
     correlation: np.ndarray
     sensitivity: np.ndarray
     unknown: np.ndarray
+    rows: float
 
 
 def nothing(n: int) -> Answer:
     """The Answer of a fit of n values whose intervals were not asked for: NaN throughout, method "none"."""
     nan = np.full((n, n), np.nan)
     return Answer(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
-                  np.zeros((0, n)))
+                  np.zeros((0, n)), np.nan)
 
 
-def intervals(model: Counted, u, cost: float, descend: Callable) -> Answer:
+def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool = False) -> Answer:
     """The Answer at the least squares u (n,) of sum of squares `cost`; descend settles the other values of a profile.
 
-    A value on a bound is held there in the linear intervals of the others and has a profile of its own.
+    A value on a bound is held there in the linear intervals of the others and has a profile of its own. ordered: the
+    rows follow one another, and those that correlate count as fewer (`correlation.effective_rows`).
     """
-    n, dof = u.size, max(model.rows - u.size, 1)
+    here = model(u) if ordered else None
+    rows = model.rows if here is None else effective_rows(here)
+    n, dof = u.size, max(rows - u.size, 1)
     cost = max(cost, (1e-15 * model.largest)**2 * model.rows, 1e-300)
     jac = model.jacobian(u, range(n))
     size = np.sqrt((jac**2).sum(axis=0))
@@ -75,7 +81,7 @@ def intervals(model: Counted, u, cost: float, descend: Callable) -> Answer:
             probe[i] = ends[i, side]
             ends[i, side] = model.space.values(probe)[i]
     return Answer(ends, tuple(methods), open_ends, _correlation(spread, lost), size / np.sqrt(model.rows),
-                  _directions(model, u, n, inner, null, size))
+                  _directions(model, u, n, inner, null, size), float(rows))
 
 
 def _covariance(jac, size) -> tuple:

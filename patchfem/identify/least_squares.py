@@ -1,7 +1,8 @@
 """Least squares of a residual within bounds: values, 95 % intervals, and what the rows do not determine.
 
 The search runs in the unit cube of the bounds (logarithms where they are positive and wide) from several starts, the
-same every time. The intervals are those of the linearised problem (Student t with rows - values degrees of freedom);
+same every time. The intervals are those of the linearised problem (Student t with rows - values degrees of freedom,
+rows in an order counted by what they tell, `correlation`);
 where the residual is not linear over them, and at a bound, they come from the profile of the sum of squares.
 """
 
@@ -28,8 +29,8 @@ class Fit:
     "profile" or "none"; open_ends: (n, 2) whether an end is only the bound; correlation: (n, n), NaN likewise; rms:
     root mean square of the residual; sensitivity: (n,) rms change of the residual per range of a value; at_bound: (n,)
     "low", "high" or ""; unknown: (d, n) directions of relative change (of change over range where a value is 0) that
-    leave the residual as it is; failures and reason: evaluations that failed, and the first cause; agreed: descents
-    that ended at the same sum of squares.
+    leave the residual as it is; rows: independent ones that the intervals count, NaN without intervals; failures and
+    reason: evaluations that failed, and the first cause; agreed: descents that ended at the same sum of squares.
     """
 
     values: np.ndarray
@@ -41,6 +42,7 @@ class Fit:
     sensitivity: np.ndarray
     at_bound: tuple
     unknown: np.ndarray
+    rows: float
     evaluations: int
     failures: int
     reason: str
@@ -48,13 +50,14 @@ class Fit:
     outcome: Outcome
 
 
-def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: bool = True) -> Fit:
+def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: str = "rows") -> Fit:
     """Minimise the sum of squares of residual(values (n,)) -> (r,) within [low, high] (n,).
 
     log: (n,) flags, None decides (see `space`); start: (n,) values tried first; starts: descents at most, 1 from
-    `start` alone where it works; bars=False leaves the intervals NaN and looks for no bound or unknown. A residual that
-    raises a PatchfemError or is not finite is a failed evaluation, counted and passed over. ValueError for bad bounds
-    or fewer rows than values, NotConverged where every start fails.
+    `start` alone where it works; bars: "rows" takes rows as independent, "series" counts neighbours that correlate as
+    fewer, "" leaves the intervals NaN and looks for no bound or unknown. A residual that raises a PatchfemError or is
+    not finite is a failed evaluation, counted and passed over. ValueError for bad bounds or fewer rows than values,
+    NotConverged where every start fails.
     """
     box = space(low, high, log)
     model, n = Counted(residual, box), box.low.size
@@ -71,7 +74,7 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, ba
     agreed = sum(abs(other[1] - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
     if bars:
         u, cost = _onto_bounds(model, u, cost)
-        answer = intervals(model, u, cost, descend)
+        answer = intervals(model, u, cost, descend, bars == "series")
     else:
         answer = nothing(n)
     rms = float(np.sqrt(cost / model.rows))
@@ -82,7 +85,7 @@ def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome:
     sides = tuple("low" if x <= 0 else "high" if x >= 1 else "" for x in u)
     return Fit(frozen_array(model.space.values(u)), frozen_array(answer.ends), answer.methods,
                frozen_array(answer.open_ends, bool), frozen_array(answer.correlation), rms,
-               frozen_array(answer.sensitivity), sides, frozen_array(answer.unknown), model.evaluations,
+               frozen_array(answer.sensitivity), sides, frozen_array(answer.unknown), answer.rows, model.evaluations,
                model.failures, model.reason, agreed, outcome)
 
 

@@ -65,7 +65,7 @@ BAD_SETS = [
     ("friction.order=-1", "friction.order", "must be >= 0"),
     ("friction.initial_bonds=1.1", "friction.initial_bonds", "must be <= 1"),
     ("friction.initial_bonds=-0.1", "friction.initial_bonds", "must be >= 0"),
-    ("friction.breakaway=1", "friction.breakaway", "must be < 1"),
+    ("friction.breakaway=1.01", "friction.breakaway", "must be <= 1"),
     ("friction.breakaway=-0.1", "friction.breakaway", "must be >= 0"),
     ("friction.reading=reprot", "friction.reading", "did you mean 'report'? one of stretch, report"),
     ("friction.temperature=5", "friction.temperature", "a table [friction.temperature] is wanted, not 5"),

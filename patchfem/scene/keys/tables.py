@@ -78,7 +78,7 @@ class Friction(Table):
     slip_growth: Length | None = None
     rest_speed: Speed | None = None
     initial_bonds: Share = 1.0
-    breakaway: number(ge=0, lt=1) = 0.0
+    breakaway: number(ge=0, le=1) = 0.0
     spread: Length | None = None
     temperature: Temperature | None = None
 
