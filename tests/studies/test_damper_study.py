@@ -1,0 +1,35 @@
+"""The measured damper loop: what the docstring of the study says, on the record itself."""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "studies" / "damper"))
+import damper
+
+FOLDER = os.environ.get("PATCHFEM_DATA")
+FILE = Path(FOLDER or ".") / "friction-damper-1hz.csv"
+
+
+def test_exact_the_plateau_begins_half_a_stroke_after_a_reversal():
+    slide = np.array([0.0, 1, 2, 1, 0, 1, 2])
+    assert damper.plateau(slide).tolist() == [False, True, True, True, True, True, True]
+    slide = np.array([0.0, 0.5, 2, 1.5, 0.5, 0, 0.5, 1.5])
+    assert damper.plateau(slide).tolist() == [False, False, True, False, True, True, False, True]
+
+
+@pytest.mark.skipif(not FILE.exists(), reason="PATCHFEM_DATA names no folder with friction-damper-1hz.csv")
+def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
+    rows = {row.law: row for row in damper.main(FILE, ("coulomb", "elastic-plastic", "stretch"))}
+    stretch, loop = rows["stretch"], rows["stretch"].fitted.loop
+    scatter = damper.repeat(loop)[1]
+    assert stretch.fitted.found.values[1] == pytest.approx(2.04e-3, rel=0.01)
+    assert stretch.work == pytest.approx(stretch.measured, rel=0.005) and stretch.plateau < 0.07 * 4.2e3
+    assert stretch.rms > 8 * scatter and rows["elastic-plastic"].rms > stretch.rms
+    assert rows["coulomb"].work < 0.9 * stretch.measured
+    limit = stretch.fitted.found.values[0] * damper.LOAD
+    assert np.abs(loop.reading).max() > 2 * limit
+    assert 40 < stretch.fitted.found.rows < 90
