@@ -70,7 +70,7 @@ def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     assert rows["`load`"][2] == "unless [contact.approach]"
     rows = {key: rest for key, *rest in section("`[friction]`")}
     assert rows["`reference_speed`"][:3] == ["velocity, > 0", "", "law `tanh`"]
-    assert rows["`breakaway`"][:2] == ["number, >= 0, < 1", "0"]
+    assert rows["`breakaway`"][:2] == ["number, >= 0, <= 1", "0"]
     rows = {key: rest for key, *rest in section("`[drive]`")}
     assert rows["`levels`"][0] == "list of acceleration, >= 0" and rows["`from`"][2] == "waveform `sweep`"
     assert section("`[[structure.spring]]`")[0][:2] == ["`between`", "pair of whole number, >= 0"]
