@@ -70,8 +70,9 @@ def _print_answer(answer: dict, target: Path, verbose: bool, page: str) -> None:
     print(f"{answer['outcome']}: {Outcome(answer['outcome']).sentence}")
     for name, m in answer["measures"].items():
         error = "" if m["error"] is None else f" ± {m['error']:.2g}"
-        value = "-" if m["value"] is None else f"{m['value']:.6g}"
-        print(f"  {name:<42} {value}{error} {m['unit']}")
+        value = f"- ({m['reason']})" if m.get("reason") else "-" if m["value"] is None else \
+            f"{m['value']:.6g}{error} {m['unit']}"
+        print(f"  {name:<42} {value}")
     for text in answer["warnings"]:
         say(f"warning: {text}")
     for text in answer["notes"]:

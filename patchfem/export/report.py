@@ -342,6 +342,10 @@ def _measures(data: dict) -> str:
     rows = []
     for name, m in data["summary"]["measures"].items():
         value, error = matched(m["value"], m["error"])
+        if m.get("reason"):
+            rows.append(f"<tr><td>{escape(name)}</td><td class=n>{value}</td><td class=soft colspan=3>"
+                        f"{escape(m['reason'])}</td></tr>")
+            continue
         rows.append(f"<tr><td>{escape(name)}</td><td class=n>{value}</td><td class=n>{error}</td>"
                     f"<td>{escape(m['unit'])}</td><td>{escape(others(name, m))}</td></tr>")
     note = (f"<p class=soft>The run holds {cycles(data):.2g} of a cycle: measures per cycle are not those of a whole "

@@ -39,22 +39,6 @@ def step_harmonic(time, means, omega) -> complex:
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
 
 
-def interface_loop(slide, q: complex, f: complex, work: float, stiffness: float) -> dict:
-    """Loop area per cycle [J], equivalent stiffness [N/m] and damping [1] of the interface alone.
-
-    slide (k,) over the window; q, f: first Fourier coefficients of slide and force; work: friction work per cycle;
-    stiffness K = moving_mass omega_1^2, 0 leaves the damping out. The stiffness is the part of the force in phase with
-    the slide, over the slide amplitude: int F cos/(pi A).
-    """
-    amplitude = (slide.max() - slide.min()) / 2
-    out = {"loop_area": float(work)}
-    if amplitude > 0 and abs(q) > 0:
-        out["equivalent_stiffness"] = float((f * q.conjugate()).real / abs(q) / amplitude)
-        if stiffness > 0:
-            out["equivalent_damping"] = work / (2 * np.pi * stiffness * amplitude**2)
-    return out
-
-
 def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
 
@@ -115,19 +99,6 @@ def work_check(work, pairs, jumps: bool = False) -> float:
         after = np.divide(parts, move, out=np.zeros_like(move), where=move != 0) if jumps else None
         total += float(sampled_work(slide, force, after).sum())
     return gap(total, float(work[-1]), float(np.abs(parts).sum()))
-
-
-def drift(time, slide, period: float) -> float:
-    """Mean motion per cycle [m] over the window: mean of the last cycle less that of the first, per cycle between them.
-
-    time: (k,) [s]; slide: (k,) [m]; period [s]. In a window below 1.5 cycles it is the motion from end to end.
-    """
-    end, start = time[-1], time[0]
-    cycles = (end - start) / period
-    if cycles < 1.5:
-        return float(slide[-1] - slide[0]) / max(cycles, 1e-9)
-    first, last = slide[time <= start + period * (1 + 1e-9)], slide[time >= end - period * (1 + 1e-9)]
-    return float(last.mean() - first.mean()) / (cycles - 1)
 
 
 def acceleration_peak(window: Response) -> float:

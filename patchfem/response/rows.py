@@ -11,7 +11,10 @@ from functools import cached_property
 import numpy as np
 
 from ..core import Response, Row
-from .measures import acceleration_peak, drift, energy_balance, interface_loop, ledger_measures, slip_measures
+from ..structure.drive_sizes import whole
+from .loops import drift, half_range, interface_loop, secant_stiffness, turns_of
+from .measures import acceleration_peak, energy_balance, ledger_measures, slip_measures
+from .spectrum import distortion
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,8 +24,9 @@ class Seen:
     window: histories; steps: samples per cycle; extremes (c, 2): of the output in every cycle of the window [m]; book:
     energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode; sine: the drive
     ends as a sine. loop: (slide (k,), first harmonics of slide and force, work per cycle [J]), None where the window
-    holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where it has
-    none.
+    holds no whole cycle (its slide is not read); ledger (4, k) [J] or None; known: name -> value that the engine has
+    itself, None where it has none. jumps: the friction force jumps where the slide turns; still: half range of the
+    slide [m] up to which it is round-off.
     """
 
     window: Response
@@ -36,6 +40,8 @@ class Seen:
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)
+    jumps: bool = False
+    still: float = 0.0
 
     @cached_property
     def slip(self) -> dict:
@@ -44,11 +50,28 @@ class Seen:
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
 
     @cached_property
+    def turns(self) -> list:
+        """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
+        w = self.window
+        return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.jumps)
+
+    @cached_property
     def cycle(self) -> dict:
-        """loop_area [J], equivalent_stiffness [N/m] and equivalent_damping [1] by name, as far as the run has them."""
+        """loop_area [J], and under a sine equivalent_stiffness, secant_stiffness [N/m] and equivalent_damping [1].
+
+        By name, as far as the run has them.
+        """
         if self.loop is None or self.load is None:
             return {}
-        return interface_loop(*self.loop, self.stiffness)
+        moves = self.sine and np.ptp(self.window.slide) > 2 * self.still
+        found = interface_loop(half_range(self.turns) if moves else 0.0, *self.loop[1:], self.stiffness)
+        return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
+
+    @property
+    def distortion(self) -> float | None:
+        """acceleration_distortion [1], None without a sine or without a whole cycle."""
+        time = self.window.time
+        return distortion(self.window, self.drive) if self.sine and whole(time[-1] - time[0], self.drive) else None
 
     @cached_property
     def energies(self) -> dict:
@@ -74,8 +97,12 @@ ROWS = (
     Row("energy_balance", "1", 1e-8,
         "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
         lambda s: energy_balance(s.book)),
-    Row("drift_per_cycle", "m", 1e-11, "motion of the middle of the slide per cycle",
-        lambda s: drift(s.window.time, s.window.slide, s.drive.period)),
+    Row("acceleration_distortion", "1", 1e-6,
+        "third over first harmonic of the acceleration at the output, base motion included",
+        lambda s: s.distortion),
+    Row("drift_per_cycle", "m", 1e-11,
+        "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
+        lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period)),
     Row("slip_amplitude", "m", 1e-10,
         "half peak-to-peak of the irreversible part of the slide, weighted by the pressure",
         lambda s: s.slip.get("slip_amplitude")),
@@ -87,11 +114,14 @@ ROWS = (
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load),
     Row("loop_area", "J", 1e-10, "work of friction per cycle", lambda s: s.cycle.get("loop_area")),
     Row("equivalent_stiffness", "N m-1", 1.0,
-        "first harmonic of the friction in phase with the slide, over the slide's",
-        lambda s: s.cycle.get("equivalent_stiffness")),
+        "part of the friction's first harmonic in phase with the slide over the first harmonic of the slide, negative "
+        "where friction holds the spring while stuck", lambda s: s.cycle.get("equivalent_stiffness")),
+    Row("secant_stiffness", "N m-1", 1.0,
+        "friction at the largest slide of a cycle less that at the smallest over their distance, where it jumps the "
+        "mean of both sides", lambda s: s.cycle.get("secant_stiffness")),
     Row("equivalent_damping", "1", 1e-8,
-        "loop area over 2 pi K A^2, K the stiffness of the first mode, A half the range of the slide",
-        lambda s: s.cycle.get("equivalent_damping")),
+        "loop area over 2 pi K A^2, K the stiffness of the first mode, A half the range of the slide in a cycle, the "
+        "mean over the last cycles", lambda s: s.cycle.get("equivalent_damping")),
     Row("friction_work", "J", 1e-10, "work that went into the interface over the run",
         lambda s: s.energies.get("friction_work")),
     Row("energy_stored", "J", 1e-10, "elastic energy in the interface at the end"),

@@ -1,14 +1,13 @@
 """Measures on signals whose answers are known by hand."""
 
 from dataclasses import replace
-from math import acos, asin, cos, pi, sin
+from math import asin, cos, pi
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem import closed_forms
 from patchfem.core import G_N, BaseSine, Outcome, Response
 from patchfem.dynamics.march.march import hermite_extremes
 from patchfem.response import measures
@@ -51,60 +50,12 @@ def test_exact_harmonic():
     assert found == pytest.approx(2 + 3j, abs=1e-12)
 
 
-def coefficients(time, slide, force):
-    """First Fourier coefficients of slide and force by the trapezium rule."""
-    weight = trapezium(time)
-    return (measures.harmonic(time, weight, slide - slide.mean(), OMEGA), measures.harmonic(time, weight, force, OMEGA))
-
-
 def test_exact_step_harmonic_of_a_square_wave():
     """A force that jumps at samples: coefficient -4i/pi, at any number of steps."""
     for steps in (4, 10, 400):
         time, _ = cycles_of(3, steps)
         means = np.where(np.arange(3 * steps) % steps < steps // 2, 1.0, -1.0)
         assert measures.step_harmonic(time, means, OMEGA) == pytest.approx(-4j / pi, abs=1e-12)
-
-
-@pytest.mark.parametrize("amplitude, length", [(3.0, 1.0), (1.5, 1.0), (1.0, 2.0)])
-def test_exact_loop_of_a_jenkins_element(amplitude, length):
-    """The first harmonic of a bilinear loop (Caughey 1960) and its area."""
-    time, phase = cycles_of(2, 20_000)
-    slide, force, stretch = amplitude * np.sin(phase), np.zeros(phase.size), 0.0
-    for k in range(1, phase.size):
-        stretch = min(max(stretch + slide[k] - slide[k - 1], -length), length)
-        force[k] = stretch / length
-    late = slice(20_000, None)
-    t, q, f = time[late], slide[late], force[late]
-    work = np.sum((f[1:] + f[:-1]) / 2 * np.diff(q))
-    area, _ = closed_forms.jenkins_loop(amplitude, length)
-    assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
-    found = measures.interface_loop(q, *coefficients(t, q, f), work, 0.5)
-    turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
-    stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
-    assert found["loop_area"] == work
-    assert found["equivalent_stiffness"] == pytest.approx(stiffness, rel=1e-6)
-    assert found["equivalent_damping"] == pytest.approx(float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6,
-                                                       abs=1e-12)
-
-
-def test_exact_loop_measures_that_do_not_exist():
-    time, phase = cycles_of(1, 64)
-    ones = np.ones(phase.size)
-    still = measures.interface_loop(ones, *coefficients(time, ones, np.sin(phase)), 0.0, 1.0)
-    assert still == {"loop_area": 0.0}
-    free = measures.interface_loop(np.sin(phase), *coefficients(time, np.sin(phase), np.cos(phase)), 2.0, 0.0)
-    assert set(free) == {"loop_area", "equivalent_stiffness"}
-    assert free["equivalent_stiffness"] == pytest.approx(0.0, abs=1e-12)
-
-
-@given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
-def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope, shift):
-    time, phase = cycles_of(1, 128)
-    slide = offset + amplitude * np.sin(phase + shift)
-    force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
-    found = measures.interface_loop(slide, *coefficients(time, slide, force), 1.0, 0.0)
-    grid = (slide.max() - slide.min()) / 2 / amplitude  # the samples may miss the top
-    assert found["equivalent_stiffness"] == pytest.approx(slope / grid, abs=1e-10)
 
 
 # slip
@@ -144,19 +95,6 @@ def test_always_circular_mean(middle, spread):
     found = measures.circular_mean([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
     assert 0 <= found <= pi
     assert min(abs(found - middle % pi), pi - abs(found - middle % pi)) < 1e-9
-
-
-@pytest.mark.parametrize("count", [2, 5, 10])
-def test_exact_drift(count):
-    time, phase = cycles_of(count, 50)
-    slide = 3e-6 * np.sin(phase + 0.3) + 2e-7 * phase / (2 * pi) + 1e-6
-    assert measures.drift(time, slide, DRIVE.period) == pytest.approx(2e-7, rel=1e-9)
-    assert measures.drift(time, np.full(time.size, 0.3), DRIVE.period) == 0.0
-
-
-def test_exact_drift_of_less_than_two_cycles():
-    time, phase = cycles_of(1, 50)
-    assert measures.drift(time, 2e-7 * phase / (2 * pi), DRIVE.period) == pytest.approx(2e-7, rel=1e-12)
 
 
 # peaks

@@ -6,7 +6,8 @@ from time import perf_counter
 import numpy as np
 
 from ...effects import has
-from ...response.measures import harmonic, interface_loop, ledger_measures, step_harmonic, work_check
+from ...response.loops import half_range, interface_loop, secant_stiffness, turns_of
+from ...response.measures import harmonic, ledger_measures, step_harmonic, work_check
 from .closed import closed
 from .engine import CLOSED, STEPPED, Engine, engine_of
 from .stepped import stepped
@@ -97,7 +98,10 @@ def _values(model, time, slide, out, first, omega) -> dict:
         weight[1:] += np.diff(t) / 2
         weight[:-1] += np.diff(t) / 2
         means = np.divide(np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0)
-        found |= interface_loop(q, harmonic(t, weight, q - q.mean(), omega), step_harmonic(t, means, omega),
-                                work[-1] - work[first], 0.0)
+        turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], has(model.friction.law, "memoryless"))
+        found |= interface_loop(half_range(turns), harmonic(t, weight, q - q.mean(), omega),
+                                step_harmonic(t, means, omega), work[-1] - work[first], 0.0)
+        secant = secant_stiffness(turns)
+        found |= {"secant_stiffness": secant} if secant is not None else {}
         found["drift_per_cycle"] = float(q[-1] - q[0])
     return found

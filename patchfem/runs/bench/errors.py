@@ -61,6 +61,7 @@ def stated(model, fine) -> dict:
     out["energy_stored"] = out["friction_force_peak"] * f.bond_length
     out["energy_created"] = error * fine.values["energy_created"]
     out["loop_area"] = error * float(np.abs(np.diff(fine.ledger[0][fine.first:])).sum())
-    out["equivalent_stiffness"] = error * abs(fine.values.get("equivalent_stiffness", 0.0))
+    out |= {f"{name}_stiffness": error * abs(fine.values.get(f"{name}_stiffness", 0.0)) for name in ("equivalent",
+                                                                                                     "secant")}
     return {name: value for name, value in out.items() if name in fine.values} | \
         {name: 0.0 for name in fine.values if name not in out}

@@ -60,11 +60,12 @@ def run_comparison(model, numerics, patch, frames: int = 0, say=None, progress=N
     book = _book(done)
     span = kept.time[-1] - kept.time[0]
     work = float(np.trapezoid(kept.force, kept.slide)) * drive.period / span if span > 0 else 0.0
-    spent, known = book["friction"], {}
+    spent, known, jumps = book["friction"], {}, False
     if model.friction is not None:
         known["work_check"] = _work_check(response, book)
+        jumps = has(model.friction.law, "memoryless")
     values = measures_of(seen(model, patch, kept, extremes[-last:], book, n, loop=sampled_loop(kept, drive, work),
-                              ledger=np.array([[spent], [0.0], [spent], [0.0]]), known=known))
+                              ledger=np.array([[spent], [0.0], [spent], [0.0]]), known=known, jumps=jumps))
     stuck, own = False, {}
     if model.friction is not None:
         values |= other_measures(kept, drive, n)

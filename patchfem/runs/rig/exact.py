@@ -39,6 +39,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     rubs = model.friction is not None
     rings, own = run_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
     values |= rings
+    own |= _of_samples(done.window, modes, drive)
     outcome = done.outcome or (Outcome.STUCK if stuck else None)
     ends = window_ends(done.amplitudes, done.phasors, numerics.window)
     return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
@@ -109,7 +110,7 @@ def _values(model, numerics, patch, drive, done) -> tuple:
         if not apart:  # the loop of strips is that of their samples
             known["work_check"] = _work_check(done)
     values = measures_of(seen(model, patch, window, extremes, done.ledger, 400, drive=drive, loop=loop, ledger=ledger,
-                              known=known))
+                              known=known, jumps=True))
     if model.friction is None:
         return values, False
     if not apart:
@@ -126,6 +127,17 @@ def _work_check(done) -> float:
     power, energy = weight * force * rate, done.ledger["power"] + done.ledger["peak_stored"]
     sampled = sampled_work(window.slide, window.force).sum()
     return gap(float(sampled), float(power.sum()), float(np.abs(power).sum()), energy)
+
+
+def _of_samples(window, modes, drive) -> dict:
+    """Errors by name of what is read off cubics through the samples of the window, 400 a cycle.
+
+    A cubic misses h^4/384 of the fourth derivative. Seen against 8000 a cycle: 2e-14 of the range in the drift, as the
+    cycles miss nearly alike, and 4e-10 in the distortion. What jumps excite in a mode r times as fast as the drive
+    falls with 1/r^2, its fourth derivative grows with r^2.
+    """
+    faster = max(1.0, float(modes.omega.max()) / omega_of(drive))**2
+    return {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide)), "acceleration_distortion": 1e-9 * faster}
 
 
 def _loop(done, drive, span: float, apart: bool) -> tuple | None:

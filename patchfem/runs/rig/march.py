@@ -45,6 +45,7 @@ class _Read:
             least = 1e-15 * peak_speed(rig.drive) * rig.drive.period
             self.held = least if contact.set_valued else 1e-3 * contact.length
             self.creeps = has(model.friction.law, "creeps")  # it never holds, nor sticks
+            self.jumps = has(model.friction.law, "memoryless") and not model.soft
             self.held *= not self.creeps
 
     def solution(self, done, seconds: float, prepare: dict) -> Solution:
@@ -69,16 +70,14 @@ class _Read:
         if self.model.friction is None:
             return measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps))
         if stuck and self.contact.set_valued:  # what moves in round-off does not slide
-            known |= dict.fromkeys(("slip_start_phase", "equivalent_stiffness", "equivalent_damping"))
-            known["stick_fraction"] = 1.0
+            known |= {"slip_start_phase": None, "stick_fraction": 1.0}
             moving = self.model.rig.modes.mass * peak_speed(drive, self.model.rig.start)**2
             book = book | {"power": book["power"] + moving}  # its energies are round-off of such a one
         energy = book["power"] + book["peak_stored"]
         known["work_check"] = gap(book["sampled"], book["booked"], book["passed"], energy)
         found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps,
-                                 loop=self._loop(part), ledger=ledger, known=known))
-        if self.contact.set_valued and found["slip_amplitude"] < self.held:  # what moves is round-off
-            found = {name: v for name, v in found.items() if not name.startswith("equivalent_")}
+                                 loop=self._loop(part), ledger=ledger, known=known, jumps=self.jumps,
+                                 still=self.held if self.contact.set_valued else 0.0))
         others = not self.model.rig.strips_slide_apart
         return found | (other_measures(part.window, drive, self.numerics.steps) if others else {})
 

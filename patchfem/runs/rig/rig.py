@@ -10,6 +10,7 @@ from ...friction.record import law_from
 from ...response.coarser import estimate
 from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
+from ...response.reasons import without_value
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
 from ..bench.averaged import limit_tractions
@@ -58,6 +59,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     fields = {}
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
+    found |= without_value(found, raw.window, drive, f is not None)
     extra |= {"book": raw.book, "period": drive.period}
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]

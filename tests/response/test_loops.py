@@ -1,0 +1,212 @@
+"""The friction loop of a window: range, stiffness, damping and drift, from even and from uneven samples."""
+
+from math import acos, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from patchfem import closed_forms
+from patchfem.response import loops
+from patchfem.response.measures import harmonic
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+OMEGA = 2 * pi * 143
+PERIOD = 2 * pi / OMEGA
+BLOCK = """\
+[normal]
+load = "26 lbf"
+[friction]
+law = "coulomb"
+static = 0.3
+{more}
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "{drive}"
+cycles = {cycles}
+"""
+
+
+def evenly(count, steps):
+    """(time, drive phase) of `count` whole cycles with both ends."""
+    phase = 2 * pi * np.arange(count * steps + 1) / steps
+    return phase / OMEGA, phase
+
+
+def unevenly(count, steps):
+    """The same with more samples in the second half of every cycle, and twins an ulp apart, as events have them."""
+    time = evenly(count, steps)[0]
+    extra = (time[:-1] + 0.3 * np.diff(time))[np.arange(count * steps) % steps > steps // 2]
+    twins = np.nextafter(time[7::31], -np.inf)
+    time = np.unique(np.concatenate([time, extra, twins]))
+    return time, OMEGA * time
+
+
+def coefficients(time, slide, force):
+    """First Fourier coefficients of slide and force by the trapezium rule."""
+    weight = np.full(time.size, 1.0)
+    weight[[0, -1]] = 0.5
+    return harmonic(time, weight, slide - slide.mean(), OMEGA), harmonic(time, weight, force, OMEGA)
+
+
+# stiffness and damping
+
+def jenkins_loop(amplitude, length, steps):
+    """(time, slide, rate, force) of the second of two cycles of a slider of length 1 behind a spring 1/length."""
+    time, phase = evenly(2, steps)
+    slide, force, stretch = amplitude * np.sin(phase), np.zeros(phase.size), 0.0
+    for k in range(1, phase.size):
+        stretch = min(max(stretch + slide[k] - slide[k - 1], -length), length)
+        force[k] = stretch / length
+    late = slice(steps, None)
+    return time[late], slide[late], OMEGA * amplitude * np.cos(phase[late]), force[late]
+
+
+@pytest.mark.parametrize("amplitude, length", [(3.0, 1.0), (1.5, 1.0), (1.0, 2.0)])
+def test_exact_loop_of_a_jenkins_element(amplitude, length):
+    """The first harmonic of a bilinear loop (Caughey 1960), its area, and the line between its ends."""
+    t, q, v, f = jenkins_loop(amplitude, length, 20_000)
+    work = np.sum((f[1:] + f[:-1]) / 2 * np.diff(q))
+    area, _ = closed_forms.jenkins_loop(amplitude, length)
+    assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
+    turns = loops.turns_of(t, q, v, f, PERIOD)
+    assert loops.half_range(turns) == pytest.approx(amplitude, rel=1e-12)
+    assert loops.secant_stiffness(turns) == pytest.approx(1 / max(amplitude, length), rel=1e-9)
+    found = loops.interface_loop(loops.half_range(turns), *coefficients(t, q, f), work, 0.5)
+    turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
+    stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
+    assert found["loop_area"] == work
+    assert found["equivalent_stiffness"] == pytest.approx(stiffness, rel=1e-6)
+    assert found["equivalent_damping"] == pytest.approx(float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6,
+                                                       abs=1e-12)
+
+
+def test_exact_stiffness_is_over_the_first_harmonic_of_the_slide():
+    """q = sin + 0.3 sin 3: F = 7 sin has Re F1/q1 = 7, whatever the range of the slide is (the bars of a balance)."""
+    t, phase = evenly(2, 400)
+    q, f = np.sin(phase) + 0.3 * np.sin(3 * phase), 7 * np.sin(phase)
+    found = loops.interface_loop(np.ptp(q) / 2, *coefficients(t, q, f), 0.0, 0.0)
+    assert found["equivalent_stiffness"] == pytest.approx(7.0, rel=1e-12)
+
+
+def test_exact_loop_measures_that_do_not_exist():
+    time, phase = evenly(1, 64)
+    ones = np.ones(phase.size)
+    still = loops.interface_loop(0.0, *coefficients(time, ones, np.sin(phase)), 0.0, 1.0)
+    assert still == {"loop_area": 0.0}
+    free = loops.interface_loop(1.0, *coefficients(time, np.sin(phase), np.cos(phase)), 2.0, 0.0)
+    assert set(free) == {"loop_area", "equivalent_stiffness"}
+    assert free["equivalent_stiffness"] == pytest.approx(0.0, abs=1e-12)
+
+
+@given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
+def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope, shift):
+    time, phase = evenly(1, 128)
+    slide = offset + amplitude * np.sin(phase + shift)
+    force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
+    found = loops.interface_loop(np.ptp(slide) / 2, *coefficients(time, slide, force), 1.0, 0.0)
+    assert found["equivalent_stiffness"] == pytest.approx(slope, abs=1e-10)
+    turns = loops.turns_of(time, slide, amplitude * OMEGA * np.cos(phase + shift), slope * (slide - offset), PERIOD)
+    assert loops.half_range(turns) == pytest.approx(amplitude, rel=1e-7)
+    # the force is straight between samples: (pi/128)^2/2 of it at the top
+    assert loops.secant_stiffness(turns) == pytest.approx(slope, abs=1e-3)
+
+
+def test_order_range_between_the_samples():
+    """The samples miss both ends of a sine by 0.35 of a step."""
+    errors = []
+    for steps in (20, 40, 80):
+        phase = 2 * pi * (np.arange(3 * steps + 1) + 0.35) / steps
+        turns = loops.turns_of(phase / OMEGA, np.sin(phase), OMEGA * np.cos(phase), phase, PERIOD)
+        assert len(turns) == 3
+        errors.append(abs(loops.half_range(turns) - 1))
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1) and errors[-1] < 1e-7
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.2, 0.9])
+@pytest.mark.parametrize("fall", [0.0, 0.4])
+def test_exact_secant_where_the_force_jumps(rest, fall):
+    """A slide that rests for `rest` rad at its ends, the friction 1 - fall before a rest, at -1 after it begins again:
+    the rest itself and what holds there do not count, only the two sides."""
+    phase = 2 * pi * np.arange(3 * 400 + 1) / 400 - 1.0
+    turn, part = np.divmod(phase, pi)
+    way = 1 - 2 * (turn % 2)
+    slide = -way * np.cos(np.clip(part * pi / (pi - rest), 0, pi))
+    force = np.where(part < pi - rest, way * np.where(part < pi / 2, 1.0, 1 - fall), way * 0.123)
+    turns = loops.turns_of(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, True)
+    assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(-fall / 2, abs=1e-12)
+    assert loops.half_range(turns) == pytest.approx(1.0, abs=2e-4)  # samples alone, without rates
+
+
+def test_always_no_secant_without_slide_or_sides():
+    time = np.linspace(0, PERIOD, 9)
+    zero, force = np.zeros(9), np.arange(9.0)
+    assert loops.secant_stiffness(loops.turns_of(time, zero, zero, force, PERIOD, True)) is None
+    up = loops.turns_of(time, time, 1 + zero, force, PERIOD, True)  # both ends of the window are its turns
+    assert up[0][1].force is None and loops.secant_stiffness(up) is None
+    assert loops.turns_of(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == [] and loops.half_range([]) == 0.0
+
+
+# drift
+
+@pytest.mark.parametrize("samples", [evenly, unevenly])
+@pytest.mark.parametrize("count", [2, 5, 10])
+def test_exact_drift(count, samples):
+    """A mean by time: the crowded half of a cycle counts no more than the other."""
+    time, phase = samples(count, 60)
+    slide = 3e-6 * np.sin(phase + 0.3) + 2e-7 * phase / (2 * pi) + 1e-6
+    rate = OMEGA * (3e-6 * np.cos(phase + 0.3) + 2e-7 / (2 * pi))
+    assert loops.drift(time, slide, rate, PERIOD) == pytest.approx(2e-7, rel=1e-9)
+    assert loops.drift(time, np.full(time.size, 0.3), 0 * rate, PERIOD) == 0.0
+
+
+def test_exact_mean_of_cubics_over_any_samples():
+    time = np.sort(np.random.default_rng(5).uniform(0, 2, 30))
+    time[[0, -1]] = 0, 2
+    y, v = time**3 - time, 3 * time**2 - 1
+    assert loops.time_mean(time, y, v, 0.0, 2.0) == pytest.approx(1.0, rel=1e-13)
+
+
+def test_exact_drift_of_less_than_two_cycles():
+    time, phase = evenly(1, 50)
+    assert loops.drift(time, 2e-7 * phase / (2 * pi), 0 * time, PERIOD) == pytest.approx(2e-7, rel=1e-12)
+
+
+# scenes
+
+def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
+    """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
+    from patchfem.dynamics.events import batches
+    from patchfem.dynamics.events.engine import Engine
+
+    model, cycles = done.plan.model, done.plan.model.rig.cycles
+    limits = [np.array([limit]) for limit in model.limits(model.point.load)]
+    engine = Engine(model.rig.modes, model.rig.drive, *limits, cycles, None)
+    pieces = batches.gather(list(engine.pieces()))
+    times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
+    return batches.sample(pieces, times, model.rig.modes, model.rig.drive, engine.live).slide
+
+
+@pytest.mark.parametrize("more, drive", [("", "7 g"), ("", "5 g"), ("kinetic = 0.2", "5 g")])
+def test_exact_range_and_drift_of_an_exact_run(more, drive):
+    """A ring-up, sliding through and sticking: the last cycles by the engine's series at 20 000 instants a cycle. Both
+    bars hold; they did not while A came from Gauss nodes and the drift from a mean of uneven samples."""
+    done = run(plan(loads(BLOCK.format(more=more, drive=drive, cycles=21))))
+    slides = [dense(done, begin) for begin in (19, 20)]
+    drift, damping = done.measures["drift_per_cycle"], done.measures["equivalent_damping"]
+    rough = 1e-8 * np.ptp(slides[0]) * 1e-3  # of the midpoint rule across stops: 1/20000^2
+    assert abs(drift.value - (slides[1].mean() - slides[0].mean())) <= drift.error + rough
+    wide = np.mean([np.ptp(one) / 2 for one in slides])
+    truth = done.measures["loop_area"].value / (2 * pi * 0.884 * OMEGA**2 * wide**2)
+    assert damping.value == pytest.approx(truth, rel=damping.error / truth + 2e-8)  # (pi/20000)^2/2 at the top
