@@ -8,6 +8,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..effects import EFFECTS
+from ..runs.results.chosen import chosen
 from ..runs.results.result import Result
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
@@ -47,9 +48,10 @@ def write_json(value: dict, path: Path) -> None:
 def summary_of(result: Result) -> dict:
     """The object of summary.json."""
     what = result.plan
-    return summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
-                   effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
-                   result.seconds)
+    answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
+                     effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
+                     result.seconds)
+    return answer | {"numerics": chosen(result)}
 
 
 def effects_of(result: Result) -> list:

@@ -21,7 +21,7 @@ from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors
-from .numerics import choose, refuse_costly
+from .numerics import choose, quadrature_of, refuse_costly
 from .solution import curve_measures
 
 
@@ -60,7 +60,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
     found |= without_value(found, raw.window, drive, f is not None)
-    extra |= {"book": raw.book, "period": drive.period}
+    extra |= {"book": raw.book, "period": drive.period} | _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
@@ -68,6 +68,17 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         warnings = [*warnings, *travelled(patch, raw.response.slide)]
     return Result(what, ended(outcome, model.patch, patch, raw.response.slide), found, raw.response, raw.window, patch,
                   fields, seconds, warnings, extra)
+
+
+def _behind(model, numerics, contact) -> dict:
+    """How the friction of a march is summed and what stands for the pieces behind it, as far as it has any."""
+    out, f = {}, model.friction
+    reduced = getattr(contact, "reduction", None)
+    if reduced is not None:
+        out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(np.size(reduced.stiffness))
+    if f is not None and has(f.law, "bonds") and numerics.engine == "march":
+        out["quadrature"] = quadrature_of(model, numerics).engine
+    return out
 
 
 def _said(model, patch, raw, outcome, found) -> list:

@@ -1,0 +1,25 @@
+"""The numerical choices of a run, by the names that summary.json gives them."""
+
+COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
+
+
+def chosen(result) -> dict:
+    """Engine, steps per cycle, cycles and window of a run, shear modes or elements behind the pieces' shear, how bonds
+    are summed, and interface nodes, strips and levels of meshes of its patch; a choice that the run did not make is
+    left out."""
+    extra, patch, out = result.extra, result.patch, {}
+    if (engine := extra.get("engine")) is not None:
+        out["engine"] = engine
+    steps = extra.get("steps")
+    if steps is not None:
+        out["steps_per_cycle"] = int(steps)
+    out |= {name: int(extra[name]) for name in COUNTS if extra.get(name) is not None}
+    if (summed := extra.get("quadrature")) is not None:
+        out["quadrature"] = summed
+    if (window := extra.get("window")) is not None:
+        out["window_cycles"] = int(window)
+    if patch is not None:
+        out["interface_nodes"] = int(patch.x.size)
+        if result.plan.model.patch.strips is not None:
+            out["strips"] = int(result.plan.model.patch.strips[0])
+    return out
