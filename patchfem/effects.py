@@ -6,7 +6,8 @@ nothing else in the package knows which laws there are.
 
 A law is carried by the bench, by a rig of one interface under a constant load, and by what its record names: "shear"
 of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw), "varying-load" in a rig,
-"harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events. Traits: "set-valued" (it holds
+"harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events, "pieces" of it (elements that
+stick or slip, exact from yield to yield). Traits: "set-valued" (it holds
 without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
 "timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds).
 
@@ -74,13 +75,13 @@ EFFECTS = {
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
-                                 ("", "kinetic"), "shear joints varying-load comparison exact",
+                                 ("", "kinetic"), "shear joints varying-load comparison exact pieces",
                                  "set-valued timeless memoryless"),
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
                               "joints varying-load harmonic comparison", "memoryless creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
                                          "reversal)", ("bond_length", ""),
-                                         "shear joints varying-load harmonic comparison", "timeless"),
+                                         "shear joints varying-load harmonic comparison pieces", "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
                                    "initial_bonds breakaway spread temperature"),
@@ -89,7 +90,7 @@ EFFECTS = {
                                      "(Oden, Pires)", ("bond_length", "order spread"), "exact",
                                      "averaged set-valued timeless memoryless"),
     "friction.law=iwan": _law("laws.iwan", "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max)"
-                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic", "timeless"),
+                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic pieces", "timeless"),
     "friction.law=bouc-wen": _law("laws.bouc_wen", "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
                                   ("stiffness", "exponent shape"), "joints harmonic", "timeless"),
     "friction.law=lugre": _law("laws.lugre", "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "

@@ -15,6 +15,7 @@ from ...response.coarser import Rung, space_rung
 from ...response.errors import change, step_error
 from ...scene.rules import methods
 from ..effort import too_long
+from .pieces.costs import seconds_of_pieces, seconds_of_steps
 
 
 class Variant(NamedTuple):
@@ -49,13 +50,33 @@ class Engine(NamedTuple):
 def no_closed_form(model: Model, steady: bool = False) -> str:
     """Why a run has no exact solution; empty where it has one. steady: under the sine of a curve, not the drive's own
     waveform."""
+    return methods.no_closed_form(*_met(model, steady))
+
+
+def no_pieces(model: Model) -> str:
+    """Why a run is not linear from yield to yield; empty where it is."""
+    return methods.no_pieces(*_met(model))
+
+
+def _met(model: Model, steady: bool = False) -> tuple:
+    """What a model confronts an exact engine with, as `scene.rules.methods` asks."""
     rig = model.rig
     laws = [one.numbers.law for one in rig.interfaces]
     spring = "[structure.stiffening]" if rig.cubic is not None else \
         "structure.bonded.wavelength" if rig.interlock is not None else ""
     waveform = "" if steady or rig.kind == "free" else rig.waveform
-    return methods.no_closed_form(laws, model.soft, "under a load that changes" if rig.load_varies else "",
-                                  rig.strips_slide_apart, waveform, spring)
+    return (laws, model.soft, "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, waveform,
+            spring)
+
+
+def dearer_pieces(model: Model) -> str:
+    """Why the march is to run a model: it is not linear from yield to yield, the scene names its steps, or its yields
+    cost more than steps."""
+    if reason := no_pieces(model):
+        return reason
+    if model.accuracy.steps_per_cycle is not None:
+        return "its steps are named"
+    return "its yields cost more than steps" if seconds_of_pieces(model) > seconds_of_steps(model) else ""
 
 
 def _not_exact(model: Model) -> str:
@@ -94,6 +115,11 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
     samples = [Rung((), sampled)] if model.rig.strips_slide_apart else []
     return [*samples, space_rung(Variant(numerics, coarse))] if meshed else samples
+
+
+def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+    """Rungs of the engine of pieces: the mesh, where its nodes make the elements."""
+    return [space_rung(Variant(numerics, coarse))] if coarse is not None and model.soft else []
 
 
 def _fewer(numerics, share: int):
@@ -141,15 +167,18 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
+PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rungs, _pieces_in_space)
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
 HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0)
 COMPARED = ("duhamel", "newmark", "euler")
-ENGINES = {one.name: one for one in (EXACT, MARCH, HARMONIC, *(
+ENGINES = {one.name: one for one in (EXACT, PIECES, MARCH, HARMONIC, *(
     Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space)
     for name in COMPARED))}
-AUTOMATIC = (EXACT, MARCH)  # in the order in which they are tried
+AUTOMATIC = (EXACT, PIECES, MARCH)  # in the order in which they are tried
 
 
 def engine_of(model: Model) -> Engine:
     """The engine that a scene names, or the first of AUTOMATIC that lacks nothing."""
+    if model.accuracy.method == "exact" and no_closed_form(model):
+        return PIECES
     return ENGINES.get(model.accuracy.method) or next(one for one in AUTOMATIC if not one.lacks(model))

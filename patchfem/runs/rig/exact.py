@@ -34,7 +34,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     else:
         done = _go(rig, drive, forces, numerics.cycles, numerics.window, rig.start, progress, say)
         levels, slips = (), None
-        done = _whole(_over_strips(done, patch) if rig.strips_slide_apart else done)
+        done = whole_cycles(_over_strips(done, patch) if rig.strips_slide_apart else done)
     values, stuck = _values(model, numerics, patch, drive, done)
     rubs = model.friction is not None
     rings, own = run_events.rings(done.window, modes, drive, done.log) if rubs else ({}, {})
@@ -156,7 +156,7 @@ def _loop(done, drive, span: float, apart: bool) -> tuple | None:
     return slide, q, part, work
 
 
-def _whole(done):
+def whole_cycles(done):
     """The run without the extremes and the phasor of a last cycle that is cut short."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):
@@ -187,11 +187,11 @@ def _levels(model, numerics, patch, forces, progress, say) -> tuple:
     def slips(number, level):
         return not _values(model, numerics, patch, *go(level, states[number + 1])[::-1])[1]
 
-    return _joined(parts, cycles * drive.period), tuple(levels), slips
+    return joined_runs(parts, cycles * drive.period), tuple(levels), slips
 
 
-def _joined(parts, each: float):
-    """Runs of `each` [s] one after the other as one EventRun; its window and loop are those of the last."""
+def joined_runs(parts, each: float):
+    """Runs of `each` [s] one after the other as one EventRun or PieceRun; its window and loop are those of the last."""
     shift = [k * each for k in range(len(parts))]
     last, rows = parts[-1], [slice(None, -1)] * (len(parts) - 1) + [slice(None)]  # where one ends the next begins
 
@@ -201,7 +201,10 @@ def _joined(parts, each: float):
     columns = {name: column(lambda p, name=name: getattr(p.response, name))
                for name in type(last.response).__dataclass_fields__ if name not in ("time", "extra")}
     time = np.concatenate([_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)])
-    extra = {name: column(lambda p, name=name: p.response.extra[name]) for name in last.response.extra}
+    extra = {name: column(lambda p, name=name: p.response.extra[name]) for name in last.response.extra
+             if name != "ledger"}
+    if "ledger" in last.response.extra:
+        extra["ledger"] = column(lambda p: p.response.extra["ledger"].T).T
     response = replace(last.response, time=time, extra=extra, **columns)
     window = replace(last.window, time=_later(last.window.time, shift[-1]))
     ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}

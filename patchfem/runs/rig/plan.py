@@ -9,6 +9,7 @@ from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
 from .numerics import choose, list_cost, quadrature_of
+from .pieces.costs import pieces, seconds_of_pieces
 
 
 def chain(rig) -> dict:
@@ -21,6 +22,8 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     numerics, rig, f, soft = choose(model, per_point), model.rig, model.friction, bool(model.soft)
     if numerics.engine == "exact":
         return "exact", *exact_effort(model)
+    if numerics.engine == "piecewise":
+        return "piecewise", int(pieces(model) * numerics.cycles), seconds_of_pieces(model)
     if numerics.engine == "harmonic":
         points = 1 if rig.waveform == "sine" else 120
         return "harmonic", points, 0.3 + 0.05 * points

@@ -46,7 +46,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     raw, numerics, found = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
     extra |= raw.extra
     drive = extra.pop("at", drive)
-    if numerics.engine not in ("exact", "harmonic"):
+    if numerics.engine not in ("exact", "piecewise", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
         lowest = levels.onset(raw.levels, raw.slips, model.accuracy.tolerance)

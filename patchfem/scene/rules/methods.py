@@ -107,9 +107,29 @@ def no_closed_form(laws: list, soft: str, varies: str, apart: bool, waveform: st
     return f"beside {spring}" if spring else ""
 
 
+def no_pieces(laws: list, soft: str, varies: str, apart: bool, waveform: str, spring: str) -> str:
+    """Why a run is not linear from yield to yield, as elements that stick or slip make it; empty where it is.
+
+    Arguments as in `no_closed_form`. Coulomb's law is such a law where the pieces give way.
+    """
+    odd = next((law for law in laws if "pieces" not in LAWS[law].carries.split()
+                or (has(law, "set-valued") and not soft)), "" if laws else "none")
+    if odd:
+        return f"for law '{odd}'" + (f" beside {soft}" if soft else "")
+    if varies:
+        return varies
+    if apart:
+        return "beside strips that yaw"
+    return f"beside {spring}" if spring else ""
+
+
 def _exact(m: Motion, method: str) -> str:
     waveform = m.drive.waveform if m.drive is not None and m.drive.kind != "free" else ""
-    why = no_closed_form([one.law for one in m.laws], m.soft, m.varies, m.apart, waveform, m.spring)
+    laws = [one.law for one in m.laws]
+    meets = m.soft, m.varies, m.apart, waveform, m.spring
+    why = no_closed_form(laws, *meets)
+    if why and laws and all("pieces" in LAWS[law].carries.split() for law in laws):
+        why = no_pieces(laws, *meets)
     return f"no exact solution exists {why}; use 'march' or leave method out" if why else ""
 
 

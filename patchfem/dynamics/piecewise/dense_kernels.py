@@ -1,0 +1,78 @@
+"""Compiled reading of a run's rows: the motion at any time in a piece, and the largest absolute acceleration."""
+
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+from .drive_kernels import RATE, drive_series
+from .march_kernels import EACH, HEAD, moved, speed_series
+from .series_kernels import fastest, largest, motion_series, powers, value
+
+
+@njit(error_model="numpy", **LEAN)
+def unfold(row, h, plant, clock, room):
+    """Fill the room with the series of the piece of a row over h [s]; the highest power."""
+    n, faces = plant.square.size, plant.faces.shape[0]
+    segment = clock.segments[int(row[3])]
+    start = HEAD + 2 * n
+    for i in range(n):
+        room.nodes[i, 0], room.nodes[i, 1] = row[HEAD + i], row[HEAD + n + i]
+    for f in range(faces):
+        room.polys[faces, f], room.springs[f] = row[start + EACH * f], row[start + EACH * f + 1]
+    top = powers(max(fastest(plant, room.springs), segment[RATE]) * h)
+    drive_series(segment, row[5], row[6], clock.period[0], h, top, room.waves)
+    motion_series(room.nodes[:n, :2].T, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs,
+                  room.pull)
+    for f in range(faces):
+        speed_series(plant.faces[f], room.coefs, top, room.polys[f])
+    return top
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def evaluate(rows, owner, tau, plant, clock, room, out):
+    """Motion at tau (j,) [s] after the starts of the rows owner (j,), rising.
+
+    out (j, 2 n + 1 + 6 i): z, v, drive [m s-2], then of every interface slide [m], rate [m/s], force [N], slip [m],
+    work and loss [J].
+    """
+    n, faces, last, top, h = plant.square.size, plant.faces.shape[0], -1, 0, 1.0
+    for j in range(owner.size):
+        row = rows[owner[j]]
+        if owner[j] != last:
+            last, h = owner[j], max(row[1], 1e-300)
+            top = unfold(row, h, plant, clock, room)
+        u = tau[j] / h
+        for i in range(n):
+            out[j, i] = value(room.coefs[:, i], 0, top, u)
+            rate = top * room.coefs[top, i]
+            for k in range(top - 1, 0, -1):
+                rate = rate * u + k * room.coefs[k, i]
+            out[j, n + i] = rate / h
+        out[j, 2 * n] = value(room.waves[0], 0, top, u)
+        for f in range(faces):
+            at, to = HEAD + 2 * n + EACH * f, 2 * n + 1 + 6 * f
+            step, place = moved(room.polys[f], top, u), 0.0
+            for i in range(n):
+                place += plant.faces[f, i] * out[j, i]
+            out[j, to], out[j, to + 1] = place, value(room.polys[f], 0, top - 1, u) / h
+            out[j, to + 2] = row[at] + row[at + 1] * step
+            out[j, to + 3] = row[at + 4] + row[at + 2] * step
+            out[j, to + 4] = row[at + 5] + (row[at] + 0.5 * row[at + 1] * step) * step
+            out[j, to + 5] = row[at + 6] + row[at + 3] * abs(step)
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def peak(rows, plant, clock, moving, room):
+    """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included."""
+    best, poly = 0.0, room.polys[plant.faces.shape[0]]
+    for j in range(rows.shape[0]):
+        h = rows[j, 1]
+        if h <= 0:
+            continue
+        top = unfold(rows[j], h, plant, clock, room)
+        for k in range(top - 1):
+            part = 0.0
+            for i in range(plant.square.size):
+                part += plant.output[i] * room.coefs[k + 2, i]
+            poly[k] = part * (k + 1) * (k + 2) / (h * h) + moving * room.waves[0, k]
+        best = largest(poly, top - 2, best, room.hulls)
+    return best

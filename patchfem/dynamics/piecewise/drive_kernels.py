@@ -1,0 +1,97 @@
+"""Compiled series of a drive over a short piece: sines and constants, straight lines, sweeps of either kind.
+
+A segment of the drive is a row: cycle and offset [s] of its start, kind, constant [m s-2], amplitude, omega [rad/s],
+phase [rad] at the start of every cycle (of a sweep at its own start), slope, whether the amplitude is a displacement,
+fastest rate [1/s].
+"""
+
+from math import cos, exp, expm1, pi, sin
+
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+
+SINE, LINE, CHIRP, LOG_CHIRP = 0.0, 1.0, 2.0, 3.0  # kinds of a segment
+CYCLE, OFFSET, KIND, CONSTANT, AMPLITUDE, OMEGA, PHASE, SLOPE, DISPLACED, RATE = range(10)
+
+
+@njit(error_model="numpy", **LEAN)
+def since(segment, cycle, offset, period):
+    """Time [s] since a segment began."""
+    return (cycle - segment[CYCLE]) * period + (offset - segment[OFFSET])
+
+
+@njit(error_model="numpy", **LEAN)
+def phase_of(segment, cycle, offset, period):
+    """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
+    if segment[KIND] == SINE:
+        return (segment[PHASE] + segment[OMEGA] * offset) % (2 * pi)
+    if segment[KIND] == LINE:
+        return 2 * pi * offset / period
+    time = since(segment, cycle, offset, period)
+    if segment[KIND] == CHIRP:
+        return (segment[PHASE] + time * (segment[OMEGA] + 0.5 * segment[SLOPE] * time)) % (2 * pi)
+    return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (2 * pi)
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def drive_series(segment, cycle, offset, period, h, top, waves):
+    """Fill waves[0] (>= top + 1,) with the series over u = t/h of a drive [m s-2] from the time (cycle, offset) on.
+
+    waves (3, >= top + 1): the rest is room.
+    """
+    wave, kind, theta = waves[0], segment[KIND], phase_of(segment, cycle, offset, period)
+    if kind == SINE:
+        turn = segment[OMEGA] * h
+        wave[0], wave[1] = segment[AMPLITUDE] * sin(theta), segment[AMPLITUDE] * cos(theta) * turn
+        for k in range(2, top + 1):
+            wave[k] = -wave[k - 2] * turn * turn / (k * (k - 1))
+        wave[0] += segment[CONSTANT]
+        return
+    time = since(segment, cycle, offset, period)
+    if kind == LINE:
+        for k in range(top + 1):
+            wave[k] = 0.0
+        wave[0], wave[1] = segment[CONSTANT] + segment[SLOPE] * time, segment[SLOPE] * h
+        return
+    omega = segment[OMEGA] + segment[SLOPE] * time if kind == CHIRP else segment[OMEGA] * exp(segment[SLOPE] * time)
+    swept(kind, omega, theta, segment[SLOPE] * h, h, top, waves)
+    if segment[DISPLACED] == 1.0:
+        squared(kind, omega, segment[SLOPE] * h, top, waves)
+    for k in range(top + 1):
+        wave[k] *= segment[AMPLITUDE]
+
+
+@njit(error_model="numpy", **LEAN)
+def swept(kind, omega, theta, slope, h, top, waves):
+    """Fill waves[0] with the series of the sine of a swept phase, by s' = phi' c and c' = -phi' s; waves[2] with phi'.
+
+    omega [rad/s] and theta: here; slope: of omega [rad/s] over u, or of its logarithm.
+    """
+    wave, cosine, rate = waves[0], waves[1], waves[2]
+    wave[0], cosine[0], rate[0] = sin(theta), cos(theta), omega * h
+    for k in range(1, top + 1):
+        rate[k] = rate[k - 1] * slope / k if kind == LOG_CHIRP else slope * h if k == 1 else 0.0
+    for k in range(top):
+        s, c = 0.0, 0.0
+        for j in range(min(k + 1, 2) if kind == CHIRP else k + 1):
+            s += rate[j] * cosine[k - j]
+            c -= rate[j] * wave[k - j]
+        wave[k + 1], cosine[k + 1] = s / (k + 1), c / (k + 1)
+
+
+@njit(error_model="numpy", **LEAN)
+def squared(kind, omega, slope, top, waves):
+    """Multiply waves[0] by the series of the swept omega squared."""
+    wave, square = waves[0], waves[2]
+    square[0] = omega * omega
+    for k in range(1, top + 1):
+        if kind == LOG_CHIRP:
+            square[k] = square[k - 1] * 2 * slope / k
+        else:
+            square[k] = 2 * omega * slope if k == 1 else slope * slope if k == 2 else 0.0
+    for k in range(top, -1, -1):
+        out = 0.0
+        for j in range(k + 1):
+            out += square[j] * wave[k - j]
+        wave[k] = out

@@ -1,0 +1,123 @@
+"""Elastic-plastic elements side by side under one slide, sorted by the slide at which they yield."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+
+SAME = 1e-14  # relative difference of two yield slides that are one
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Elements:
+    """Elements of one interface: springs k_j that slip at a stretch y_j, F = sum k_j e_j with |e_j| <= y_j.
+
+    stiffness: (t,) [N/m]; yield_slide: (t,) [m], rising; rank: (a,) the element that each given one became part of, -1
+    for one without stiffness or yield slide, which carries nothing.
+    """
+
+    stiffness: np.ndarray
+    yield_slide: np.ndarray
+    rank: np.ndarray
+
+    @property
+    def limit(self) -> float:
+        """Friction limit sum k_j y_j [N]."""
+        return float(self.stiffness @ self.yield_slide)
+
+
+def elements_of(stiffness, yield_slide) -> Elements:
+    """Elements from stiffness (a,) [N/m] >= 0 and yield slide (a,) [m] >= 0 in any order; equal yields become one.
+
+    PatchfemError for values below zero or not finite.
+    """
+    k, y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
+    if not (np.isfinite(k).all() and np.isfinite(y).all() and (k >= 0).all() and (y >= 0).all()):
+        raise PatchfemError("friction: elements want a finite stiffness and yield slide >= 0")
+    order = np.flatnonzero((k > 0) & (y > 0))
+    order = order[np.argsort(y[order], kind="stable")]
+    new = np.ones(order.size, bool)
+    new[1:] = np.diff(y[order]) > SAME * y[order][1:]
+    place, first = np.cumsum(new) - 1, np.flatnonzero(new)
+    rank = np.full(k.size, -1, np.int64)
+    rank[order] = place
+    stiff = np.add.reduceat(k[order], first) if first.size else np.zeros(0)
+    return Elements(frozen_array(stiff), frozen_array(y[order][first]), frozen_array(rank, np.int64))
+
+
+class Table(NamedTuple):
+    """Elements of all interfaces (i) as the compiled loop takes them, t of the longest list.
+
+    count: (i,); reach: (i, t) yield slides [m], infinite behind the last; and sums over the first j elements, j = 0 to
+    t: stiff (i, t + 1) of k [N/m], limit of k y [N], twice of k y^2 [J].
+    """
+
+    count: np.ndarray
+    reach: np.ndarray
+    stiff: np.ndarray
+    limit: np.ndarray
+    twice: np.ndarray
+
+
+def table_of(groups) -> Table:
+    """The Table of Elements of every interface, in order."""
+    most = max((one.stiffness.size for one in groups), default=0)
+    reach = np.full((len(groups), most + 1), np.inf)
+    sums = np.zeros((3, len(groups), most + 1))
+    for i, one in enumerate(groups):
+        k, y = one.stiffness, one.yield_slide
+        reach[i, :y.size] = y
+        for j, part in enumerate((k, k * y, k * y * y)):
+            sums[j, i, 1:y.size + 1] = np.cumsum(part)
+            sums[j, i, y.size + 1:] = sums[j, i, y.size]
+    return Table(np.array([one.stiffness.size for one in groups], np.int64), reach, *sums)
+
+
+class Memory(NamedTuple):
+    """What the elements of all interfaces (i) remember.
+
+    place: (i,) slide [m]; slipping: (i,) how many elements slip, the first of the sorted list; way: (i,) sign of their
+    slip; the others keep their stretch since a turning point, in groups: depth (i,) groups, the innermost last; upto
+    (i, t + 1) the elements before this number, from where the inner group ends; at (i, t + 1) [m] the slide at which a
+    group stopped slipping; side (i, t + 1) the sign of that slip, 0 for elements that never slipped, unstretched at
+    `at`. force [N], slip [m] (mean irreversible slide, weighted with k y), worked, lost [J]: (i,).
+    """
+
+    place: np.ndarray
+    slipping: np.ndarray
+    way: np.ndarray
+    depth: np.ndarray
+    upto: np.ndarray
+    at: np.ndarray
+    side: np.ndarray
+    force: np.ndarray
+    slip: np.ndarray
+    worked: np.ndarray
+    lost: np.ndarray
+
+
+def virgin(table: Table, slide) -> Memory:
+    """Memory of unstretched elements at slides (i,) [m]."""
+    faces, wide = table.stiff.shape
+    upto = np.zeros((faces, wide + 1), np.int64)
+    upto[:, 0] = table.count
+    at = np.zeros((faces, wide + 1))
+    at[:, 0] = slide
+    zero = [np.zeros(faces) for _ in range(5)]
+    return Memory(np.array(slide, float), np.zeros(faces, np.int64), zero[0], np.ones(faces, np.int64), upto, at,
+                  np.zeros((faces, wide + 1)), *zero[1:])
+
+
+def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
+    """Stretch (a,) [m] of every element as given to `elements_of`, of the interface `face`; 0 where it carries
+    nothing."""
+    out, y = np.zeros(group.yield_slide.size), group.yield_slide
+    first = int(memory.slipping[face])
+    out[:first] = memory.way[face] * y[:first]
+    for k in range(int(memory.depth[face]) - 1, -1, -1):
+        end = int(memory.upto[face, k])
+        out[first:end] = memory.side[face, k] * y[first:end] + memory.place[face] - memory.at[face, k]
+        first = end
+    return np.where(group.rank >= 0, out[group.rank], 0.0) if y.size else np.zeros(group.rank.size)

@@ -1,0 +1,320 @@
+"""Samples, extremes, energies and events of a run of piecewise-linear elements."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled import load
+from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
+from ..events.event_list import RELEASE, ROOM, STOP, EventLog
+from .elements import stretches, table_of, virgin
+from .plant import books_of, clock_of, place, plant_of, room_of
+
+HERE = "dynamics.piecewise"
+SAMPLES = 400  # per drive cycle in the kept window
+LEAST = 101  # of a run that has no cycles
+CHUNK = 4096  # rows held at once
+CORNERS = 400_000  # turning points kept from before the window
+SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
+GAUSS = 12
+
+
+class Loop(NamedTuple):
+    """An interface in the window: least and largest slide [m], first harmonics of slide [m] and force [N], friction
+    work [J], range of the slip [m], time stuck [s], largest force [N]."""
+
+    low: float
+    high: float
+    first: complex
+    pull: complex
+    work: float
+    slip: float
+    stuck: float
+    force: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PieceRun:
+    """A run of piecewise-linear elements.
+
+    response, window: histories; their `extra` has "ledger" (4, k) [J] of all interfaces, and of several interfaces
+    slides, slide_rates, forces, slips (k, i). amplitudes (c, 2): extremes of the output per cycle; phasors (c,): its
+    drive-frequency part in the last cycle of every window, 0 in the others; ledger: energies [J]; loops: a Loop per
+    interface; starts: phases of the release of the first interface in the window, mod pi;
+    acceleration: largest at the output in the window; log: events; snapshots: of the elements in the last cycle;
+    events: how many pieces; swing, drift: half the range of the output in the window and the motion of the slide's
+    mean per cycle [m]; waves: first and third harmonic of the absolute acceleration in the window [m s-2]; end:
+    (Start, memory) to go on from.
+    """
+
+    response: Response
+    window: Response
+    amplitudes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None
+    loops: tuple
+    starts: np.ndarray
+    acceleration: float
+    log: EventLog
+    snapshots: list
+    events: int
+    swing: float
+    drift: float
+    waves: tuple
+    cycles_done: float
+    end: tuple
+
+
+def warm_up(say=None) -> None:
+    """Load the compiled loop; `say` is told where it has to be compiled first."""
+    load(f"{HERE}.march_kernels", say)
+    load(f"{HERE}.dense_kernels", say)
+
+
+def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, travel: float = np.inf,
+             frames: int = 0, progress=None, start: Start | None = None, memory=None) -> PieceRun:
+    """Run `cycles` drive cycles from rest or `start`; keeps the last `window` cycles whole.
+
+    groups: Elements of every interface; frames: snapshots of the elements in the last cycle; memory: of the elements at
+    the start, unstretched without. The outcome is set only where the output passes `travel` [m]; the run ends there.
+    NotConverged where events pile up.
+    """
+    if start is not None and abs(float(modes.output @ start.z)) > travel:
+        raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
+    run = _Run(modes, drive, groups, cycles, window, travel, start, memory)
+    done = run.go(frames, progress)
+    if done is None:  # the travel ends the run: the same again to there, for the last cycles before it
+        again = _Run(modes, drive, groups, run.now / drive.period, window, np.inf, start, memory)
+        again.outcome = Outcome.EXCEEDS_TRAVEL
+        done = again.go(frames, None)
+    return done
+
+
+class _Run:
+    """Rows as they come: what is summed is summed, all but turning points and slips is forgotten before the window."""
+
+    def __init__(self, modes, drive, groups, cycles, window, travel, start, memory):
+        warm_up()
+        from . import dense_kernels, march_kernels
+
+        self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
+        self.kernels, self.dense = march_kernels, dense_kernels
+        self.table, self.plant = table_of(self.groups), plant_of(modes)
+        self.clock, self.room = clock_of(drive, len(self.groups)), room_of(self.plant)
+        n, count = modes.omega.size, max(1, ceil(cycles - 1e-9))
+        self.motion = np.zeros((2, n))
+        if start is not None:
+            self.motion[:] = start.z, start.v
+        fresh = virgin(self.table, self.plant.faces @ self.motion[0])
+        self.memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
+        wanted = np.zeros(count)
+        wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
+        self.books, self.cycles, self.period = books_of(count, wanted, travel), cycles, drive.period
+        self.width = march_kernels.HEAD + 2 * n + march_kernels.EACH * len(self.groups)
+        self.early, self.kept, self.events, self.count = [], 0, [], 0
+        self.before, self.outcome, self.snapshots = np.zeros(len(self.groups)), None, []
+        self.passed = False
+        self.begun = march_kernels.stored(self.motion, self.plant, self.table, self.memory)
+
+    def until(self, cycles: float, whole: bool, progress=None) -> list:
+        """Rows up to a time in cycles: all of them, or where not `whole` only turning points and slips."""
+        out, stop = [], place(cycles * self.period, self.period)
+        rows = np.empty((CHUNK, self.width))
+        code = self.kernels.FULL
+        while code == self.kernels.FULL and not self.passed:
+            code, used = self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.clock,
+                                            self.books, self.room, rows)
+            if code == self.kernels.PILED:
+                raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
+            if code == self.kernels.TRAVEL:
+                self.passed = True
+                break
+            done = rows[:used]
+            marked = self._note(done) | (done[:, 4] == 2)
+            if whole:
+                out.append(done.copy())
+            elif self.kept < CORNERS:
+                self.early.append(done[marked])
+                self.kept += int(marked.sum())
+            if progress is not None:
+                progress(min(self.now / (self.cycles * self.period), 1.0))
+        return out
+
+    def _note(self, rows) -> np.ndarray:
+        """Note stops and releases of all interfaces; which rows (k,) begin with one."""
+        marked = np.zeros(len(rows), bool)
+        if not len(rows):
+            return marked
+        shares = rows[:, self.width - self.kernels.EACH * len(self.groups) + 2::self.kernels.EACH]
+        for f, share in enumerate(shares.T):
+            way = np.where(share >= SLIPS, rows[:, self._at(f, 7)], 0.0)
+            old = np.concatenate([self.before[f:f + 1], way[:-1]])
+            self.before[f] = way[-1]
+            turned = np.flatnonzero(old != way)
+            what = np.where(way[turned] == 0, STOP, RELEASE * way[turned])
+            place = rows[turned][:, self.kernels.HEAD:self.kernels.HEAD + self.modes.omega.size] @ self.plant.faces[f]
+            self.events.append(np.stack([rows[turned, 0], rows[turned, 2] % (2 * np.pi), 0 * place + f, what, place],
+                                        axis=1))
+            self.count += turned.size
+            marked[turned] = True
+        return marked
+
+    def _at(self, face: int, column: int) -> int:
+        return self.kernels.HEAD + 2 * self.modes.omega.size + self.kernels.EACH * face + column
+
+    def go(self, frames: int, progress) -> PieceRun | None:
+        """The whole run; None where its output passed the travel."""
+        end = self.cycles
+        first, last = max(0.0, end - self.window), max(0.0, end - 1)
+        begin = max(0.0, min(first, end - 2))
+        if begin > 0:
+            self.until(begin, False, progress)
+        wide = self.until(first, True, progress) if first > begin else []
+        late = []
+        for stop in (first + 1, last):  # the drift asks for the first and the last cycle of the window
+            if first < stop < end:
+                late += self.until(stop, True, progress)
+        for k in range(frames):
+            late += self.until(last + (end - last) * (k + 1) / frames, True)
+            self.snapshots.append(self._snapshot())
+        late += self.until(end, True, progress)
+        return None if self.passed else self._close(wide, late)
+
+    @property
+    def now(self) -> float:
+        """Time [s] of the run."""
+        return float(self.clock.now[0] * self.period + self.clock.now[1])
+
+    def _snapshot(self) -> dict:
+        return {"time": self.now, "slide": float(self.memory.place[0]), "force": float(self.memory.force[0]),
+                "rate": float(self.plant.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
+                "stretch": stretches(self.groups[0], self.memory, 0)}
+
+    def _close(self, wide, late) -> PieceRun:
+        """Everything kept, as a PieceRun."""
+        none, late = np.empty((0, self.width)), np.concatenate(late)
+        stop = late[-1, 0] + late[-1, 1]
+        early, begun = np.concatenate([none, *self.early]), late[0, 0]
+        number = max(LEAST, round((stop - begun) / self.period * SAMPLES) + 1)
+        window = self.sample(late, np.linspace(begun, stop, number))
+        parts = [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])] if len(early) else []
+        wide = np.concatenate([none, *wide])
+        if len(wide):
+            span = begun - wide[0, 0]
+            more = self.sample(wide, np.linspace(wide[0, 0], begun, round(span / self.period * SAMPLES) + 1))
+            parts.append(_part(more, more.time < begun))
+        done = slice(0, max(1, ceil(stop / self.period - 1e-9)))
+        names = ("work_in", "viscous", "power")
+        book = dict(zip(names, map(float, self.books.ledger[:3]))) | {"friction": float(self.books.ledger[4])}
+        now = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
+        book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[5]), self.begun)}
+        log = self.log()
+        starts = log.phase[(log.interface == 0) & (np.abs(log.what) == RELEASE) & (log.time > begun)] % np.pi
+        high = self.dense.peak(late, self.plant, self.clock, float(self.drive.moving), self.room)
+        phasors = self.books.phasors[done] @ [1, 1j]
+        loops, *moved = self._loops(late)
+        return PieceRun(_chain([*parts, window]), window, self.books.extremes[done], phasors, book, self.outcome,
+                        loops, starts, float(high), log, self.snapshots, int(self.books.ledger[6]), *moved,
+                        stop / self.period, (Start(*self.motion.copy()), self.memory))
+
+    def log(self) -> EventLog:
+        """The last stops and releases."""
+        rows = np.concatenate([np.empty((0, 5)), *self.events])
+        rows = rows[np.argsort(rows[:, 0], kind="stable")][-ROOM:]
+        time, phase, interface, what, slide = rows.T
+        return EventLog(frozen_array(time), frozen_array(phase), frozen_array(interface, np.int64),
+                        frozen_array(what, np.int64), frozen_array(slide), self.count)
+
+    def sample(self, rows, grid) -> Response:
+        """Histories at the times of a grid (k,) [s] and wherever a row begins with a turning point, a stop or a
+        release."""
+        shares = rows[:, self._at(0, 2)::self.kernels.EACH] >= SLIPS
+        events = (rows[:, 4] == 2) | np.any(np.diff(shares, axis=0, prepend=shares[:1]), axis=1)
+        if np.count_nonzero(rows[:, 4]) <= 2 * grid.size:
+            events |= rows[:, 4] > 0  # the force bends at a yield, so both books close
+        time = np.unique(np.concatenate([grid, rows[events, 0]]))
+        owner = np.clip(np.searchsorted(rows[:, 0], time, side="right") - 1, 0, len(rows) - 1)
+        return self._rows_as(rows, owner, np.clip(time - rows[owner, 0], 0.0, rows[owner, 1]), time)
+
+    def dense_values(self, rows, owner, tau) -> np.ndarray:
+        """Columns of `dense_kernels.evaluate` at tau (k,) [s] after the starts of the rows owner (k,)."""
+        out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
+        self.dense.evaluate(rows, owner, tau, self.plant, self.clock, self.room, out)
+        return out
+
+    def _rows_as(self, rows, owner, tau, time) -> Response:
+        """Histories at `time` (k,) [s], tau (k,) [s] after the starts of the rows owner (k,)."""
+        return self._as_response(self.dense_values(rows, owner, tau), time)
+
+    def _as_response(self, out, time) -> Response:
+        """Histories at `time` (k,) [s] from the columns of `dense_values`."""
+        modes, n = self.modes, self.modes.omega.size
+        z, v, push = out[:, :n].copy(), out[:, n:2 * n].copy(), out[:, 2 * n]
+        slides, rates, forces, slips, works, losses = (out[:, 2 * n + 1 + k::6] for k in range(6))
+        base = push if self.drive.moving else np.zeros_like(push)
+        accel = -np.outer(push, modes.base) - v @ self.plant.damping.T - z * self.plant.square \
+            - forces @ self.plant.faces / modes.mass
+        work, lost = works.sum(axis=1), losses.sum(axis=1)
+        extra = {"ledger": np.stack([work, work - lost, lost, 0 * lost])}
+        if len(self.groups) > 1:
+            extra |= {"slides": slides, "slide_rates": rates, "forces": forces, "slips": slips}
+        return Response(time, z, v, *(part[:, 0].copy() for part in (slides, rates)), z @ modes.output,
+                        v @ modes.output, accel @ modes.output + base, base, forces[:, 0].copy(), slips[:, 0].copy(),
+                        extra)
+
+    def _loops(self, rows) -> tuple:
+        """(what the measures ask of every interface over the pieces of the window, half the range of the output, motion
+        of the first slide per cycle), by Gauss points and the ends of the pieces."""
+        nodes, weight = np.polynomial.legendre.leggauss(GAUSS)
+        owner = np.repeat(np.arange(len(rows)), GAUSS)
+        tau = (rows[:, 1:2] * (1 + nodes) / 2).ravel()
+        n, out, time = self.modes.omega.size, self.dense_values(rows, owner, tau), rows[owner, 0] + tau
+        weight = (rows[:, 1:2] * weight / 2).ravel()
+        turn = np.exp(-2j * np.pi * time / self.period) * weight
+        begin = self.dense_values(rows, np.arange(len(rows)), np.zeros(len(rows)))
+        close = self.dense_values(rows[-1:], np.zeros(1, np.int64), rows[-1:, 1].copy())
+        ends, span = np.concatenate([begin, close]), rows[:, 1].sum()
+        found = []
+        for f in range(len(self.groups)):
+            at = 2 * n + 1 + 6 * f
+            slide, force, slip, work = (ends[:, at + k] for k in (0, 2, 3, 4))
+            stuck = rows[rows[:, self._at(f, 2)] < SLIPS, 1].sum()
+            middle = slide.mean()
+            q, pull = (2 / span * np.sum(turn * part) for part in (out[:, at] - middle, out[:, at + 2]))
+            found.append(Loop(float(slide.min()), float(slide.max()), complex(q), complex(pull),
+                              float(work[-1] - work[0]), float(np.ptp(slip)), float(stuck), float(np.abs(force).max())))
+        output, felt = ends[:, :n] @ self.modes.output, self._as_response(out, time).acceleration
+        waves = tuple(complex(2 / span * np.sum(weight * felt * np.exp(-2j * np.pi * k * time / self.period)))
+                      for k in (1, 3))
+        drift = self._drift(time, weight, out[:, 2 * n + 1], rows[0, 0], rows[-1, 0] + rows[-1, 1], ends[:, 2 * n + 1])
+        return tuple(found), float(np.ptp(output)) / 2, drift, waves
+
+    def _drift(self, time, weight, slide, start: float, end: float, ends) -> float:
+        """Mean of a slide in the last cycle of [start, end] less that in the first, per cycle between them [m]; in
+        fewer than 1.5 cycles the motion from end to end."""
+        cycles = (end - start) / self.period
+        if cycles < 1.5:
+            return float(ends[-1] - ends[0]) / max(cycles, 1e-9)
+        means = [np.sum((weight * slide)[part]) / np.sum(weight[part])
+                 for part in (time < start + self.period, time > end - self.period)]
+        return float(means[1] - means[0]) / (cycles - 1)
+
+
+_COLUMNS = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "output_rate", "acceleration",
+            "base_acceleration", "force", "slip")
+
+
+def _part(response: Response, which) -> Response:
+    extra = {name: part[:, which] if name == "ledger" else part[which] for name, part in response.extra.items()}
+    return Response(*(getattr(response, name)[which] for name in _COLUMNS), extra)
+
+
+def _chain(parts) -> Response:
+    if len(parts) == 1:
+        return parts[0]
+    extra = {name: np.concatenate([r.extra[name] for r in parts], axis=1 if name == "ledger" else 0)
+             for name in parts[0].extra}
+    return Response(*(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS), extra)

@@ -1,0 +1,146 @@
+"""Arrays of the compiled loop: modes, drive, room and books."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import ModalBasis, PatchfemError
+from . import drive_kernels as kinds
+from . import series_kernels as series
+
+
+class Plant(NamedTuple):
+    """Modes as the loop takes them.
+
+    square: (n,) omega^2 [1/s2]; damping: (n, n) D [1/s], coupled: whether it is more than its diagonal; base, output:
+    (n,); faces: (i, n); mass [kg]; reach: (i,) |face|^2/mass [1/kg], how much a spring there adds to a square of a
+    rate; square_most, damping_most: norms of the modes' own; along: 1 where the output moves as the first interface
+    does.
+    """
+
+    square: np.ndarray
+    damping: np.ndarray
+    base: np.ndarray
+    faces: np.ndarray
+    output: np.ndarray
+    reach: np.ndarray
+    mass: float
+    square_most: float
+    damping_most: float
+    coupled: int
+    along: int
+
+
+def plant_of(modes: ModalBasis) -> Plant:
+    """The Plant of a basis."""
+    damping, faces = np.array(modes.dampers, float), np.array(modes.interfaces, float)
+    output = np.array(modes.output, float)
+    along = len(faces) == 1 and bool(np.abs(np.outer(faces[0], output) - np.outer(output, faces[0])).max() == 0)
+    coupled = bool(np.any(damping != np.diag(np.diag(damping))))
+    return Plant(np.array(modes.omega, float)**2, np.ascontiguousarray(damping), np.array(modes.base, float),
+                 np.ascontiguousarray(faces), output, (faces**2).sum(axis=1) / modes.mass, float(modes.mass),
+                 float(modes.omega.max()**2), float(np.linalg.norm(damping, 2)), int(coupled), int(along))
+
+
+class Clock(NamedTuple):
+    """Time of a run: now (3,) cycle, offset in it [s], segment of the drive; segments (p, 10) rows of `drive_kernels`;
+    period (1,) [s]; rest (i + 1,) 1 where a slide, or last the output, stands still at a turning point."""
+
+    now: np.ndarray
+    segments: np.ndarray
+    period: np.ndarray
+    rest: np.ndarray
+
+
+def clock_of(drive, faces: int) -> Clock:
+    """The Clock of a drive of `core` or `structure.drives` at t = 0. PatchfemError for a segment of another frequency
+    than the cycle's."""
+    period = drive.period
+    if drive.segments:
+        rows = [_sine(part, period) for part in drive.segments]
+    else:
+        rows = (_swept if hasattr(drive, "low") else _lines)(drive)
+    out = np.zeros((len(rows), 10))
+    for row, (start, *numbers) in zip(out, rows):
+        row[:2], row[2:] = place(start, period), numbers
+    return Clock(np.zeros(3), out, np.array([period]), np.zeros(faces + 1))
+
+
+def place(time: float, period: float) -> tuple:
+    """(cycle, offset [s]) of a time [s]; within a last digit of a whole cycle it is that one."""
+    share = time / period
+    near = round(share)
+    if abs(share - near) <= 4e-15 * max(1.0, abs(share)):
+        return float(near), 0.0
+    return float(int(share)), max(time - int(share) * period, 0.0)
+
+
+def _sine(part, period: float) -> tuple:
+    omega = part.omega if part.amplitude else 0.0
+    whole = omega * period / (2 * np.pi)
+    if abs(whole - round(whole)) > 1e-12 * max(1.0, whole):
+        raise PatchfemError("drive: a segment of another frequency than the cycle's has no exact solution here; use "
+                            "method = \"march\"")
+    steady = part.constant + (0.0 if omega else part.amplitude * np.sin(part.phase))
+    phase = part.phase - omega * place(part.start, period)[1]
+    return part.start, kinds.SINE, steady, part.amplitude if omega else 0.0, omega, phase, 0.0, 0.0, omega
+
+
+def _swept(sweep) -> list:
+    """The sweep, then the sine at its last frequency."""
+    low, high, span = 2 * np.pi * sweep.low, 2 * np.pi * sweep.high, sweep.duration
+    log = sweep.logarithmic and high != low
+    slope = np.log(high / low) / span if log else (high - low) / span
+    moved = sweep.displacement is not None
+    size = sweep.displacement if moved else sweep.acceleration
+    last = float(sweep.phase(span)) - high * place(span, sweep.period)[1]
+    return [(0.0, kinds.LOG_CHIRP if log else kinds.CHIRP, 0.0, size, low, 0.0, slope, float(moved), sweep.rate),
+            (span, kinds.SINE, 0.0, size * high**2 if moved else size, high, last, 0.0, 0.0, high)]
+
+
+def _lines(record) -> list:
+    """Straight lines between the rows of a record, then nothing."""
+    slopes = np.diff(record.value) / np.diff(record.time)
+    rows = [(float(t), kinds.LINE, float(y), 0.0, 0.0, 0.0, float(s), 0.0, 0.0)
+            for t, y, s in zip(record.time, record.value, slopes)]
+    return [*rows, (float(record.time[-1]), kinds.LINE, *[0.0] * 7)]
+
+
+class Room(NamedTuple):
+    """Room of the loop: coefs (terms, n), waves (3, terms) of the drive, polys (i + 3, terms), pull and springs (i,),
+    nodes (n + 5, 16) of the sums, hulls of the search for roots."""
+
+    coefs: np.ndarray
+    waves: np.ndarray
+    polys: np.ndarray
+    pull: np.ndarray
+    springs: np.ndarray
+    nodes: np.ndarray
+    hulls: np.ndarray
+
+
+def room_of(plant: Plant) -> Room:
+    """Fresh Room for a Plant."""
+    faces, n = plant.faces.shape
+    wide = series.MOST + 2
+    return Room(np.zeros((wide, n)), np.zeros((3, wide)), np.zeros((faces + 3, wide)), np.zeros(faces), np.zeros(faces),
+                np.zeros((n + 5, 16)), np.zeros((series.DEEP + 2, series.WIDE)))
+
+
+class Books(NamedTuple):
+    """What a run sums: ledger (8,) work of the drive, viscous loss, integral of its |power|, friction work, energy
+    dissipated, largest energy stored [J], pieces, events; extremes (c, 2) [m] of the output per cycle; phasors (c, 2)
+    of its drive-frequency part, real and imaginary, in the cycles where wanted (c,) is 1; limits (2,): travel [m],
+    idle events."""
+
+    ledger: np.ndarray
+    extremes: np.ndarray
+    phasors: np.ndarray
+    wanted: np.ndarray
+    limits: np.ndarray
+
+
+def books_of(cycles: int, wanted, travel: float = np.inf) -> Books:
+    """Empty Books of a run of so many cycles."""
+    return Books(np.zeros(8), np.tile([np.inf, -np.inf], (cycles, 1)), np.zeros((cycles, 2)),
+                 np.array(wanted, float), np.array([travel, 0.0]))

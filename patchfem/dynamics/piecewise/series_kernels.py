@@ -1,0 +1,216 @@
+"""Compiled series of a linear motion over a short piece, its roots proved and found.
+
+Over u = t/h in [0, 1] every coordinate is sum c_k u^k. With h at most REACH over the fastest rate of the system the
+terms fall as REACH^k/k!, so a few dozen are exact to round-off, whatever the rates are: rigid, overdamped, coupled,
+equal. All coefficients of the Bernstein form above zero prove that there is no root; one change of their sign proves
+that there is exactly one (Descartes).
+"""
+
+from math import comb, factorial, sqrt
+
+import numpy as np
+from numba import njit
+
+from ...friction.flags_kernels import LEAN
+
+REACH = 3.0  # longest piece times the fastest rate
+MOST = 36  # highest power of a series
+EPS = 2.0**-52
+NONE = 2.0  # a root beyond the piece
+DEEP = 52  # halvings of a piece
+WIDE = MOST + 2  # columns of the room for them; the last one tells a second half
+# largest piece times rate for which powers up to k suffice: rate^k/k! of the last one below a quarter of EPS
+_ROOM = np.array([0.0, 0.0] + [(EPS / 4 * factorial(k))**(1 / k) for k in range(2, MOST + 1)])
+_INVERSE = np.array([[1 / comb(d, k) if k <= d else 0.0 for k in range(MOST + 1)] for d in range(MOST + 1)])
+_NODES = 14
+# largest piece times rate for which g Gauss points integrate a square of the motion to round-off
+_GAUSS = np.array([0.0] + [0.5 * (1e-16 * (2 * g + 1) * factorial(2 * g)**3 / factorial(g)**4)**(1 / (2 * g))
+                           for g in range(1, _NODES + 1)])
+_PLACE, _WEIGHT = np.zeros((2, _NODES + 1, _NODES))
+for _g in range(1, _NODES + 1):
+    _x, _w = np.polynomial.legendre.leggauss(_g)
+    _PLACE[_g, :_g], _WEIGHT[_g, :_g] = (1 + _x) / 2, _w / 2
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def powers(x):
+    """Highest power that a piece of x times the fastest rate needs."""
+    k = 4
+    while k < MOST and _ROOM[k] < x:
+        k += 1
+    return k
+
+
+@njit(error_model="numpy", **LEAN)
+def points(x):
+    """Gauss points that integrate squares of the motion over a piece of x times the fastest rate."""
+    g = 2
+    while g < _NODES and _GAUSS[g] < x:
+        g += 1
+    return g
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def fastest(plant, springs):
+    """Bound [1/s] of the rates of the modes with springs (i,) [N/m] between the interfaces."""
+    square = plant.square_most
+    for f in range(springs.size):
+        square += springs[f] * plant.reach[f]
+    return 0.5 * plant.damping_most + sqrt(0.25 * plant.damping_most**2 + square)
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
+    """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
+    slide)/mass.
+
+    motion (2, n): coordinates and rates at first; force (i,) [N] there; springs (i,) [N/m]; wave: series of a; pull:
+    room (i,).
+    """
+    n, faces = plant.square.size, plant.faces
+    for i in range(n):
+        coefs[0, i], coefs[1, i] = motion[0, i], h * motion[1, i]
+    for k in range(top - 1):
+        for f in range(springs.size):
+            part = force[f]
+            if k > 0:
+                part = 0.0
+                for i in range(n):
+                    part += faces[f, i] * coefs[k, i]
+                part *= springs[f]
+            pull[f] = part / plant.mass
+        scale, damp = h * h / ((k + 1) * (k + 2)), (k + 1) / h
+        for i in range(n):
+            part = -plant.square[i] * coefs[k, i] - plant.base[i] * wave[k]
+            for f in range(springs.size):
+                part -= faces[f, i] * pull[f]
+            if plant.coupled:
+                for j in range(n):
+                    part -= damp * plant.damping[i, j] * coefs[k + 1, j]
+            else:
+                part -= damp * plant.damping[i, i] * coefs[k + 1, i]
+            coefs[k + 2, i] = scale * part
+
+
+@njit(error_model="numpy", **LEAN)
+def value(poly, low, top, u):
+    """Sum of poly[k] u^(k - low) for k from low to top."""
+    out = poly[top]
+    for k in range(top - 1, low - 1, -1):
+        out = out * u + poly[k]
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def polish(poly, low, top, left, right, u):
+    """The root in [left, right] of a polynomial that falls there from above zero to below, by guarded Newton from u."""
+    for _ in range(100):
+        here, slope = poly[top], 0.0
+        for k in range(top - 1, low - 1, -1):
+            slope = slope * u + here
+            here = here * u + poly[k]
+        if here > 0:
+            left = u
+        elif here < 0:
+            right = u
+        else:
+            return u
+        new = u - here / slope if slope < 0 else left
+        if not left < new < right:
+            new = 0.5 * (left + right)
+        if abs(new - u) <= 2 * EPS * u:
+            return new
+        u = new
+    return u
+
+
+@njit(error_model="numpy", **LEAN)
+def bernstein(poly, low, top, hull):
+    """Fill hull (top - low + 1,) with the Bernstein coefficients of poly[low] ... poly[top] on [0, 1]."""
+    degree = top - low
+    for k in range(degree + 1):
+        hull[k] = poly[low + k] * _INVERSE[degree, k]
+    for j in range(1, degree + 1):
+        for k in range(degree, j - 1, -1):
+            hull[k] += hull[k - 1]
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def first_root(poly, low, top, hulls):
+    """First u in (0, 1] at which sum poly[k] u^(k - low), positive just after 0, is no longer so; NONE if none.
+
+    A dip of round-off below zero is passed over. hulls: room (DEEP + 2, WIDE).
+    """
+    rest = 0.0
+    for k in range(low + 1, top + 1):
+        rest += abs(poly[k])
+    if poly[low] > rest:
+        return NONE
+    noise, degree = 4 * EPS * (rest + abs(poly[low])), top - low
+    bernstein(poly, low, top, hulls[0])
+    left, width, depth = 0.0, 1.0, 0
+    while True:
+        hull, least, changes, at = hulls[depth], 0.0, 0, 0
+        for k in range(degree + 1):
+            least = min(least, hull[k])
+            if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
+                changes += 1
+                at = k
+        if least >= -noise:  # free of roots: on with the part to the right, which an outer halving left
+            left += width
+            while depth > 0 and hulls[depth, MOST + 1] == 1.0:
+                depth -= 1
+                width *= 2
+            if depth == 0:
+                return NONE
+            _halve(hulls[depth - 1], hulls[depth], degree, False)
+            hulls[depth, MOST + 1] = 1.0
+            continue
+        if hull[0] > 0 and changes == 1:
+            share = (at - 1 + hull[at - 1] / (hull[at - 1] - hull[at])) / degree
+            return polish(poly, low, top, left, left + width, left + width * share)
+        if depth == DEEP:
+            return left
+        _halve(hull, hulls[depth + 1], degree, True)
+        depth, width = depth + 1, width / 2
+        hulls[depth, MOST + 1] = 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def _halve(hull, half, degree, first):
+    """Bernstein coefficients of the first or the second half of an interval (de Casteljau)."""
+    for k in range(degree + 1):
+        half[k] = hull[k]
+    if first:
+        for j in range(1, degree + 1):
+            for k in range(degree, j - 1, -1):
+                half[k] = 0.5 * (half[k] + half[k - 1])
+    else:
+        for j in range(1, degree + 1):
+            for k in range(degree - j + 1):
+                half[k] = 0.5 * (half[k] + half[k + 1])
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def largest(poly, top, best, hulls):
+    """The larger of `best` and max |sum poly[k] u^k| over [0, 1], to 1e-14 of it: halves whose hull cannot pass it are
+    left out."""
+    best = max(best, abs(poly[0]), abs(value(poly, 0, top, 1.0)))
+    bernstein(poly, 0, top, hulls[0])
+    depth = 0
+    while True:
+        hull, most = hulls[depth], 0.0
+        for k in range(top + 1):
+            most = max(most, abs(hull[k]))
+        if most <= best * (1 + 1e-14) or depth == DEEP:
+            while depth > 0 and hulls[depth, MOST + 1] == 1.0:
+                depth -= 1
+            if depth == 0:
+                return best
+            _halve(hulls[depth - 1], hulls[depth], top, False)
+            hulls[depth, MOST + 1] = 1.0
+            continue
+        _halve(hull, hulls[depth + 1], top, True)
+        depth += 1
+        hulls[depth, MOST + 1] = 0.0
+        best = max(best, abs(hulls[depth, top]))

@@ -1,0 +1,137 @@
+"""The engine of elastic-plastic elements of a rig: from yield to yield in closed form (`dynamics.piecewise`)."""
+
+from time import perf_counter
+
+import numpy as np
+
+from ....core import BaseSine, Outcome
+from ....dynamics.piecewise import elements, histories
+from ....dynamics.second_book import gap, sampled_work
+from ....friction.record import law_from
+from ....response import run_events
+from ....response.levels import Level
+from ....response.measures import circular_mean, window_amplitudes, window_ends
+from ....response.outcome import steady_of
+from ....response.rows import measures_of
+from ....structure.drive_sizes import omega_of, sinusoidal, whole
+from .. import levels as rig_levels
+from ..exact import joined_runs, whole_cycles
+from ..interface import contact_model
+from ..solution import Solution, seen
+
+
+def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
+    rig, drive, begin = model.rig, model.rig.drive, perf_counter()
+    found = Interfaces(model, numerics, patch)
+    reduced = perf_counter() - begin
+    histories.warm_up(say)
+    loaded, begin = perf_counter() - begin - reduced, perf_counter()
+    if rig.levels:
+        done, levels, slips = _levels(model, numerics, patch, found, frames, progress)
+    else:
+        done = histories.simulate(rig.modes, drive, found.groups, numerics.cycles, numerics.window, rig.travel, frames,
+                                  progress, rig.start)
+        levels, slips, done = (), None, whole_cycles(done)
+    values = values_of(model, numerics, patch, drive, done)
+    stuck = found.holds(done)
+    rings, own = run_events.rings(done.window, rig.modes, drive, done.log)
+    outcome = done.outcome or (Outcome.STUCK if stuck else None)
+    ends = window_ends(done.amplitudes, done.phasors, numerics.window)
+    return Solution(values | rings, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
+                    steady_of(drive, *ends), outcome, done.snapshots, done.ledger, perf_counter() - begin,
+                    found.contact, {"reduce": reduced, "load": loaded}, levels=levels, slips=slips, log=done.log,
+                    held=found.held, own=own)
+
+
+class Interfaces:
+    """The elements of every interface of a model, as `groups`; contact: the ContactModel of a single one; held: slip
+    [m] below which a cycle sticks."""
+
+    def __init__(self, model, numerics, patch):
+        rig, self.contact = model.rig, None
+        if len(rig.modes.interfaces) > 1:
+            parts = [law_from(one.numbers, one.load).element(one.load) for one in rig.interfaces]
+        else:
+            self.contact = contact_model(model, numerics, patch)
+            parts = [self.contact.element]
+        self.held = 1e-3 * min(one.length for one in parts)
+        self.groups = tuple(group_of(one) for one in parts)
+
+    def holds(self, done) -> bool:
+        """Whether no interface slips in the window of a run by more than `held`, or the last digit."""
+        noise = 1e-13 * float(np.abs(done.window.modal).max(initial=0.0))
+        return all(one.slip / 2 <= max(self.held, noise) for one in done.loops)
+
+
+def group_of(element) -> elements.Elements:
+    """Elements of an Element of form "parallel"."""
+    count = int(element.numbers[1])
+    return elements.elements_of(element.numbers[2:2 + count], element.numbers[2 + count:2 + 2 * count])
+
+
+def values_of(model, numerics, patch, drive, done) -> dict:
+    """Measures of the window of a PieceRun, read off its series."""
+    window, span = done.window, done.window.time[-1] - done.window.time[0]
+    known = {"absolute_acceleration_peak": done.acceleration, "relative_displacement_amplitude": done.swing,
+             "drift_per_cycle": done.drift}
+    for k, one in enumerate(done.loops):
+        known |= {f"{name}{f'_{k + 1}' * (k > 0)}": value for name, value in _of_interface(one, span).items()}
+    if sinusoidal(drive) and whole(span, drive) and done.waves[0] != 0:
+        known["acceleration_distortion"] = abs(done.waves[1]) / abs(done.waves[0])
+    known["work_check"] = _second_book(done)
+    known["slip_start_phase"] = circular_mean(done.starts) if done.starts.size and sinusoidal(drive) else None
+    extremes, loop = done.amplitudes[-min(numerics.window, len(done.amplitudes)):], None
+    first = done.loops[0]
+    if whole(span, drive):
+        loop = np.array([first.low, first.high]), first.first, first.pull, first.work * drive.period / span
+    found = measures_of(seen(model, patch, window, extremes, done.ledger, histories.SAMPLES, drive=drive, loop=loop,
+                             ledger=done.response.extra["ledger"], known=known))
+    others = {name: value for name, value in known.items() if name[-1].isdigit()}
+    areas = {f"loop_area_{k + 2}": one.work * drive.period / max(span, 1e-300) for k, one in enumerate(done.loops[1:])}
+    return found | others | areas
+
+
+def _second_book(done) -> float:
+    """Gap [1] of the friction work of the window: by the trapezoidal rule on its samples against the sum of its
+    pieces."""
+    w, extra = done.window, done.window.extra
+    pairs = zip(extra["slides"].T, extra["forces"].T) if "slides" in extra else [(w.slide, w.force)]
+    sampled = sum(float(sampled_work(slide, force).sum()) for slide, force in pairs)
+    works = extra["ledger"][0]
+    energy = done.ledger["power"] + done.ledger["peak_stored"]
+    return gap(sampled, float(works[-1] - works[0]), float(np.abs(np.diff(works)).sum()), energy)
+
+
+def _of_interface(one, span: float) -> dict:
+    """Measures of an interface by name, from its Loop over a window of `span` [s]."""
+    return {"slip_amplitude": one.slip / 2, "stick_fraction": min(one.stuck / span, 1.0),
+            "friction_force_peak": one.force}
+
+
+def _levels(model, numerics, patch, found, frames: int, progress) -> tuple:
+    """Run of all levels one after the other: (PieceRun, its Levels, slips as `levels.onset` asks)."""
+    rig, drive, cycles = model.rig, model.rig.drive, model.rig.level_cycles
+    states, parts, levels, last = [(rig.start, None)], [], [], len(rig.levels) - 1
+
+    def go(level, state, watch=None, frames=0):
+        sine = BaseSine(level, omega_of(drive), drive.moving)
+        return histories.simulate(rig.modes, sine, found.groups, cycles, numerics.window, rig.travel, frames, watch,
+                                  *state), sine
+
+    for k, level in enumerate(rig.levels):
+        share = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
+        done, sine = go(level, states[-1], share, frames * (k == last))
+        values = values_of(model, numerics, patch, sine, done)
+        kept = {name: values[name] for name in rig_levels.KEPT if name in values}
+        levels.append(Level(level, found.holds(done), kept, {name: 1e-9 * abs(v) for name, v in kept.items()}))
+        parts.append(done)
+        states.append(done.end)
+        if done.outcome is not None:
+            break
+
+    def slips(number, level):
+        return not found.holds(go(level, states[number + 1])[0])
+
+    return joined_runs(parts, cycles * drive.period), tuple(levels), slips
+

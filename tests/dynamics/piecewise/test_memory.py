@@ -1,0 +1,92 @@
+"""Memory of elastic-plastic elements against the elements one by one, and known loops."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.dynamics.piecewise import memory_kernels as kernels
+from patchfem.dynamics.piecewise.elements import elements_of, stretches, table_of, virgin
+from patchfem.slip.shear_modes import jenkins_set
+
+
+class Follower:
+    """Elements along prescribed slides, by the memory of the engine and one by one."""
+
+    def __init__(self, stiffness, yield_slide):
+        self.k, self.y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
+        self.group = elements_of(self.k, self.y)
+        self.table = table_of([self.group])
+        self.memory = virgin(self.table, [0.0])
+        self.stretch, self.lost, self.depth = np.zeros(self.k.size), 0.0, 0
+
+    def to(self, slide: float) -> float:
+        """Slide straight to a place [m]; the force [N] there."""
+        memory, way = self.memory, 1.0 if slide > self.memory.place[0] else -1.0
+        if memory.slipping[0] and memory.way[0] != way:
+            kernels.turn.py_func(0, memory)
+        while way * (at := kernels.threshold.py_func(0, way, self.table, memory)) <= way * slide:
+            self.lost += self.limit * abs(at - memory.place[0])
+            memory.place[0] = at
+            kernels.give_way.py_func(0, way, self.table, memory)
+        self.lost += self.limit * abs(slide - memory.place[0])
+        self.stretch = np.clip(self.stretch + slide - self.before, -self.y, self.y)
+        memory.place[0] = self.before = slide
+        self.depth = max(self.depth, int(memory.depth[0]))
+        return kernels.carried.py_func(0, self.table, memory)[0]
+
+    before = 0.0
+
+    @property
+    def limit(self) -> float:
+        return kernels.tangent.py_func(0, self.table, self.memory)[2]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_exact_memory_is_that_of_elements_one_by_one(seed):
+    random = np.random.default_rng(seed)
+    count = int(random.integers(1, 60))
+    y = np.exp(random.uniform(-4, 0, count))
+    y[random.random(count) < 0.2] = y[0]  # equal yields become one element
+    k = random.uniform(0.1, 2.0, count) * (random.random(count) > 0.1)
+    one = Follower(k, y)
+    for slide in np.cumsum(random.normal(0.0, 0.6, 300) * random.random(300)**2):
+        force = one.to(slide)
+        assert force == pytest.approx(k @ one.stretch, abs=1e-12 * (k @ y))
+        energy = kernels.carried.py_func(0, one.table, one.memory)[1]
+        assert energy == pytest.approx(0.5 * k @ one.stretch**2, rel=1e-10, abs=1e-12)
+        np.testing.assert_allclose(k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12)
+    assert one.depth <= one.group.yield_slide.size + 1  # a turning point that says nothing more is forgotten
+
+
+def test_exact_iwan_100_wipes_out_minor_loops():
+    """H11: 100 elements with F(0.8) = 0.48, a minor loop in between wiped out exactly."""
+    phi = (np.arange(100) + 0.5) / 100
+    one = Follower(np.full(100, 0.01), phi)
+    found = [one.to(slide) for slide in (0.8, 0.2, 0.6, 0.2, 0.8, -0.8, 0.8)]
+    np.testing.assert_allclose(found, [0.48, -0.03, 0.33, -0.03, 0.48, -0.48, 0.48], atol=1e-14)
+    before = one.lost
+    one.to(-0.8)
+    one.to(0.8)
+    masing = sum(4 * 0.01 * y * (0.8 - y) for y in phi[phi < 0.8])  # of every element that slips, 4 k y (a - y)
+    assert one.lost - before == pytest.approx(masing, rel=1e-13)
+
+
+@pytest.mark.parametrize("count", (100, 400))
+def test_exact_rod_on_a_friction_bed(count):
+    """H14: EA = tau = P = 1, tip 0.5 and loss 2/3 a cycle in the limit, 2/3 (1 - 1/n^2) of n points."""
+    far = (np.arange(count) + 0.5) / count  # distance of the points from the tip
+    rod = jenkins_set(np.minimum.outer(far, far), np.full(count, 1 / count))
+    one = Follower(rod.stiffness, rod.yield_slide)
+    assert one.to(0.5) == pytest.approx(1.0, rel=1e-12)
+    one.to(-0.5)
+    before = one.lost
+    one.to(0.5)
+    one.to(-0.5)
+    assert one.lost - before == pytest.approx(2 / 3 * (1 - 1 / count**2), rel=1e-10)
+
+
+def test_refuses_elements_that_are_none():
+    with pytest.raises(PatchfemError, match="finite"):
+        elements_of([1.0, -1.0], [1.0, 1.0])
+    with pytest.raises(PatchfemError, match="finite"):
+        elements_of([1.0], [np.inf])

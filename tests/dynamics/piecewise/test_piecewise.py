@@ -1,0 +1,184 @@
+"""Runs from yield to yield against DOP853 with every element restarted, known amplitudes, energies."""
+
+import numpy as np
+import pytest
+from support.jenkins_reference import Reference
+
+from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
+from patchfem.dynamics.piecewise.elements import elements_of
+from patchfem.dynamics.piecewise.histories import simulate
+from patchfem.response.measures import energy_balance
+from patchfem.structure.drives import Recorded, Sweep, levels, release
+
+
+def basis(omega, zeta, slide, base, output, damping=None, faces=None):
+    columns = (np.array(column, float) for column in (omega, zeta, slide, base, output))
+    return ModalBasis(tuple(map(str, range(len(omega)))), *columns, 1.0, damping, faces)
+
+
+ONE = basis([1.0], [0.003], [1.0], [1.0], [1.0])
+
+
+def random_rig(seed, most):
+    """(modes, drive, stiffness, yield slide): rigid, overdamped and coupled ones among them."""
+    r = np.random.default_rng(seed)
+    n, t = int(r.integers(1, 6)), int(np.exp(r.uniform(0, np.log(most))))
+    omega, zeta = np.sort(np.exp(r.uniform(-0.7, 1.5, n))), np.exp(r.uniform(np.log(0.001), np.log(0.3), n))
+    omega[0] *= r.random() > 0.2
+    zeta[-1] = r.uniform(1, 4) if r.random() < 0.2 else zeta[-1]
+    slide, base, output = (r.uniform(0.2, 1.0, n) * r.choice([-1, 1], n) for _ in range(3))
+    noise = r.normal(size=(n, n)) * 0.2
+    damping = np.diag(2 * zeta * omega) + noise @ noise.T if r.random() < 0.3 else None
+    y, k = np.exp(r.uniform(-3, 1, t)), np.exp(r.uniform(-1, 1.5, t))
+    k *= np.exp(r.uniform(-1.5, 0)) / (k @ y)
+    return (basis(omega, zeta, slide, base, output, damping), BaseSine(1.0, float(np.exp(r.uniform(-0.7, 0.7)))), k,
+            y * np.exp(r.uniform(-1, 0.5)))
+
+
+def against_reference(seed, most, cycles):
+    modes, drive, k, y = random_rig(seed, most)
+    done = simulate(modes, drive, [elements_of(k, y)], cycles, window=1)
+    want = Reference(modes, drive, [(k, y)]).go(cycles * drive.period)
+    found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
+    assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
+    assert energy_balance(done.ledger) <= 1e-10
+
+
+@pytest.mark.parametrize("seed", (2, 3, 4))
+def test_exact_random_rigs_against_dop853(seed):
+    against_reference(seed, 20, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 130))
+def test_exact_thirty_rigs_against_dop853(seed):
+    against_reference(seed, 200, 6)
+
+
+@pytest.mark.parametrize(("stiffness", "amplitude"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)])
+def test_exact_amplitude_at_resonance(stiffness, amplitude):
+    """H13: printed to nine digits, found by DOP853 at 1e-12."""
+    done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])], 400)
+    assert done.swing == pytest.approx(amplitude, abs=6e-10)
+    assert energy_balance(done.ledger) <= 1e-11
+    assert done.loops[0].force == pytest.approx(0.8, rel=1e-12)  # it slips, so the force is its limit
+
+
+def test_exact_two_interfaces_against_dop853():
+    faces = np.array([[1.0, 0.4], [0.3, -1.0]])
+    modes = basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], [1.0, 0.2], None, faces)
+    drive, elements = BaseSine(1.0, 1.4), [([2.0, 1.0], [0.1, 0.3]), ([1.5], [0.12])]
+    done = simulate(modes, drive, [elements_of(*one) for one in elements], 4, window=2)
+    want = Reference(modes, drive, elements).go(4 * drive.period)
+    found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
+    assert np.abs(found - want).max() <= 1e-10 * np.abs(want).max()
+    assert energy_balance(done.ledger) <= 1e-13
+
+
+def test_exact_equal_elements_are_one():
+    drive = BaseSine(1.0, 0.8)
+    many = simulate(ONE, drive, [elements_of(np.full(50, 0.2), np.full(50, 0.05))], 20)
+    one = simulate(ONE, drive, [elements_of([10.0], [0.05])], 20)
+    np.testing.assert_allclose(many.window.modal, one.window.modal, atol=1e-12)
+    assert many.events == one.events
+
+
+def test_exact_soft_elements_that_never_yield_are_a_spring():
+    done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([3.0], [1e3])], 30)
+    held = simulate(basis([2.0], [0.0015], [1.0], [1.0], [1.0]), BaseSine(1.0, 1.0), [elements_of([0.0], [1.0])], 30)
+    np.testing.assert_allclose(done.response.modal[-1], held.response.modal[-1], atol=1e-12)
+    assert done.loops[0].stuck == pytest.approx(10 * 2 * np.pi)  # stuck all the time
+    assert done.loops[0].slip == 0.0
+
+
+def test_exact_release_comes_to_rest_where_the_energy_says():
+    """A mass without damping released: what it loses to friction is what it had less what is stored."""
+    modes = basis([1.0], [0.0], [1.0], [1.0], [1.0])
+    done = simulate(modes, release(2 * np.pi), [elements_of([20.0], [0.01])], 30, start=Start(np.array([2.0]),
+                                                                                          np.array([0.0])))
+    assert done.ledger["work_in"] == 0.0
+    assert done.ledger["friction"] == pytest.approx(-done.ledger["stored"], rel=1e-13)
+    # every half swing loses twice the limit over the stiffness of the mode, until the springs hold it
+    assert done.amplitudes[-1].max() < 0.25 + 0.02
+
+
+def test_exact_grazing_yield():
+    """A push that brings the slide just short of its yield, or just past it."""
+    stiff, zeta = 3.0, 0.05
+    held = basis([2.0], [zeta / 2], [1.0], [1.0], [1.0])
+    drive = BaseSine(1.0, 0.9)
+    peak = np.abs(simulate(held, drive, [elements_of([0.0], [1.0])], 40, window=40).window.modal).max()
+    modes = basis([1.0], [zeta], [1.0], [1.0], [1.0])
+    exact = simulate(held, drive, [elements_of([0.0], [1.0])], 40).amplitudes
+    peak = max(peak, np.abs(exact).max())
+    for share, slips in ((1 + 1e-12, False), (1 - 1e-9, True), (1 - 1e-4, True)):
+        done = simulate(modes, drive, [elements_of([stiff], [share * peak])], 40, window=40)
+        assert (done.loops[0].slip > 0) is slips
+        assert energy_balance(done.ledger) < 1e-12
+
+
+def test_exact_levels_in_one_run_are_runs_one_after_the_other():
+    drive, group = levels([0.5, 1.2], 1.1, 7), elements_of([4.0, 2.0], [0.05, 0.2])
+    whole = simulate(ONE, drive, [group], 14, window=3)
+    half = simulate(ONE, BaseSine(0.5, 1.1), [group], 7, window=3)
+    start, memory = half.end
+    rest = simulate(ONE, BaseSine(1.2, 1.1), [group], 7, window=3, start=start, memory=memory)
+    np.testing.assert_allclose(whole.response.modal[-1], rest.response.modal[-1], rtol=1e-11)
+    assert whole.swing == pytest.approx(rest.swing, rel=1e-11)
+
+
+def test_exact_travel_ends_the_run_where_it_is_passed():
+    done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([1.0], [0.02])], 50, travel=1.5)
+    assert done.outcome is Outcome.EXCEEDS_TRAVEL
+    assert abs(done.response.output[-1]) == pytest.approx(1.5, rel=1e-12)
+    assert np.abs(done.response.output).max() <= 1.5 * (1 + 1e-12)
+
+
+def test_exact_snapshots_carry_the_force():
+    k, y = np.array([1.0, 3.0, 2.0]), np.array([0.2, 0.05, 0.1])
+    done = simulate(ONE, BaseSine(1.0, 0.8), [elements_of(k, y)], 5.5, window=2, frames=8)
+    assert len(done.snapshots) == 8
+    for shot in done.snapshots:
+        assert k @ shot["stretch"] == pytest.approx(shot["force"], abs=1e-13)
+        assert np.interp(shot["time"], done.window.time, done.window.slide) == pytest.approx(shot["slide"], abs=1e-5)
+    assert done.snapshots[-1]["time"] == pytest.approx(5.5 * 2 * np.pi / 0.8)
+
+
+def test_exact_window_of_samples_agrees_with_the_sums():
+    done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([6.0, 2.0], [0.05, 0.25])], 30, window=4)
+    window, (low, high, q, pull, work, slip, _, force) = done.window, done.loops[0]
+    assert window.slide.max() == high and window.slide.min() == low  # turning points are among the samples
+    assert np.abs(window.force).max() == pytest.approx(force, rel=1e-14)
+    assert np.trapezoid(window.force, window.slide) == pytest.approx(work, rel=1e-4)
+    assert np.ptp(window.slip) == pytest.approx(slip, rel=1e-14)
+    turn = np.exp(-1j * window.time)
+    for column, want in ((window.slide, q), (window.force, pull)):
+        assert 2 * np.trapezoid(column * turn, window.time) / np.ptp(window.time) == pytest.approx(want, rel=1e-4)
+    assert np.abs(window.acceleration).max() == pytest.approx(done.acceleration, rel=1e-4)
+    assert done.acceleration >= np.abs(window.acceleration).max() * (1 - 1e-13)
+
+
+SWEPT = [Sweep(0.15, 0.35, 30.0, 1.0), Sweep(0.35, 0.1, 25.0, 0.9, None, True), Sweep(0.1, 0.3, 30.0, 0.0, 0.5),
+         Sweep(0.1, 0.25, 30.0, 0.0, 0.7, True)]
+
+
+@pytest.mark.parametrize("drive", [*SWEPT, Recorded(np.array([0.0, 2.0, 3.5, 9.0, 9.5, 20.0]), np.array(
+    [0.0, 1.5, -1.0, 0.7, -2.0, 1.0]), 2 * np.pi)], ids=["linear", "log", "displacement", "log displacement", "record"])
+def test_exact_sweeps_and_records_against_dop853(drive):
+    modes, k, y = basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3]), [2.0, 1.0], [0.1, 0.3]
+    end = 1.1 * drive.duration
+    done = simulate(modes, drive, [elements_of(k, y)], end / drive.period, window=2)
+    reference = Reference(modes, drive, [(k, y)])
+    breaks = drive.breaks if isinstance(drive, Recorded) else [drive.duration]
+    for stop in (*breaks, end):  # the integrator is stopped where the formula of the drive changes
+        want = reference.go(stop)
+    found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
+    assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
+    assert energy_balance(done.ledger) <= 1e-12
+    np.testing.assert_allclose(done.window.base_acceleration, drive.values(done.window.time), atol=1e-11)
+
+
+def test_refuses_a_start_beyond_the_travel():
+    with pytest.raises(PatchfemError, match="travel"):
+        simulate(ONE, BaseSine(1.0, 1.0), [elements_of([1.0], [1.0])], 5, travel=0.1,
+                 start=Start(np.array([1.0]), np.array([0.0])))

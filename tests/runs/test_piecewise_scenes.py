@@ -1,0 +1,162 @@
+"""Scenes behind elastic-plastic elements: exact from yield to yield beside the march, chosen where it is cheaper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.scene_texts import COATED, COULOMB, DRIVE, KILOGRAM, MODE, PLASTIC, POINT, SECOND, SHEAR, only
+
+import patchfem as pf
+from patchfem.effects import LAWS
+
+IWAN = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5\n'
+RIG = POINT + PLASTIC + MODE + DRIVE
+PAIR = """\
+[structure]
+masses = ["1 kg", "0.7 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "4e5 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "2e5 N/m"
+[[structure.damper]]
+between = [2, 0]
+coefficient = "40 N s/m"
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "5 um"
+load = "60 N"
+[[structure.interface]]
+between = [2, 1]
+law = "elastic-plastic"
+static = 0.2
+bond_length = "20 um"
+load = "40 N"
+"""
+FORCED = '[drive]\nkind = "force"\nmass = 2\nforce = "30 N"\nfrequency = "90 Hz"\ncycles = 25\n'
+SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n' \
+        'rate = "80 Hz/s"\n'
+ROUND = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")  # of the same size as round-off
+
+
+def both(text, *sets):
+    """Results of the exact engine and of the march."""
+    keys = dict(one.split("=", 1) for one in sets)
+    return [pf.run(text, **keys, **{"accuracy.method": method}) for method in ("exact", "march")]
+
+
+def agree(exact, march, *besides):
+    """Measures of a march whose bars do not hold the exact values."""
+    assert exact.extra["engine"] == "piecewise" and march.extra["engine"] == "march"
+    assert set(exact.measures) == set(march.measures)
+    out = []
+    for name, other in march.measures.items():
+        mine = exact.measures[name]
+        if name in (*ROUND, *besides) or mine.value is None or other.value is None:
+            continue
+        if abs(mine.value - other.value) > 1.5 * (other.error or 0.0) + mine.error + other.floor:
+            out.append((name, mine.value, other.value, other.error))
+    return out
+
+
+@pytest.mark.parametrize("sets", [
+    (), ("drive.cycles=20.3",), ("drive.acceleration=2 g",), ("structure.mode.axial.damping=3",),
+])
+def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
+    exact, march = both(RIG, "accuracy.tolerance=1e-4", *sets)
+    assert agree(exact, march) == []
+    assert exact.measures["energy_balance"].value < 1e-12
+    assert all(m.error <= 1e-8 * abs(m.value) + m.floor for m in exact.measures.values() if m.value is not None)
+    if not sets:
+        assert exact.measures["stick_fraction"].value == pytest.approx(
+            0.5 * march.measures["stick_fraction"].value + 0.5 * exact.measures["stick_fraction"].value, abs=2e-3)
+
+
+def test_exact_two_modes_and_a_release():
+    exact, march = both(POINT + PLASTIC + MODE + SECOND + DRIVE, "drive.cycles=12", "accuracy.tolerance=1e-4")
+    assert agree(exact, march) == []
+    free = RIG[:RIG.index("[drive]")] + '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\ncycles = 12\n'
+    exact, march = both(free, "accuracy.tolerance=1e-4")
+    assert agree(exact, march) == []
+    assert exact.outcome == march.outcome
+
+
+def test_exact_two_interfaces_between_masses():
+    exact, march = both(PAIR + FORCED, "accuracy.tolerance=1e-4")
+    assert agree(exact, march) == []
+    assert exact.measures["slip_amplitude_2"].error <= 1e-9 * exact.measures["slip_amplitude_2"].value
+
+
+@pytest.mark.parametrize("law", (COULOMB, PLASTIC))
+def test_exact_patch_behind_its_shear(law):
+    text = COATED + SHEAR + law + KILOGRAM + DRIVE
+    exact, march = both(text, "drive.cycles=6", "accuracy.tolerance=1e-3", "contact.element_size=0.4 mm")
+    assert agree(exact, march) == []
+    fine, coarse = exact.fields, march.fields
+    assert np.abs(fine["shear_stress"] - coarse["shear_stress"]).max() < 0.02 * np.abs(coarse["shear_stress"]).max()
+    assert np.abs(fine["slip"] - coarse["slip"]).max() < 0.02 * np.abs(coarse["slip"]).max()
+
+
+def test_exact_sweep():
+    exact, march = both(POINT + PLASTIC + MODE + SWEEP, "accuracy.tolerance=1e-4")
+    assert agree(exact, march) == []
+    assert exact.measures["slip_start_phase"].value is None
+
+
+def test_exact_both_books_close():
+    """The samples hold every yield, so the trapezoidal rule on them is exact."""
+    exact = pf.run(POINT + PLASTIC + MODE + SECOND + DRIVE, **{"accuracy.method": "exact"})
+    assert exact.measures["work_check"].value < 1e-11 and exact.measures["loop_area"].value > 1e-4
+
+
+def test_exact_iwan():
+    exact, march = both(POINT + IWAN + MODE + DRIVE, "drive.cycles=6")
+    assert agree(exact, march) == []
+
+
+def test_exact_levels_and_their_onset():
+    drive = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = 12\n'
+    exact, march = both(POINT + PLASTIC + MODE + drive, 'drive.levels=["0.5 g", "3 g", "5 g"]')
+    assert agree(exact, march, "level_hysteresis") == []
+    assert len(exact.extra["levels"]) == 3
+    assert np.all(np.diff(exact.response.time) > 0)
+
+
+def test_always_auto_takes_the_cheaper_engine():
+    def engine(text, **keys):
+        return pf.plan(pf.load(text + "".join(f"[accuracy]\n{k} = {v}\n" for k, v in keys.items()))).engine
+
+    assert engine(RIG) == "piecewise"
+    assert engine(RIG.replace("1 um", "1e-5 um")) == "march"  # a spring so stiff that it rings without end
+    assert engine(POINT + IWAN + MODE + DRIVE, tolerance="1e-2") == "march"  # 769 elements slip one after the other
+    assert engine(POINT + IWAN + MODE + DRIVE, tolerance="1e-6") == "piecewise"
+    assert engine(RIG, steps_per_cycle="400") == "march"  # steps that are named are taken
+    assert engine(POINT + PLASTIC + MODE + SWEEP) == "piecewise"
+    assert engine(POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE) == "march"
+
+
+def test_refuses_exact_where_a_spring_bends_or_the_load_changes():
+    exact = '[accuracy]\nmethod = "exact"\n'
+    bends = POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact
+    assert "no exact solution exists beside [structure.stiffening]" in only(bends)
+    varies = POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
+    assert "no exact solution exists beside normal.amplitude" in only(varies)
+    assert "no exact solution exists for law 'tanh'" in only(
+        POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n' + MODE + DRIVE + exact)
+
+
+def test_always_laws_of_pieces_are_those_with_parallel_elements():
+    from patchfem.friction.record import law_from
+    from patchfem.scene.scene import loads
+
+    more = {"tanh": 'reference_speed = "1 mm/s"', "elastic-plastic": 'bond_length = "1 um"', "coulomb": "",
+            "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5', "bouc-wen": 'stiffness = "1e7 N/m"',
+            "lugre": 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"'}
+    for law, keys in more.items():
+        scene = loads(POINT + f'[friction]\nlaw = "{law}"\nstatic = 0.3\n{keys}\n' + MODE + DRIVE, "a.toml")
+        parallel = law_from(scene.friction, 100.0).element(100.0).form == "parallel"
+        carried = "pieces" in LAWS[law].carries.split()
+        assert carried == (parallel or law == "coulomb")  # Coulomb's points behind the pieces' shear are such elements

@@ -1,0 +1,70 @@
+"""Elastic-plastic elements one by one under DOP853, restarted at every yield and turning point: an independent
+reference."""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+
+class Reference:
+    """Modes (core.ModalBasis) behind elements: (stiffness (t,), yield slide (t,)) of every interface, from rest."""
+
+    def __init__(self, modes, drive, elements, rtol=1e-12, atol=1e-14, method="DOP853"):
+        self.modes, self.drive, self.rtol, self.atol, self.method = modes, drive, rtol, atol, method
+        self.k, self.y = ([np.asarray(one[j], float) for one in elements] for j in (0, 1))
+        self.stretch = [np.zeros(k.size) for k in self.k]
+        self.way = [np.zeros(k.size) for k in self.k]  # of the elements that slip
+        self.faces, n = np.asarray(modes.interfaces), modes.omega.size
+        self.state, self.time, self.restarts = np.zeros(2 * n), 0.0, 0
+        self.peak = 0.0
+
+    def forces(self, z, frozen):
+        slide = self.faces @ z
+        return np.array([k @ np.where(way != 0, way * y, e + s - s0) for k, y, e, way, s, s0 in zip(
+            self.k, self.y, self.stretch, self.way, slide, frozen)])
+
+    def go(self, end: float) -> np.ndarray:
+        """State (2 n,) at `end` [s]."""
+        modes, n = self.modes, self.modes.omega.size
+        step = 0.05 * self.drive.period
+        while self.time < end:
+            frozen = self.faces @ self.state[:n]
+
+            def rate(t, x, frozen=frozen):
+                z, v = x[:n], x[n:]
+                push = self.drive.values(t)
+                return np.concatenate([v, -modes.dampers @ v - modes.omega**2 * z - modes.base * push
+                                       - self.forces(z, frozen) @ self.faces / modes.mass])
+
+            def margin(t, x, frozen=frozen):
+                slide = self.faces @ x[:n]
+                return min(min((y - np.abs(e + s - s0))[way == 0].min(initial=1.0) for y, e, way, s, s0 in zip(
+                    self.y, self.stretch, self.way, slide, frozen)), 1.0) + 1e-15
+
+            events = [margin]
+            for f, way in enumerate(self.way):
+                if way.any():
+                    events.append(lambda t, x, f=f, sign=way[way != 0][0]: sign * (self.faces[f] @ x[n:]))
+            for event in events:
+                event.terminal, event.direction = True, -1
+            found = solve_ivp(rate, (self.time, end), self.state, self.method, rtol=self.rtol, atol=self.atol,
+                              max_step=step, events=events)
+            self.restarts += 1
+            self._land(found, frozen)
+        return self.state
+
+    def _land(self, found, frozen):
+        n = self.modes.omega.size
+        self.peak = max(self.peak, np.abs(self.modes.output @ found.y[:n]).max())
+        self.time, self.state = float(found.t[-1]), found.y[:, -1]
+        slide, speed = self.faces @ self.state[:n], self.faces @ self.state[n:]
+        for f in range(len(self.k)):
+            slips = self.way[f] != 0
+            self.stretch[f] = np.where(slips, self.way[f] * self.y[f], self.stretch[f] + slide[f] - frozen[f])
+            if found.status == 1:
+                turned = f + 1 < len(found.t_events) + 1 and slips.any() and self.way[f][slips][0] * speed[f] <= 1e-12
+                if turned:
+                    self.way[f][:] = 0.0
+                sign = np.sign(speed[f])
+                yields = (self.way[f] == 0) & (sign * self.stretch[f] >= self.y[f] - 1e-14) & (not turned)
+                self.way[f][yields] = sign
+                self.stretch[f] = np.clip(self.stretch[f], -self.y[f], self.y[f])
