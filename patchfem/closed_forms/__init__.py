@@ -6,56 +6,60 @@ slides; `dynamics` one mode with Coulomb friction; `wear` depths under a steady 
 Nothing here uses the rest of the package, so tests may trust it. Read `contact` first.
 """
 
-from .contact import (
-    cattaneo_shear,
-    cattaneo_stick_half_width,
-    combined_modulus,
-    hertz_half_width,
-    hertz_peak,
-    hertz_pressure,
-    kern_fraction,
-    layered_compliance,
-    punch_contact,
-    punch_pressure,
-    punch_rotation,
-    rounded_corner,
-    rounded_punch_half_width,
-    rounded_punch_pressure,
-    wedge_linear,
-    wedge_loop,
-    wedge_opening,
-    wedge_skin,
-    westergaard_approach,
-    westergaard_full_pressure,
-    westergaard_half_width,
-    westergaard_pressure,
-    westergaard_stiffness,
-)
-from .dynamics import (
-    COULOMB_RESONANCE,
-    bounded_input,
-    decay,
-    decay_half_cycles,
-    decay_rest,
-    sliding_amplitude,
-    two_stop_amplitude,
-    two_stop_relation,
-)
-from .friction import (
-    coulomb_loop_area,
-    dither_drift,
-    growth_factor,
-    jenkins_loop,
-    report_loop,
-    reversal_force,
-    steady_bond_length,
-    steady_shear,
-    stretch_loop,
-    virgin_force,
-    weight_across,
-    weight_along,
-)
-from .wear import even_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .contact import (
+        cattaneo_shear,
+        cattaneo_stick_half_width,
+        combined_modulus,
+        hertz_half_width,
+        hertz_peak,
+        hertz_pressure,
+        kern_fraction,
+        layered_compliance,
+        punch_contact,
+        punch_pressure,
+        punch_rotation,
+        rounded_corner,
+        rounded_punch_half_width,
+        rounded_punch_pressure,
+        wedge_linear,
+        wedge_loop,
+        wedge_opening,
+        wedge_skin,
+        westergaard_approach,
+        westergaard_full_pressure,
+        westergaard_half_width,
+        westergaard_pressure,
+        westergaard_stiffness,
+    )
+    from .dynamics import (
+        COULOMB_RESONANCE,
+        bounded_input,
+        decay,
+        decay_half_cycles,
+        decay_rest,
+        sliding_amplitude,
+        two_stop_amplitude,
+        two_stop_relation,
+    )
+    from .friction import (
+        coulomb_loop_area,
+        dither_drift,
+        growth_factor,
+        jenkins_loop,
+        report_loop,
+        reversal_force,
+        steady_bond_length,
+        steady_shear,
+        stretch_loop,
+        virgin_force,
+        weight_across,
+        weight_along,
+    )
+    from .wear import even_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
 
 __all__ = [
     "COULOMB_RESONANCE",
@@ -106,3 +110,12 @@ __all__ = [
     "worn_pad_fraction",
     "worn_volume",
 ]
+
+
+def __getattr__(name: str):
+    """A closed form by its name; the module that has it is loaded now, and with it what it takes from SciPy."""
+    for home in ("contact", "dynamics", "wear", "friction") if name in __all__ else ():
+        found = getattr(import_module(f"{__name__}.{home}"), name, None)
+        if found is not None:
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

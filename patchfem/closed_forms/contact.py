@@ -7,8 +7,6 @@ strain unless a foundation is named. Signs of the project: a rotation > 0 opens 
 """
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import xlogy
 
 
 def positive(**values) -> None:
@@ -116,6 +114,8 @@ def _rounded_angle(line_load, flat, radius, modulus) -> float:
     top = np.pi / 2 - 1e-9
     if want >= _less_sine(2 * top) / (2 * np.cos(top)**2):
         raise ValueError("the flat is too short to count under this load; use hertz_pressure")
+    from scipy.optimize import brentq
+
     return brentq(lambda t: _less_sine(2 * t) / (2 * np.cos(t)**2) - want, 0.0, top, xtol=1e-18, rtol=1e-15)
 
 
@@ -136,6 +136,8 @@ def rounded_punch_pressure(x, line_load, flat, radius, modulus):
     ln|sin(phi + phi_0)/sin(phi - phi_0)| + sin phi_0 ln|tan((phi + phi_0)/2) tan((phi - phi_0)/2)|}; the logarithms
     are regrouped here so that each meets a factor that vanishes with its argument.
     """
+    from scipy.special import xlogy
+
     small = _rounded_angle(line_load, flat, radius, modulus)
     half, edge = flat / np.cos(small), np.pi / 2 - small
     x = np.asarray(x, float)

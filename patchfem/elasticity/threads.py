@@ -2,12 +2,12 @@
 
 from functools import cache
 
-import scipy.linalg  # noqa: F401  (loads the second BLAS before the libraries are looked up)
-from threadpoolctl import ThreadpoolController
-
 
 @cache
-def _libraries() -> ThreadpoolController:
+def _libraries():
+    import scipy.linalg  # noqa: F401  (loads the second BLAS before the libraries are looked up)
+    from threadpoolctl import ThreadpoolController
+
     return ThreadpoolController()
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from math import ceil, log
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ..core import PatchfemError, frozen_array
 
@@ -74,11 +73,12 @@ def graded_rows(start: float, total: float, growth: float = GROWTH, least: int =
     if count * start >= total * (1 - 1e-12):
         return np.full(count, total / count)
 
-    def excess(ratio: float) -> float:
-        return start * np.sum(ratio ** np.arange(count)) - total
-
-    ratio = brentq(excess, 1.0, growth * (1 + 1e-6) + 1e-6, xtol=1e-15)
-    rows = start * ratio ** np.arange(count)
+    # the sum of the rows is convex in their ratio, so Newton's steps from above fall onto it until round-off
+    powers, ratio, last = np.arange(count), growth * (1 + 1e-6) + 1e-6, np.inf
+    while ratio < last:
+        last, rows = ratio, ratio**powers
+        ratio -= (start * rows.sum() - total) / (start * (powers[1:] @ rows[:-1]))
+    rows = start * last**powers
     return rows * (total / rows.sum())
 
 

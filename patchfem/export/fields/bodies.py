@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...elasticity import coating_bond, elasticity, substructure
+from ...elasticity import coating_bond, elasticity
 from ...elasticity.elasticity import Piece, von_mises
 from ...elasticity.recovery import Cells, Recovery, cells_of, indicator, quadratures, recovery
 from .blocks import blocks_of
@@ -57,11 +57,20 @@ def _loads(patch, fields: dict, side: str) -> tuple:
 def _motions(patch, loads: list) -> list:
     """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
     pair = patch.pair
-    how = elasticity.displacement if isinstance(pair.piece, elasticity.Piece) else substructure.displacement
+    how = _solver(pair.piece).displacement
     if pair.upper is pair.piece:
         both = how(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
         return np.split(both, 2)
     return [how(piece, *load) for piece, load in zip((pair.piece, pair.upper), loads)]
+
+
+def _solver(piece):
+    """The module that solves inside a piece, loaded where one is of its kind."""
+    if isinstance(piece, Piece):
+        return elasticity
+    from ...elasticity import substructure
+
+    return substructure
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,12 +91,11 @@ class _Inside:
 
 def _inside(piece, grid) -> _Inside:
     cells = cells_of(piece)
-    if isinstance(piece, elasticity.Piece):
+    if isinstance(piece, Piece):
         points, blocks, interface = cells.points, [piece.cells], np.arange(0, len(cells.points), grid.depth.size)
-        how = elasticity.cell_stress
     else:
         points, blocks, interface = grid.points, list(cells.blocks), grid.interface
-        how = substructure.cell_stress
+    how = _solver(piece).cell_stress
     return _Inside(points, blocks, interface, lambda u: how(piece, u)[0], cells, quadratures(cells), recovery(cells))
 
 

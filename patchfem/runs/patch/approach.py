@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from ...contact.unilateral import press
 from ...core import Compliance, NotConverged, PatchfemError, frozen_array
@@ -19,6 +18,8 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
     nothing touches. PatchfemError where the middle does not close as the load grows (`refuse_opening`), NotConverged
     where the approach jumps past the distance: one node under the load line carries at any rotation within bounds.
     """
+    from scipy.optimize import brentq
+
     refuse_opening(asked, stiff)
     distance, tried = asked.approach, []
     least = _least_load(asked, np.ptp(pieces.interface.x))
@@ -78,6 +79,8 @@ def refuse_opening(asked, pieces: Compliance) -> None:
 
     if closing(asked.offset) > 0:
         return
+    from scipy.optimize import brentq
+
     limit = brentq(closing, 0.0, asked.offset, xtol=1e-4 * abs(asked.offset))
     holder = "raise" if asked.spring > 0 else "name"
     raise PatchfemError(f"the load line lies {asked.offset:.6g} m off the middle; beyond {limit:.3g} m the middle of "
