@@ -8,9 +8,8 @@ The list has two settings, the tail that its cut-off may lose and the width up t
 from dataclasses import dataclass
 from math import ceil, inf, sqrt
 
-from .list_numbers import AGED, MOMENTS, POWER, SHARES, form_of
+from .list_numbers import AGED, MOMENTS, POWER, SHARES, cutoff, form_of
 from .parameters import Bonds
-from .quadrature import cutoff
 
 LISTS = {"direct": (False, False), "truncated": (True, False), "merged": (True, True)}  # (drops old strips, joins them)
 ENGINES = (*LISTS, "recursion")

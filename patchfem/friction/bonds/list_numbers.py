@@ -3,7 +3,6 @@
 from math import ceil, gamma
 
 import numpy as np
-from scipy.special import gammainc, roots_jacobi
 
 from .parameters import Bonds
 
@@ -20,6 +19,16 @@ def form_of(law: Bonds) -> float:
     return AGED if law.grows else SHARES
 
 
+def cutoff(order: float, tail: float) -> float:
+    """Path R/eps [1] beyond which all older bonds together carry at most the share `tail` of the friction limit.
+
+    It solves Q(p + 1, R/eps) = tail; order: p > -1, tail in (0, 1).
+    """
+    from scipy.special import gammainccinv
+
+    return float(gammainccinv(order + 1, tail))
+
+
 def law_numbers(law: Bonds, reach: float, merge: float) -> np.ndarray:
     """(24,): order, form, eps_0, m_0, 1/Gamma(p + 1), merge width, cut-off on the clock of the form, -, Gauss points
     and weights in (0, 1) with |u|^p and with |u|^(p + 1) as their weight.
@@ -32,6 +41,8 @@ def law_numbers(law: Bonds, reach: float, merge: float) -> np.ndarray:
     out[:7] = (law.order, form, law.length, law.initial, 1 / gamma(law.order + 1), merge,
                reach * (law.length if form >= SHARES else 1.0))
     if form == POWER:
+        from scipy.special import roots_jacobi
+
         for at, power in ((8, law.order), (16, law.order + 1)):
             x, w = roots_jacobi(4, 0.0, power)
             out[at:at + 4], out[at + 4:at + 8] = (1 + x) / 2, w / 2**(power + 1)
@@ -45,6 +56,8 @@ def share_table(law: Bonds) -> np.ndarray:
     """
     if form_of(law) != SHARES or law.order in (0, 1, 2):
         return np.zeros(0)
+    from scipy.special import gammainc
+
     return gammainc(law.order + 1, NODES * np.arange(32 * ceil(60 + 4 * law.order)))
 
 

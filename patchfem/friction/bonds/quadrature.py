@@ -22,23 +22,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import gammainccinv
 
 from ..protocol import Step
+from .list_numbers import cutoff
 from .parameters import Bonds, elastic_part, grow, growth_exponents
 from .recursion import direction, moved, pressed, refuse_directions
 from .strips import COLUMNS, Strips, surviving, weights
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 PANELS = (0, 1, 2, 4, 8, 16, 32)  # of a step in bond lengths, five Gauss points each
-
-
-def cutoff(order: float, tail: float) -> float:
-    """Path R/eps [1] beyond which all older bonds together carry at most the share `tail` of the friction limit.
-
-    It solves Q(p + 1, R/eps) = tail; order: p > -1, tail in (0, 1).
-    """
-    return float(gammainccinv(order + 1, tail))
 
 
 @dataclass(frozen=True, slots=True)
