@@ -5,6 +5,8 @@ import signal
 
 signal.signal(signal.SIGINT, lambda *_: os._exit(130))  # until main() takes over, an interrupt just leaves
 
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # looking for some costs every command 30 ms
+
 import sys  # noqa: E402
 
 from cyclopts import App, CycloptsError  # noqa: E402

@@ -3,7 +3,6 @@
 import numpy as np
 
 from ...effects import has
-from ...friction.bonds.quadrature import Quadrature
 from ...friction.bonds.recursion import Recursion
 from ...friction.record import law_from
 
@@ -22,6 +21,8 @@ def law_for(model, patch=None):
     engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
         return Recursion(law)
+    from ...friction.bonds.quadrature import Quadrature
+
     if engine == "direct":
         return Quadrature(law, 0.0)
     tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
