@@ -98,7 +98,7 @@ class _Kept:
         self.ledger += batches.energies(batch, self.modes, self.live)
         self.peak = max(self.peak, *(float(batches.stored(batch, self.modes, s).max()) for s in (0.0, 0.5)))
         self.events += int(np.count_nonzero(batch.first))
-        self._add_phasor(batch, series)
+        self._add_phasor(batch, series, cycle)
         if self.corners < 400_000:
             self._corners(batch, piece, u)
         self.recent.append(batch)
@@ -129,16 +129,14 @@ class _Kept:
         return (batch, piece[kept], u[kept], turn[kept], series[:, 0],
                 batches.values_at(series, np.arange(k + 1), batch.share))
 
-    def _add_phasor(self, batch, series) -> None:
-        """Add the samples of the output on a grid of 64 per cycle to the phasor of their cycle."""
-        period = self.drive.period
-        first = ceil(batch.time[0] / period * 64 - 1e-9)
-        stop = batch.time[-1] + batch.span[-1]
-        number = np.arange(first, ceil(stop / period * 64 - 1e-9))
-        times = number * (period / 64)
-        owner = np.clip(np.searchsorted(batch.time, times, side="right") - 1, 0, len(batch) - 1)
-        y = batches.values_at(series, owner, (times - batch.time[owner]) / batch.unit[owner])
-        np.add.at(self.phasors, np.minimum(number // 64, self.cycles - 1), y * np.exp(-2j * np.pi * number / 64) / 32)
+    def _add_phasor(self, batch, series, cycle) -> None:
+        """Add the pieces' parts of 2/period int y exp(-i omega t) dt to the phasors of their cycles, by Gauss points.
+        """
+        tau, turn = batch.span[:, None] * batches.NODES, 2 * np.pi / self.drive.period
+        y = np.einsum("kjp,kp->kj", batches.powers(tau / batch.unit[:, None]), series)
+        angle = turn * (batch.time - cycle * self.drive.period)[:, None] + turn * tau
+        part = batch.span * ((y * np.exp(-1j * angle)) @ batches.WEIGHTS)
+        np.add.at(self.phasors, cycle, part * (2 / self.drive.period))
 
     def _corners(self, batch, piece, u) -> None:
         """States kept before the window: where events stand, and turning points unless every one of them is an

@@ -1,5 +1,5 @@
-"""Compiled events of one mode with one Coulomb interface: the arithmetic of `slip_kernels` and
-`sdof_kernels`, and runs in batches."""
+"""Compiled events of one mode with one Coulomb interface: the arithmetic of `slip_kernels`, `sdof_kernels` and
+`keep_kernels`, and runs in batches."""
 
 from types import FunctionType
 
@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
-from . import sdof_kernels, slip_kernels
+from . import keep_kernels, sdof_kernels, slip_kernels
 
 SLIP = ("oscillator", "series", "step_answer", "moved", "motion", "first_leap", "_free", "leap", "bend", "over_parts",
         "stop")
@@ -30,8 +30,10 @@ def compiled_copy(module, inner, outer, known=None):
 
 _SLIP = compiled_copy(slip_kernels, SLIP, ())
 _EVENTS = compiled_copy(sdof_kernels, INNER, ("enter", "march"), {name: _SLIP[name] for name in SLIP})
+_KEEP = compiled_copy(keep_kernels, ("by_parts", "wave", "by_points", "add_phasors", "listed_event"), ("keep",),
+                      {name: _SLIP[name] for name in SLIP})
 COMPILED = {name: _SLIP[name] for name in SLIP} | {name: _EVENTS[name] for name in INNER}
-march, enter = _EVENTS["march"], _EVENTS["enter"]
+march, enter, keep = _EVENTS["march"], _EVENTS["enter"], _KEEP["keep"]
 
 
 @njit(error_model="numpy", cache=True)

@@ -4,15 +4,16 @@ Short blocks run as plain Python, so no compiled code is loaded; long ones run c
 """
 
 from itertools import pairwise
-from math import ceil, inf, pi
+from math import inf, pi
 
 import numpy as np
 
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from ..events.event_list import BORDER, ROOM, EventLog
+from ..events.event_list import ROOM, EventLog
 from ..events.histories import LEAST, SAMPLES, EventRun
 from . import sdof_kernels
-from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, position, response, states
+from .sdof_keep import keep
+from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, response, starts, states
 
 COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
@@ -110,10 +111,10 @@ class _Run:
         self.block, self.period, self.duration, self.window = block, period, cycles * period, window
         number = int(np.ceil(cycles - 1e-9))
         self.extremes = np.tile([inf, -inf], (number, 1))
-        self.phasors = np.zeros(number, complex)
-        self.book, self.peak, self.begun, self.end = np.zeros(10), 0.0, 0.0, self.duration
+        self.parts = np.zeros((number, 2))  # phasors of z
+        self.book, self.begun, self.end = np.zeros(10), 0.0, self.duration
         self.recent, self.corners, self.outcome, self.kept = np.empty((0, sdof_kernels.ROW)), [], None, 0
-        self.listed, self.noted, self.before = [], 0, None
+        self.events, self.memo, self.keep = np.empty((ROOM, 5)), np.zeros(4), None
 
     def go(self, engine, z: float, v: float, far: float, progress) -> None:
         """All events from state (z, v)."""
@@ -121,7 +122,8 @@ class _Run:
         self.state, clock = np.zeros(9), (self.period, far, 0.0, 1.0)
         self.begun = 0.5 * block.modes.mass * (v * v + block.w**2 * z * z)
         engine.enter(self.state, block.segments, 0, 0.0, 0.0, z, v, 1.0, *block.friction, block.w**2)
-        self.before = (np.sign(v), 0.0)
+        self.memo[1] = np.sign(v)
+        self.keep = getattr(engine, "keep", keep)
         while code == sdof_kernels.FULL:
             code, used = engine.march((block.w, block.decay), block.friction, block.segments, clock, self.state, rows,
                                       self.extremes, self.book)
@@ -136,12 +138,9 @@ class _Run:
 
     def take(self, rows) -> None:
         """Sum what a chunk of phases adds."""
-        block, beta = self.block, self.block.w**2
-        z, v, _ = states(0.5 * rows[:, 2], rows, np.arange(len(rows)), block)
-        self.peak = max(self.peak, float((v * v + beta * z * z).max()),
-                        float((rows[:, 5]**2 + beta * rows[:, 4]**2).max()))
-        self._add_phasors(rows)
-        self._note(rows)
+        block = self.block
+        self.keep(rows, (block.w, block.decay), block.segments, (self.period, block.slide, block.friction[0]),
+                  self.parts, self.events, self.memo)
         if self.kept < CORNERS:
             self.corners.append(rows)
             self.kept += len(rows)
@@ -149,44 +148,13 @@ class _Run:
         old = np.searchsorted(self.recent[:, 0], self.recent[-1, 0] - (self.window + 1) * self.period)
         self.recent = self.recent[max(old - 1, 0):]
 
-    def _note(self, rows) -> None:
-        """Keep the changes of direction and of segment as rows (time, phase, interface, what, slide)."""
-        rows, slide = rows[rows[:, 2] > 0], self.block.slide
-        if not len(rows):
-            return
-        way, segment = (np.concatenate([[first], rows[:, k]]) for first, k in zip(self.before, (3, 9)))
-        self.before = way[-1], segment[-1]
-        old, new = np.sign(slide) * way[:-1], np.sign(slide) * way[1:]
-        what = np.where(new == 0, 0, np.where(old == 0, 1, 2)) * new
-        turned = (old != new) & (self.block.friction[0] > 0)
-        crossed = segment[1:] != segment[:-1]
-        zero = np.zeros(len(rows))
-        found = np.stack([rows[:, 0], rows[:, 1], zero, what, slide * rows[:, 4]], axis=1)
-        border = np.stack([rows[:, 0], rows[:, 1], zero - 1, zero + BORDER, zero], axis=1)
-        both = np.stack([border, found], axis=1)[np.stack([crossed, turned], axis=1)]
-        self.noted += len(both)
-        self.listed.append(both)
-        while len(self.listed) > 1 and sum(map(len, self.listed[1:])) > ROOM:
-            self.listed.pop(0)
-
     def log(self) -> EventLog:
         """The last events."""
-        rows = np.concatenate([np.empty((0, 5)), *self.listed])[-ROOM:]
+        count = int(self.memo[0])
+        rows = self.events[np.arange(max(0, count - ROOM), count) % ROOM]
         time, phase, interface, what, slide = rows.T
         return EventLog(frozen_array(time), frozen_array(phase), frozen_array(interface, np.int64),
-                        frozen_array(what, np.int64), frozen_array(slide), self.noted).until(self.end)
-
-    def _add_phasors(self, rows) -> None:
-        per = self.period / 64
-        first = ceil(rows[0, 0] / per - 1e-9)
-        number = np.arange(first, ceil((rows[-1, 0] + rows[-1, 2]) / per - 1e-9))
-        if not number.size:
-            return
-        time = number * per
-        owner = np.maximum(np.searchsorted(rows[:, 0], time + 1e-9 * per, side="right") - 1, 0)
-        z = position(np.clip(time - rows[owner, 0], 0.0, rows[owner, 2]), rows, owner, self.block)
-        turn = np.exp(-2j * pi * np.arange(64) / 64)[number % 64] * (self.block.output / 32)
-        np.add.at(self.phasors, np.minimum(number // 64, len(self.phasors) - 1), z * turn)
+                        frozen_array(what, np.int64), frozen_array(slide), count).until(self.end)
 
     def collect(self) -> EventRun:
         """Everything that is kept."""
@@ -201,12 +169,13 @@ class _Run:
         loop = (rows[owner, 0] + tau, weight, block.slide * z, block.slide * v, force(tau, rows, owner, block))
         stored = 0.5 * mass * (self.state[4]**2 + block.w**2 * self.state[3]**2)
         book = dict(zip(("work_in", "viscous", "power", "friction"), (mass * self.book[:4]).tolist()))
-        book |= {"stored": float(stored) - self.begun, "peak_stored": max(0.5 * mass * self.peak, float(stored))}
+        book |= {"stored": float(stored) - self.begun, "peak_stored": max(0.5 * mass * self.memo[3], float(stored))}
         seen = np.isfinite(self.extremes[:, 0])
         amplitudes = np.sort(block.output * self.extremes[seen], axis=1)
         count = 1 if block.friction[0] == 0 else int(self.book[4])
         stuck = float((high - low)[rows[:, 3] == 0].sum())
-        return EventRun(full, wide, amplitudes, self.phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
+        phasors = block.output * (self.parts[:, 0] + 1j * self.parts[:, 1])
+        return EventRun(full, wide, amplitudes, phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
                         self._starts(first), peak_acceleration(low, high, rows, block), end / self.period, self.log(),
                         force_peaks=np.array([peak_force(low, high, rows, block)]))
 
@@ -238,7 +207,7 @@ class _Run:
         if not len(rows):
             return wide
         tau, owner = np.zeros(len(rows)), np.arange(len(rows))
-        early = response(rows[:, 0].copy(), *states(tau, rows, owner, self.block),
+        early = response(rows[:, 0].copy(), *starts(rows, self.block),
                          force(tau, rows, owner, self.block), self.block)
         return _chained(early, wide)
 

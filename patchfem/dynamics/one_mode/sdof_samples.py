@@ -30,7 +30,7 @@ class OneMode:
         return max(self.w, float(self.segments[:, 4].max()))
 
 
-def _turn(angle):
+def turn(angle):
     out = np.empty(angle.shape, complex)
     out.real, out.imag = np.cos(angle), np.sin(angle)
     return out
@@ -52,9 +52,9 @@ def _growth(x):
 def basis(u, mode, om) -> tuple:
     """(h, h', step answer, cosine answer, sine answer) of a mode at times u (k,): `slip_kernels.motion` in arrays."""
     beta, _, decay, own, kind, _, _ = mode
-    wave = _turn(om * u)
+    wave = turn(om * u)
     if kind == 0:
-        own_wave = np.exp(-decay * u) * _turn(own * u)
+        own_wave = np.exp(-decay * u) * turn(own * u)
         h = own_wave.imag / own
         h1 = own_wave.real - decay * h
         second = (wave - own_wave.conj()) / complex(decay, om + own)
@@ -115,19 +115,25 @@ def _series(u, v0, g0, bc, bs, mode, om) -> tuple:
 
 
 def _one(u, rows, owner, block, om, parts) -> np.ndarray:
-    mode = oscillator(block.w, block.decay, om)
+    return motions(u, *(rows[owner, k] for k in (5, 6, 7, 8)), oscillator(block.w, block.decay, om), parts)
+
+
+def motions(u, v0, g0, bc, bs, mode, parts) -> np.ndarray:
+    """The first `parts` of (shift, speed, acceleration) at times u (k,) of slips, `slip_kernels.motion` in arrays."""
+    om = mode[5]
     out, short = np.empty((parts, u.size)), u * mode[6] < REACH
     if short.any():
-        out[:, short] = _series(u[short], *(rows[owner[short], k] for k in (5, 6, 7, 8)), mode, om)[:parts]
+        out[:, short] = _series(u[short], v0[short], g0[short], bc[short], bs[short], mode, om)[:parts]
     far = ~short
     if far.any():
-        v0, g0, bc, bs = (rows[owner[far], k] for k in (5, 6, 7, 8))
+        v0, g0, bc, bs = v0[far], g0[far], bc[far], bs[far]
         h, h1, one, c, s = basis(u[far], mode, om)
         out[0, far] = v0 * h + g0 * one + bc * s - bs * (one - c)
         if parts == 1:
             return out
         out[1, far] = v0 * h1 + g0 * h + om * (bc * c - bs * s)
-        out[2, far] = g0 * h1 - v0 * (mode[1] * h1 + mode[0] * h) + om * (bc * (h - om * s) - bs * om * c)
+        if parts == 3:
+            out[2, far] = g0 * h1 - v0 * (mode[1] * h1 + mode[0] * h) + om * (bc * (h - om * s) - bs * om * c)
     return out
 
 
@@ -155,19 +161,26 @@ def _states(u, rows, owner, block, parts):
     return out
 
 
-def pull(u, rows, owner, block: OneMode) -> tuple:
-    """Drive force over the mass and its first and second derivative at times u (k,) after the starts of phases."""
+def starts(rows, block: OneMode) -> tuple:
+    """Motion (z [m], v [m/s], z'' [m s-2]), (p,) each, at the starts of phases rows (p, 10)."""
+    way = rows[:, 3]
+    return rows[:, 4], way * rows[:, 5], way * (rows[:, 6] - 2 * block.decay * rows[:, 5])
+
+
+def pull(u, rows, owner, block: OneMode, parts: int = 3) -> tuple:
+    """Drive force over the mass and, up to `parts`, its first and second derivative at times u (k,) after the starts of
+    phases."""
     _, _, push, b, om, _ = block.segments[rows[owner, 9].astype(int)].T
     angle = rows[owner, 1] + om * u
     wave = b * np.sin(angle)
-    return push + wave, b * om * np.cos(angle), -om * om * wave
+    return (push + wave,) if parts == 1 else (push + wave, b * om * np.cos(angle), -om * om * wave)
 
 
 def force(u, rows, owner, block: OneMode):
     """Friction force (k,) [N] at times u (k,) [s] in the phases `owner`: kinetic in slip, what holds in stick."""
     if block.slide == 0 or block.friction[0] == 0:
         return np.zeros(u.size)
-    held, way = pull(u, rows, owner, block)[0] - block.w**2 * rows[owner, 4], rows[owner, 3]
+    held, way = pull(u, rows, owner, block, 1)[0] - block.w**2 * rows[owner, 4], rows[owner, 3]
     return np.where(way == 0, held, way * block.friction[1]) * (block.modes.mass / block.slide)
 
 
