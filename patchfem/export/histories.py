@@ -79,7 +79,7 @@ def _between(result: Result) -> dict:
 
 def _levels(levels) -> dict:
     """Columns of a run in levels: the drive, whether it held, every measure and its error."""
-    out = {"level_drive": ("m s-2", np.array([one.drive for one in levels])),
+    out = {"level_drive": (levels[0].unit, np.array([one.drive for one in levels])),
            "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
     for name in KEPT:
         if any(name in one.values for one in levels):

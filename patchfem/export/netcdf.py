@@ -102,7 +102,8 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
         coords["strip_offset"] = ("strip", strips[0], {"units": "m", "long_name": "place of the strip over the width"})
         data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
     for name, (unit, values) in (levels or {}).items():
-        text = {"level_drive": "acceleration of the base", "level_stuck": "whether the interface held"}
+        drive = "force" if unit == "N" else "acceleration of the base"
+        text = {"level_drive": drive, "level_stuck": "whether the interface held"}
         data[name] = ("level", values, {"units": unit, "long_name": text.get(name, name.replace("_", " "))})
     return Contents(data, coords)
 

@@ -326,10 +326,12 @@ def _table_of_levels(levels: list) -> str:
             value, error = one["values"].get(name), one["errors"].get(name)
             unit = "m" if name.startswith("rel") else "m s-2"
             cells.append("&ndash;" if value is None else pair(name, measure(value, unit, error)))
-        rows.append(f"<tr><td class=n>{number}</td><td class=n>{one['drive'] / G:.4g} g</td>"
+        drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
+        rows.append(f"<tr><td class=n>{number}</td><td class=n>{drive}</td>"
                     + "".join(f"<td class=n>{cell}</td>" for cell in cells)
                     + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
-    return ("<h2>Levels</h2><table><tr><th class=n>level<th class=n>base acceleration<th class=n>half peak-to-peak"
+    sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
+    return (f"<h2>Levels</h2><table><tr><th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak"
             f"<th class=n>peak acceleration<th>interface</tr>{''.join(rows)}</table>")
 
 

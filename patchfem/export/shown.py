@@ -23,7 +23,8 @@ def report_data(result: Result) -> dict:
         data["fields"] = {name: rows[count:] for name, rows in result.fields.items()}
         data["fields"]["time"] = data["fields"]["time"] - data["fields"]["time"][0]
     if "levels" in result.extra:
-        data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors}
+        data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors,
+                           "unit": one.unit}
                           for one in result.extra["levels"]]
     if "regime" in result.extra:
         data["steady"] = {"regime": result.extra["regime"], "multiplier": largest_multiplier(result.extra)}

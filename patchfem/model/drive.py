@@ -26,7 +26,7 @@ def drive_of(scene, modes: ModalBasis):
 
 def levelled(asked) -> bool:
     """Whether the drive is raised in levels."""
-    return asked.kind == "base" and asked.waveform == "levels"
+    return asked.kind != "free" and asked.waveform == "levels"
 
 
 def cycles_per_level(asked) -> float:

@@ -16,13 +16,13 @@ class Rig:
     """Modes with their drive and what rubs on them.
 
     start: None at rest. kind: "base", "force" or "free"; waveform as in the scene; frequency [Hz] of a sine or of
-    levels, else None; levels: accelerations [m s-2] of a drive in levels, level_cycles of each; cycles of the whole
-    run; force [N] of a force drive, else None. interfaces: a Rubbing each, none in a linear rig; names: of interfaces
-    between masses. load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a
-    patch in strips. travel [m], infinite without a stop; cubic [N/m3] stiffening at the output or None; interlock:
-    (stiffness [N/m], wavelength [m]) of a bonded spring that bends, or None. mass [kg] and own_frequency [Hz] of the
-    first mode that is not rigid; frequencies (n,) [Hz]; by_modes: the scene
-    lists modes; notes: on a structure file.
+    levels, else None; levels: accelerations [m s-2] of a drive in levels, or forces over the modal mass, level_cycles
+    of each; onset: what their onset means, (kind, length [m] or None); cycles of the whole run; force [N] of a force
+    drive, else None. interfaces: a Rubbing each, none in a linear rig; names: of interfaces between masses.
+    load_varies: the normal load changes with the motion or in time; strips_slide_apart: modes yaw a patch in strips.
+    travel [m], infinite without a stop; cubic [N/m3] stiffening at the output or None; interlock: (stiffness [N/m],
+    wavelength [m]) of a bonded spring that bends, or None. mass [kg] and own_frequency [Hz] of the first mode that is
+    not rigid; frequencies (n,) [Hz]; by_modes: the scene lists modes; notes: on a structure file.
     """
 
     modes: ModalBasis
@@ -48,6 +48,7 @@ class Rig:
     frequencies: np.ndarray
     by_modes: bool
     notes: tuple
+    onset: tuple = ("distortion", None)
 
     @property
     def speed(self) -> float:
@@ -75,10 +76,11 @@ def rig_asked(scene) -> Rig:
     rows = levelled(asked)
     bends = bonded is not None and bonded.wavelength is not None
     return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
-               asked.levels if rows else (), cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
+               tuple(part.amplitude for part in drive.segments) if rows else (),
+               cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
                asked.force if asked.kind == "force" else None, rubbings_of(scene), tuple(interface_names(structure)),
                acts(scene), yaws(scene), structure.travel or np.inf,
                structure.stiffening.cubic if structure.stiffening is not None else None,
                (bonded.stiffness, bonded.wavelength) if bends else None,
                bonded.stiffness if bonded is not None else None, mass, own, frequencies(structure, modes),
-               bool(structure.mode), tuple(notes_of(scene)))
+               bool(structure.mode), tuple(notes_of(scene)), (asked.onset, asked.onset_length))

@@ -1,56 +1,82 @@
-"""Measures of a run whose level is raised or lowered in steps: onset of slip, jump, hysteresis."""
+"""Measures of a run whose level is raised or lowered in steps: onset, jump, hysteresis."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "stick_fraction",
-        "friction_force_peak", "loop_area", "equivalent_stiffness", "equivalent_damping")
+KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "acceleration_distortion", "slip_amplitude",
+        "stick_fraction", "friction_force_peak", "loop_area", "equivalent_stiffness", "secant_stiffness",
+        "equivalent_damping")
+AMPLITUDE = KEPT[0]
+DISTORTED = 0.03  # third over first harmonic of the acceleration: from there on a person sees it in the curve
+JUMP = 1.5  # factor beyond what the drive changed, between neighbouring levels
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Level:
     """The end of one level of the drive.
 
-    drive: acceleration [m s-2]; stuck: nothing slipped; values: measures by name; errors: theirs, as far as they are
-    known.
+    drive: acceleration [m s-2], of a force drive the force over the modal mass, or the force [N] where `unit` says so;
+    stuck: nothing slipped; values: measures by name; errors: theirs, as far as they are known.
     """
 
     drive: float
     stuck: bool
     values: dict
     errors: dict
+    unit: str = "m s-2"
 
 
-def bracket(levels) -> tuple | None:
-    """Numbers of the last level that still held and of the first that slips, on the way up; None where none slips.
+def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool]:
+    """What tells whether a level lies beyond the onset, by the kind of onset that the scene asks for.
 
-    -1 stands for the start.
+    "slip": some irreversible motion; "distortion": H3/H1 of the acceleration above DISTORTED; "gauge": half
+    peak-to-peak at the output above `length` [m].
+    """
+    if kind == "slip":
+        return lambda level: not level.stuck
+    if kind == "gauge":
+        return lambda level: level.values[AMPLITUDE] > length
+    return lambda level: level.values.get("acceleration_distortion", 0.0) > DISTORTED
+
+
+def no_onset(kind: str, length: float | None = None) -> str:
+    """The reason why a run of levels has no onset; arguments as in `past_onset`."""
+    what = {"slip": "slips", "gauge": f"moves the output by more than {length:g} m" if length else ""}.get(
+        kind, f"distorts the acceleration (third over first harmonic) by more than {DISTORTED:g}")
+    return f"no level on the way up {what}"
+
+
+def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:
+    """Numbers of the last level before the onset and of the first beyond it, on the way up; None where none is beyond.
+
+    past: what tells, as `past_onset` gives it; -1 stands for the start.
     """
     for k, level in enumerate(levels):
-        if not level.stuck:
+        if past(level):
             return k - 1, k
         if k + 1 < len(levels) and levels[k + 1].drive < level.drive:
             return None
     return None
 
 
-def jump(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
+def jump(levels, name: str = AMPLITUDE) -> tuple | None:
     """Largest change of a measure between neighbouring levels, up or down, over what the drive itself changed.
 
-    Returns (drive of the level after it, factor, distance of the two levels); None with fewer than two levels that
-    move.
+    Returns (drive of the level after it, factor, distance of the two levels); None where no factor reaches JUMP, up or
+    down.
     """
     found = []
     for a, b in pairwise(levels):
         if min(a.drive, b.drive, a.values[name], b.values[name]) > 0 and not (a.stuck or b.stuck):
             factor = (b.values[name] / a.values[name]) / (b.drive / a.drive)
             found.append((abs(np.log(factor)), b.drive, factor, abs(b.drive - a.drive)))
-    return max(found)[1:] if found else None
+    return max(found)[1:] if found and max(found)[0] >= np.log(JUMP) else None
 
 
-def hysteresis(levels, name: str = "relative_displacement_amplitude") -> tuple | None:
+def hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
     """Hysteresis of a measure between the upward and the downward series of levels, and its error.
 
     It is the largest difference at one drive that is passed both ways; None where no drive is.

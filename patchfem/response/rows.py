@@ -144,8 +144,11 @@ ROWS = (
     Row("ring_frequency", "Hz", 1e-3, "frequency at which the rig rings while it sticks"),
     Row("ring_damping", "1", 1e-6, "damping ratio of that ringing"),
     Row("onset_level", "m s-2", 0.0,
-        "level of the drive at which the interface starts to slip, found by halving between two levels"),
-    Row("jump_level", "m s-2", 0.0, "level after the largest jump of the amplitude between two levels"),
+        "level of the drive at which slip begins, as drive.onset says, found by halving between two levels; N under a "
+        "force"),
+    Row("jump_level", "m s-2", 0.0,
+        "level after the largest jump of the amplitude between two levels, by a factor of 1.5 or more beyond the "
+        "drive's; N under a force"),
     Row("level_hysteresis", "m", 0.0,
         "hysteresis: largest difference of the amplitude between rising and falling levels, at one level"),
 )

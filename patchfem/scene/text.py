@@ -65,11 +65,17 @@ def _lines(table: Table, at: str) -> Iterator[str]:
         elif isinstance(value, Table) and not isinstance(value, Material):
             inner.append((f"[{path}]", path, value))
         else:
-            yield f"{key} = {_value(value, kind_of(type(table), name))}"
+            yield f"{key} = {_value(value, _kind(table, name))}"
     for header, path, value in inner:
         yield ""
         yield header
         yield from _lines(value, path)
+
+
+def _kind(table: Table, name: str) -> str | None:
+    """Kind of quantity of an attribute; the levels of a force drive are forces."""
+    forces = isinstance(table, Drive) and name == "levels" and table.kind == "force"
+    return "force" if forces else kind_of(type(table), name)
 
 
 def _value(value: Any, kind: str | None) -> str:

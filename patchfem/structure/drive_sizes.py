@@ -25,6 +25,11 @@ class Asked(NamedTuple):
         """Whether the base accelerates."""
         return self.keys.kind == "base"
 
+    @property
+    def levels(self) -> tuple:
+        """Levels [m s-2]: accelerations, or forces over the modal mass; () where there are none."""
+        return tuple(one / (1.0 if self.moving else self.mass) for one in self.keys.levels or ())
+
     def size(self, omega: float) -> float:
         """Amplitude [m s-2]: of the acceleration, a displacement times omega^2, or a force over the modal mass."""
         if self.keys.kind == "force":

@@ -206,7 +206,7 @@ class Recorded:
 
 
 def _levels(asked: Asked) -> Piecewise:
-    return levels(asked.keys.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys))
+    return levels(asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving)
 
 
 def _step(asked: Asked) -> Piecewise:

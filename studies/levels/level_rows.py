@@ -63,7 +63,8 @@ class Row:
 def scene_text(case: str, cycles: int, rows: str, method: str = "") -> str:
     """The case with [drive] in levels."""
     text, frequency, _ = CASES[case]
-    drive = f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "{frequency} Hz"\nlevels = [{rows}]\n'
+    drive = f'[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "{frequency} Hz"\nlevels = [{rows}]\n' \
+        'onset = "slip"\n'
     return text[:text.index("[drive]")] + drive + f"cycles = {cycles}\n[accuracy]\n{method}"
 
 

@@ -65,7 +65,7 @@ def onset(worn, cycles: int, pair=None) -> float:
     model = build(scene.loads(text, SCENE))
     patch = pressed(model.patch, pair, worn)
     found = ENGINES["march"].run(model, choose(model), patch)
-    return levels.onset(found.levels, found.slips, 3e-3)[0] / G_N
+    return levels.onset(found.levels, found.probe, 3e-3)[0] / G_N
 
 
 def worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:

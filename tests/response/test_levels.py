@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from scene_texts import MODE, POINT
+from scene_texts import MODE, POINT, mistakes
 
 from patchfem.core import G_N
-from patchfem.response.levels import Level, bracket, hysteresis, jump
+from patchfem.response.levels import JUMP, Level, bracket, hysteresis, jump, past_onset
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -21,6 +21,7 @@ kind = "base"
 waveform = "levels"
 frequency = "143 Hz"
 levels = {levels}
+onset = "slip"
 cycles = 30
 [accuracy]
 tolerance = 1e-3
@@ -36,9 +37,12 @@ def level(drive, amplitude, stuck=False, error=0.0):
 def test_exact_bracket_jump_and_hysteresis_of_a_table():
     table = [level(3, 0.0, True), level(4, 0.0, True), level(5, 1.0), level(6, 6.0, error=0.1),
              level(5, 1.5, error=0.2), level(4, 0.4)]
-    assert bracket(table) == (1, 2)
-    assert bracket(table[2:]) == (-1, 0)
-    assert bracket(table[:2]) is None and bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)]) is None
+    slips = past_onset("slip")
+    assert bracket(table, slips) == (1, 2)
+    assert bracket(table[2:], slips) == (-1, 0)
+    assert bracket(table[:2], slips) is None
+    assert bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)], slips) is None
+    assert bracket(table, past_onset("gauge", 2.0)) == (2, 3)
     assert jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
     assert jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5  # not the widest of the table
     assert hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
@@ -65,7 +69,69 @@ def test_exact_onset_of_a_rigid_block_is_mu_n_over_m(levels):
 
 def test_exact_no_onset_where_every_level_holds():
     _, found = measured('law = "coulomb"', '["1 g", "3 g"]')
-    assert "onset_level" not in found and "jump_level" not in found
+    assert found["onset_level"].value is None and found["onset_level"].reason == "no level on the way up slips"
+    assert found["jump_level"].value is None and f"factor of {JUMP:g}" in found["jump_level"].reason
+
+
+def alone(level: str, cycles: int = 30):
+    """A run at one level [g] from rest, as a block that held until then has it."""
+    text = RIG.format(law='law = "coulomb"', levels='["1 g"]', method="").replace(
+        'waveform = "levels"\n', "").replace('levels = ["1 g"]\nonset = "slip"', f'acceleration = "{level} g"')
+    return run(plan(loads(text)), estimate=False)
+
+
+def third(window) -> float:
+    """Third over first harmonic of the acceleration in the window, by the trapezoidal rule on its uneven samples."""
+    wave = [np.trapezoid(window.acceleration * np.exp(-2j * np.pi * n * 143 * window.time), window.time)
+            for n in (1, 3)]
+    return abs(wave[1] / wave[0])
+
+
+def test_exact_onset_by_distortion_is_where_the_third_harmonic_passes_three_percent():
+    """The default. A block that slips by 1e-8 m at 4.01 g shows nothing in the acceleration; a person reads 4.2 g."""
+    text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "5 g"]', method="").replace('onset = "slip"\n', "")
+    onset = run(plan(loads(text))).measures["onset_level"]
+    assert onset.value > 1.005 * ONSET and onset.error <= 1e-3 * onset.value
+    below, above = (third(alone((onset.value + way * onset.error) / G_N).window) for way in (-1, 1))
+    assert below < 0.03 < above < 0.031
+
+
+def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
+    text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "4.8 g", "6 g"]', method="")
+    found = run(plan(loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "0.1 mil"')))).measures
+    onset = found["onset_level"]
+    below, above = (alone((onset.value + way * onset.error) / G_N).measures[NAME].value for way in (-1, 1))
+    assert below < 2.54e-6 < above < 1.03 * 2.54e-6
+    never = run(plan(loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "1 m"')))).measures
+    assert never["onset_level"].reason == "no level on the way up moves the output by more than 1 m"
+
+
+@pytest.mark.parametrize("method", ["", 'method = "march"\nsteps_per_cycle = 200'])
+def test_exact_onset_of_a_force_drive_is_mu_n(method):
+    """Levels of a force, in newtons: the held block slips where the force passes mu N."""
+    text = RIG.format(law='law = "coulomb"', levels='["20 N", "5.5 lbf", "40 N", "50 N"]', method=method).replace(
+        'kind = "base"', 'kind = "force"')
+    result = run(plan(loads(text)))
+    onset = result.measures["onset_level"]
+    assert onset.unit == "N" and abs(onset.value - 0.884 * ONSET) <= onset.error + 1e-9
+    assert [(one.drive, one.unit) for one in result.extra["levels"]] == [
+        (pytest.approx(n), "N") for n in (20, 5.5 * 4.4482216152605, 40, 50)]
+    assert loads(text).resolved().count('levels = ["20.0 N", "24.46521888393') == 1
+    assert loads(loads(text).resolved()).drive.levels == loads(text).drive.levels
+
+
+def test_refuses_levels_in_the_unit_of_the_other_drive():
+    text = RIG.format(law='law = "coulomb"', levels='["3 g"]', method="")
+    assert "drive.levels" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
+    assert "but this is a force" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
+    assert "acceleration" in mistakes(text.replace("3 g", "3 N"))[0]
+    assert "drive.onset_length" in mistakes(text.replace('"slip"', '"gauge"'))[0]
+
+
+def test_exact_nothing_jumps_in_a_response_that_is_all_but_linear():
+    """The stuck spring of an elastic-plastic interface far below its limit: the amplitude follows the drive to 2e-4."""
+    found = measured('law = "elastic-plastic"\nbond_length = "1 um"', '["1 g", "1.5 g", "2 g", "1.5 g"]')[1]
+    assert found["jump_level"].value is None and "factor of 1.5" in found["jump_level"].reason
 
 
 def test_exact_levels_by_the_march_are_those_of_the_event_engine():

@@ -160,7 +160,7 @@ def test_exact_a_recorded_scene_follows_its_file(tmp_path):
      "drive.to"),
     ('kind = "base"\nwaveform = "sweep"\nfrom = "1 Hz"\nto = "9 Hz"\nrate = "1 Hz/s"\nlog_rate = "1 oct/min"\n'
      'acceleration = "1 g"', "drive.log_rate"),
-    ('kind = "force"\nwaveform = "levels"\nlevels = ["1 g"]\nfrequency = "9 Hz"\ncycles = 3', "drive.waveform"),
+    ('kind = "force"\nwaveform = "levels"\nlevels = ["1 g"]\nfrequency = "9 Hz"\ncycles = 3', "drive.levels"),
     ('kind = "base"\nwaveform = "levels"\nfrequency = "9 Hz"\ncycles = 3', "drive.levels"),
     ('kind = "base"\nwaveform = "step"\ncycles = 3', "drive.acceleration"),
     ('kind = "force"\nwaveform = "step"\ncycles = 3', "drive.force"),

@@ -170,15 +170,14 @@ class Run:
         twin.contact = type(self.contact)(*(array.copy() for array in self.contact))
         return twin
 
-    def slip_amplitude(self, cycles: int, window: int) -> float:
-        """Half the range of the irreversible slip [m] over the last `window` of `cycles` more cycles."""
-        column, rows = 2 * self.modes.omega.size + 3, deque(maxlen=window)
+    def mark(self, cycles: int, window: int) -> Mark:
+        """The Mark of the last `window` of `cycles` more cycles."""
+        parts = deque(maxlen=window)
         for _ in range(cycles):
-            rows.append(self.cycle(self.prop.steps, 0, [])[1][:, column])
+            parts.append(self.cycle(self.prop.steps, 0, []))
             if self.outcome is not None:
                 break
-        slip = np.concatenate(rows)
-        return float(slip.max() - slip.min()) / 2
+        return _mark(self, list(parts), [_extremes(rows, self.modes, self.prop.dt) for _, rows, _ in parts])
 
     def table(self, count: int) -> tuple:
         """(table of `propagator.tables`, row of the next step in it) for `count` steps from here."""

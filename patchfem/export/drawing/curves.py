@@ -87,9 +87,10 @@ def _gaps(axis, along, value) -> None:
 def levels(rows: list):
     """Draw the amplitude after every level, in the order of the test, with arrows upwards and downwards.
 
-    rows: objects with drive [m s-2], stuck, values and errors by name, as in result.nc.
+    rows: dicts with drive [m s-2], or [N] where "unit" says so, stuck, values and errors by name, as in result.nc.
     """
-    drive = np.array([row["drive"] for row in rows]) / G
+    forced = rows[0].get("unit") == "N"
+    drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G)
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
     name, scale = axis_unit(amplitude, "m")
     error = np.array([row["errors"].get("relative_displacement_amplitude", 0.0) for row in rows]) * scale
@@ -108,7 +109,8 @@ def levels(rows: list):
         if which.any():
             axis.errorbar(drive[which], y[which], yerr=error[which], fmt="o", color=GREY, mfc=fill, ms=5, capsize=2,
                           label=text)
-    axis.set(xlabel="base acceleration [g]", ylabel=f"half peak-to-peak [{name}]", title="Level by level")
+    axis.set(xlabel="force [N]" if forced else "base acceleration [g]", ylabel=f"half peak-to-peak [{name}]",
+             title="Level by level")
     axis.set_ylim(bottom=0)
     axis.legend()
     return figure

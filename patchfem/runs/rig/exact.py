@@ -30,10 +30,10 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     rig, drive, modes = model.rig, model.rig.drive, model.rig.modes
     begin, forces = perf_counter(), forces_of(model, patch)
     if rig.levels:
-        done, levels, slips = _levels(model, numerics, patch, forces, progress, say)
+        done, levels, probe = _levels(model, numerics, patch, forces, progress, say)
     else:
         done = _go(rig, drive, forces, numerics.cycles, numerics.window, rig.start, progress, say)
-        levels, slips = (), None
+        levels, probe = (), None
         done = whole_cycles(_over_strips(done, patch) if rig.strips_slide_apart else done)
     values, stuck = _values(model, numerics, patch, drive, done)
     rubs = model.friction is not None
@@ -44,7 +44,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     ends = window_ends(done.amplitudes, done.phasors, numerics.window)
     return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
                steady_of(drive, *ends), outcome, [], done.ledger, perf_counter() - begin,
-               levels=levels, slips=slips, log=done.log, own=own)
+               levels=levels, probe=probe, log=done.log, own=own)
 
 
 def forces_of(model, patch) -> tuple:
@@ -165,7 +165,7 @@ def whole_cycles(done):
 
 
 def _levels(model, numerics, patch, forces, progress, say) -> tuple:
-    """Run of all levels one after the other: (EventRun, its Levels, slips as `levels.onset` asks)."""
+    """Run of all levels one after the other: (EventRun, its Levels, probe as `levels.onset` asks)."""
     rig = model.rig
     drive, cycles, states, parts, levels = rig.drive, rig.level_cycles, [rig.start], [], []
 
@@ -176,18 +176,24 @@ def _levels(model, numerics, patch, forces, progress, say) -> tuple:
     for k, level in enumerate(rig.levels):
         share = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
         done, sine = go(level, states[-1], share)
-        values, stuck = _values(model, numerics, patch, sine, done)
-        kept = {name: values[name] for name in rig_levels.KEPT if name in values}
-        levels.append(Level(level, stuck, kept, {name: 1e-9 * abs(value) for name, value in kept.items()}))
+        levels.append(_level(model, numerics, patch, level, sine, done))
         parts.append(done)
         states.append(Start(done.response.modal[-1], done.response.modal_rate[-1]))
         if done.outcome is not None:
             break
 
-    def slips(number, level):
-        return not _values(model, numerics, patch, *go(level, states[number + 1])[::-1])[1]
+    def probe(number, level):
+        return _level(model, numerics, patch, level, *go(level, states[number + 1])[::-1])
 
-    return joined_runs(parts, cycles * drive.period), tuple(levels), slips
+    return joined_runs(parts, cycles * drive.period), tuple(levels), probe
+
+
+def _level(model, numerics, patch, level: float, drive, done) -> Level:
+    """The Level of a run at one level [m s-2] of the drive."""
+    values, stuck = _values(model, numerics, patch, drive, done)
+    kept = {name: values[name] for name in rig_levels.KEPT if name in values}
+    read = _of_samples(done.window, model.rig.modes, drive)
+    return Level(level, stuck, kept, {name: 1e-9 * abs(value) + read.get(name, 0.0) for name, value in kept.items()})
 
 
 def joined_runs(parts, each: float):

@@ -1,10 +1,11 @@
-"""Levels: the level of the drive changed in steps with the state carried over, and the onset of slip between two."""
+"""Levels: the level of the drive changed in steps with the state carried over, and the onset between two."""
 
 from dataclasses import replace
 
 from ...core import Measure
 from ...response.errors import step_error
-from ...response.levels import KEPT, Level, bracket, hysteresis, jump
+from ...response.levels import JUMP, KEPT, Level, bracket, hysteresis, jump, no_onset, past_onset
+from ...response.rows import TABLE
 
 MOST = 40  # halvings of the bracket of an onset
 
@@ -19,12 +20,13 @@ def rows(sizes, marks, values, held: float | None) -> tuple:
 
     values(mark) -> its measures; held [m]: slip amplitude below which a level sticks, None where nothing rubs.
     """
-    out = []
-    for size, mark in zip(sizes, marks):
-        found = values(mark)
-        kept = {name: found[name] for name in KEPT if name in found}
-        out.append(Level(size, held is not None and found["slip_amplitude"] < held, kept, {}))
-    return tuple(out)
+    return tuple(row(size, values(mark), held) for size, mark in zip(sizes, marks))
+
+
+def row(size: float, found: dict, held: float | None) -> Level:
+    """The Level of a size [m s-2] from its measures; held as in `rows`."""
+    kept = {name: found[name] for name in KEPT if name in found}
+    return Level(size, held is not None and found["slip_amplitude"] < held, kept, {})
 
 
 def with_errors(fine, half, quarter, steps: int) -> tuple:
@@ -36,21 +38,23 @@ def with_errors(fine, half, quarter, steps: int) -> tuple:
                  for a, b, c in zip(fine, half, quarter))
 
 
-def onset(levels, slips, tolerance: float) -> tuple | None:
-    """Onset of slip [m s-2] and half its bracket, by halving between the last level that held and the first that slips.
+def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
+    """Onset [m s-2] and half its bracket, by halving between the last level before it and the first beyond it.
 
-    slips(number of the level that held or -1, level) -> bool runs one more level from the state that it left.
+    probe(number of the level before or -1, level) -> Level runs one more level from the state that it left; past(Level)
+    -> bool, of slip unless given, as `response.levels.past_onset` makes it.
     """
-    found = bracket(levels)
+    past = past_onset("slip") if past is None else past
+    found = bracket(levels, past)
     if found is None:
         return None
-    held, first = found
-    low, high = levels[held].drive if held >= 0 else 0.0, levels[first].drive
+    before, first = found
+    low, high = levels[before].drive if before >= 0 else 0.0, levels[first].drive
     for _ in range(MOST):
         if high - low <= tolerance * high:
             break
         middle = (low + high) / 2
-        if slips(held, middle):
+        if past(probe(before, middle)):
             high = middle
         else:
             low = middle
@@ -62,13 +66,38 @@ def drive_with(drive, number: int, level: float):
     return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
 
 
-def measures(levels, found: tuple | None) -> dict:
-    """Measures over all levels: onset_level, jump_level, level_hysteresis, as far as there are any."""
-    out = {}
-    if found is not None:
-        out["onset_level"] = Measure(found[0], "m s-2", found[1], 1e-9)
+def measures(rig, levels, probe, tolerance: float, rubs: bool) -> dict:
+    """Measures over all levels: onset_level, jump_level, level_hysteresis, with a reason where they have no value.
+
+    rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load.
+    """
+    unit, size, out = _unit(rig), _size(rig), {}
+    lowest = onset(levels, probe, tolerance, past_onset(*rig.onset)) if rubs else None
+    if lowest is not None:
+        out["onset_level"] = Measure(size * lowest[0], unit, size * lowest[1], 1e-9)
+    elif rubs:
+        out["onset_level"] = Measure(None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.onset))
     if (leap := jump(levels)) is not None:
-        out["jump_level"] = Measure(leap[0], "m s-2", float(leap[2]), float(leap[2]))  # it lies between two levels
+        width = size * float(leap[2])  # it lies between two levels
+        out["jump_level"] = Measure(size * leap[0], unit, width, width)
+    else:
+        out["jump_level"] = Measure(None, unit, None, TABLE["jump_level"].floor, reason="between no two neighbouring "
+                                    f"levels that move does the amplitude change by a factor of {JUMP:g} beyond the "
+                                    "drive's")
     if (loop := hysteresis(levels)) is not None:
         out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return out
+
+
+def shown(rig, levels) -> tuple:
+    """The levels as the results show them: of a force drive with the force [N]."""
+    return tuple(replace(level, drive=_size(rig) * level.drive, unit=_unit(rig)) for level in levels)
+
+
+def _unit(rig) -> str:
+    return "N" if rig.kind == "force" else "m s-2"
+
+
+def _size(rig) -> float:
+    """What a level of the drive [m s-2] is in the unit of the scene, over it."""
+    return rig.modes.mass if rig.kind == "force" else 1.0

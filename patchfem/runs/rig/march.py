@@ -16,7 +16,7 @@ from ...structure.drive_sizes import omega_of, peak_speed
 from . import levels as rig_levels
 from .interface import model_of
 from .solution import Solution, sampled_loop, seen
-from .strips import joined, other_measures
+from .strips import joined, mark_as_one, other_measures
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -57,25 +57,26 @@ class _Read:
             stuck = run_events.all_stick(done.window, self.held) and not self.creeps
         last = min(window, len(done.amplitudes))
         values = self.values(done, done.amplitudes[-last:], done.response.extra.get("ledger"), stuck) | rings
-        levels, slips = self._levels(done) if rig.levels else ((), None)
+        levels, probe = self._levels(done) if rig.levels else ((), None)
         outcome = done.outcome or (Outcome.STUCK if stuck else None)
         ends = window_ends(done.amplitudes, done.phasors, window)
         return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, window),
                         steady_of(rig.drive, *ends), outcome, done.snapshots, done.ledger, seconds, self.contact,
-                        prepare, done.message, levels, slips, held=self.held, own=own)
+                        prepare, done.message, levels, probe, held=self.held, own=own)
 
-    def values(self, part, extremes, ledger, stuck: bool = False) -> dict:
-        """Measures of a MarchResult or of a Mark of it; ledger (4, k) [J] or None."""
-        drive, book, known = self.model.rig.drive, part.ledger, {}
+    def values(self, part, extremes, ledger, stuck: bool = False, drive=None) -> dict:
+        """Measures of a MarchResult or of a Mark of it; ledger (4, k) [J] or None; drive: where it is another."""
+        drive, book, known = drive or self.model.rig.drive, part.ledger, {}
         if self.model.friction is None:
-            return measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps))
+            return measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps,
+                                    drive=drive))
         if stuck and self.contact.set_valued:  # what moves in round-off does not slide
             known |= {"slip_start_phase": None, "stick_fraction": 1.0}
             moving = self.model.rig.modes.mass * peak_speed(drive, self.model.rig.start)**2
             book = book | {"power": book["power"] + moving}  # its energies are round-off of such a one
         energy = book["power"] + book["peak_stored"]
         known["work_check"] = gap(book["sampled"], book["booked"], book["passed"], energy)
-        found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps,
+        found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps, drive=drive,
                                  loop=self._loop(part), ledger=ledger, known=known, jumps=self.jumps,
                                  still=self.held if self.contact.set_valued else 0.0))
         others = not self.model.rig.strips_slide_apart
@@ -93,16 +94,19 @@ class _Read:
         return sampled_loop(w, drive, work, step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j)
 
     def _levels(self, done) -> tuple:
-        """Levels of the drive, and slips as `levels.onset` asks."""
+        """Levels of the drive, and probe as `levels.onset` asks."""
         rig, numerics = self.model.rig, self.numerics
         rubs = self.model.friction is not None
         found = rig_levels.rows(rig.levels, done.marks, lambda mark: self.values(mark, mark.amplitudes, None),
                                 self.held if rubs else None)
 
-        def slips(number, level):
+        def probe(number, level):
             other = rig_levels.drive_with(rig.drive, number + 1, level)
             run = done.marks[number].after.fork(other) if number >= 0 else hub.fresh(
                 rig.modes, other, self.contact, numerics.steps, rig.travel, rig.start)
-            return run.slip_amplitude(round(rig.level_cycles), numerics.window) >= self.held
+            mark = run.mark(round(rig.level_cycles), numerics.window)
+            mark = mark_as_one(mark, self.patch) if rig.strips_slide_apart else mark
+            return rig_levels.row(level, self.values(mark, mark.amplitudes, None, drive=other),
+                                  self.held if rubs else None)
 
-        return found, slips
+        return found, probe

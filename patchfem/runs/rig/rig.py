@@ -49,8 +49,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if numerics.engine not in ("exact", "piecewise", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
-        lowest = levels.onset(raw.levels, raw.slips, model.accuracy.tolerance)
-        found, extra = found | levels.measures(raw.levels, lowest), extra | {"levels": raw.levels}
+        found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None)
+        extra |= {"levels": levels.shown(rig, raw.levels)}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
     found = with_own(found, raw.own)
     outcome, found = settle(raw, without_errors(found, estimated), model.accuracy.tolerance, drive, rig.level_cycles)

@@ -17,7 +17,7 @@ class Solution:
     values: measure -> value; response: kept histories, window: those of the last cycles; amplitudes: per window;
     steady: (steady amplitude, error) or (None, None); outcome: None where the amplitudes decide; snapshots of the
     interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
-    levels, slips: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
+    levels, probe: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
     [m] below which a cycle sticks; own: what the run itself leaves open of its
     measures; errors: by measure, where the engine has them itself; extra: for the report.
     """
@@ -35,7 +35,7 @@ class Solution:
     prepare: dict | None = None
     message: str = ""
     levels: tuple = ()
-    slips: object = None
+    probe: object = None
     log: object = None
     notes: tuple = ()
     held: float = 0.0

@@ -18,10 +18,15 @@ def joined(done, patch):
     """A MarchResult of strips as that of the patch, averaged by `as_one`."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
     window = as_one(done.window, loads, offsets)
-    marks = tuple(replace(mark, window=as_one(mark.window, loads, offsets)) for mark in done.marks)
-    marks = tuple(replace(mark, step_force=(mark.window.force[1:] + mark.window.force[:-1]) / 2) for mark in marks)
-    return replace(done, response=as_one(done.response, loads, offsets), window=window, marks=marks,
+    return replace(done, response=as_one(done.response, loads, offsets), window=window,
+                   marks=tuple(mark_as_one(mark, patch) for mark in done.marks),
                    step_force=(window.force[1:] + window.force[:-1]) / 2)
+
+
+def mark_as_one(mark, patch):
+    """A Mark of strips as that of the patch, averaged by `as_one`."""
+    window = as_one(mark.window, strip_loads(patch), patch.strips.offsets)
+    return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
 def as_one(response, loads, offsets):

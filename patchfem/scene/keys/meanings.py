@@ -168,7 +168,10 @@ MEANINGS = {
         "log_rate": "octaves per time of a logarithmic sweep",
         "acceleration": "acceleration of the base, zero to peak",
         "displacement": "displacement of the base, zero to peak, in place of an acceleration; where a release starts",
-        "levels": "accelerations of the base one after the other, the state carried over",
+        "levels": "accelerations of the base, or forces, one after the other, the state carried over",
+        "onset": "what onset_level means: 'slip' the first irreversible motion, 'distortion' a third harmonic of the "
+                 "acceleration above 3 % of the first, 'gauge' half peak-to-peak at the output above onset_length",
+        "onset_length": "half peak-to-peak at the output from which a gauge sees motion",
         "force": "force, zero to peak",
         "mass": "number of the mass on which the force acts; the output unless given",
         "cycles": "length of the run, of each level, in cycles of the drive or of the first mode that is not rigid",
@@ -221,6 +224,7 @@ CONDITIONS = {
     "drive.acceleration": "kind `base` unless displacement, levels or a file",
     "drive.displacement": "kind `free` unless [structure.start]",
     "drive.force": "kind `force` unless a file",
+    "drive.onset_length": "onset `gauge`",
     "drive.rate": "waveform `sweep` unless log_rate",
     "drive.cycles": "unless duration, a sweep or a file",
 }

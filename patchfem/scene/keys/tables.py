@@ -6,13 +6,14 @@ is the business of `scene.rules.check`, reading a file that of `scene`.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from ...effects import LAWS, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact
+from .quantities import format_si, parse
 from .types import (
     Acceleration,
     Force,
@@ -193,11 +194,21 @@ class Drive(Table):
     acceleration: quantity("acceleration", ge=0) | None = None
     displacement: quantity("length", ge=0) | None = None
     levels: Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None = None
+    onset: Literal["slip", "distortion", "gauge"] = "distortion"
+    onset_length: Length | None = None
     force: Force | None = None
     mass: whole(1) | None = None
     cycles: Positive | None = None
     duration: Seconds | None = None
     file: Text | None = None
+
+    @field_validator("levels", mode="before")
+    @classmethod
+    def _forces(cls, value: Any, info: Any) -> Any:
+        """Levels of a force drive, each a force in SI behind the unit of an acceleration."""
+        if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
+            return value
+        return [format_si(parse(one, "force"), "acceleration") for one in value]
 
 
 class Wear(Table):

@@ -31,8 +31,16 @@ def check_drive(draft: Draft) -> None:
     _size(draft, drive)
     if drive.kind in ("base", "force") and drive.waveform == "sweep":
         _sweep(draft, drive)
-    if drive.kind == "force" and drive.waveform == "levels":
-        draft.say("drive.waveform", "'levels' are accelerations of the base; use kind = \"base\"")
+    if drive.kind in ("base", "force") and drive.waveform == "levels":
+        _onset(draft, drive)
+
+
+def _onset(draft: Draft, drive: Any) -> None:
+    given = draft.given("drive.onset_length")
+    if drive.onset == "gauge" and not given:
+        draft.lacks("drive.onset_length", "onset 'gauge' needs it, such as '0.01 mil'")
+    if given and drive.onset != "gauge":
+        draft.remark(f"drive.onset_length has no meaning for onset '{drive.onset}' and is not used")
 
 
 def _sweep(draft: Draft, drive: Any) -> None:
@@ -71,7 +79,8 @@ def drive_unused(drive: Any) -> list[str]:
     without = {
         "base": ["force", "mass"],
         "force": ["acceleration", "displacement"],
-        "free": ["acceleration", "force", "frequency", "from", "to", "rate", "log_rate", "levels", "file", "waveform"],
+        "free": ["acceleration", "force", "frequency", "from", "to", "rate", "log_rate", "levels", "onset",
+                 "onset_length", "file", "waveform"],
     }
     return without.get(drive.kind, [])
 
