@@ -28,11 +28,11 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     histories.warm_up(say)
     loaded, begin = perf_counter() - begin - reduced, perf_counter()
     if rig.levels:
-        done, levels, slips = _levels(model, numerics, patch, found, frames, progress)
+        done, levels, probe = _levels(model, numerics, patch, found, frames, progress)
     else:
         done = histories.simulate(rig.modes, drive, found.groups, numerics.cycles, numerics.window, rig.travel, frames,
                                   progress, rig.start)
-        levels, slips, done = (), None, whole_cycles(done)
+        levels, probe, done = (), None, whole_cycles(done)
     values = values_of(model, numerics, patch, drive, done)
     stuck = found.holds(done)
     rings, own = run_events.rings(done.window, rig.modes, drive, done.log)
@@ -40,7 +40,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     ends = window_ends(done.amplitudes, done.phasors, numerics.window)
     return Solution(values | rings, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
                     steady_of(drive, *ends), outcome, done.snapshots, done.ledger, perf_counter() - begin,
-                    found.contact, {"reduce": reduced, "load": loaded}, levels=levels, slips=slips, log=done.log,
+                    found.contact, {"reduce": reduced, "load": loaded}, levels=levels, probe=probe, log=done.log,
                     held=found.held, own=own)
 
 
@@ -110,7 +110,7 @@ def _of_interface(one, span: float) -> dict:
 
 
 def _levels(model, numerics, patch, found, frames: int, progress) -> tuple:
-    """Run of all levels one after the other: (PieceRun, its Levels, slips as `levels.onset` asks)."""
+    """Run of all levels one after the other: (PieceRun, its Levels, probe as `levels.onset` asks)."""
     rig, drive, cycles = model.rig, model.rig.drive, model.rig.level_cycles
     states, parts, levels, last = [(rig.start, None)], [], [], len(rig.levels) - 1
 
@@ -119,19 +119,22 @@ def _levels(model, numerics, patch, found, frames: int, progress) -> tuple:
         return histories.simulate(rig.modes, sine, found.groups, cycles, numerics.window, rig.travel, frames, watch,
                                   *state), sine
 
+    def level_of(level, sine, done) -> Level:
+        values = values_of(model, numerics, patch, sine, done)
+        kept = {name: values[name] for name in rig_levels.KEPT if name in values}
+        return Level(level, found.holds(done), kept, {name: 1e-9 * abs(v) for name, v in kept.items()})
+
     for k, level in enumerate(rig.levels):
         share = None if progress is None else (lambda part, k=k: progress((k + part) / len(rig.levels)))
         done, sine = go(level, states[-1], share, frames * (k == last))
-        values = values_of(model, numerics, patch, sine, done)
-        kept = {name: values[name] for name in rig_levels.KEPT if name in values}
-        levels.append(Level(level, found.holds(done), kept, {name: 1e-9 * abs(v) for name, v in kept.items()}))
+        levels.append(level_of(level, sine, done))
         parts.append(done)
         states.append(done.end)
         if done.outcome is not None:
             break
 
-    def slips(number, level):
-        return not found.holds(go(level, states[number + 1])[0])
+    def probe(number, level):
+        return level_of(level, *go(level, states[number + 1])[::-1])
 
-    return joined_runs(parts, cycles * drive.period), tuple(levels), slips
+    return joined_runs(parts, cycles * drive.period), tuple(levels), probe
 
