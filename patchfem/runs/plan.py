@@ -91,6 +91,10 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = [*said[2], of_wear.verdict(model)]
     seconds += 1.5  # files and report
     size = int(2.5e8 + 8 * 4 * unknowns.get("interface_points", 0)**2 * 2 + 200 * min(steps, 500_000))
+    if "bond_list_about" in unknowns:
+        from ..dynamics.march.room import most_bytes
+
+        size += int(most_bytes(unknowns["bond_list_about"]))
     if model.friction is not None:
         from . import law
 

@@ -158,6 +158,9 @@ class JointsRun(Run):
         twin.joints = type(self.joints)(*(array.copy() for array in self.joints))
         return twin
 
+    def _moving(self) -> tuple:
+        return *super()._moving(), *self.joints
+
     def _steps(self, count: int, rows) -> tuple:
         table, row = self.table(count)
         return self.loop.march(row, count, self.state, self.plant, table, self.contact, self.joints, float(self.travel),

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...compiled import load
-from ...core import STICK, BaseSine, Missing, ModalBasis, Outcome, Response
+from ...core import STICK, BaseSine, ModalBasis, Outcome, Response
 from ..propagator import propagator
 from ..second_book import sampled_work
 from .models import ContactModel, load_kernels
+from .room import keep, lengthened
 
-MOST_STRIPS = 2_000_000  # of a shared list of bonds; beyond it a run is refused
+FULL = 2  # status of a loop whose list of bonds is full
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
 MOST_TURNS = 100  # of them in a cycle
@@ -195,11 +196,14 @@ class Run:
         Returns (first step, rows (steps + 1, width), friction work [J]); snapshots: list to add to.
         """
         first, before, parts = self.done, self.ledger[8], []
-        self._make_room(size)
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
+            kept = keep(self.contact, *self._moving())
             did, status = self._steps(int(piece), rows)
+            while status == FULL:
+                self.contact = lengthened(self.contact, kept, f"at step {self.done + did}", *self._moving())
+                did, status = self._steps(int(piece), rows)
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)
@@ -241,24 +245,13 @@ class Run:
         jumps = getattr(self.model, "set_valued", False)
         return sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4] if jumps else None)
 
-    def _make_room(self, steps: int) -> None:
-        """Lengthen the list of bonds where it could fill up within the next cycle, short steps taken for granted."""
-        if not hasattr(self.contact, "bondlist"):
-            return
-        have = self.contact.bondlist.shape[1]
-        want = int(self.contact.tally[1] - self.contact.tally[0]) + 4 * steps + 256
-        if want <= have or have >= MOST_STRIPS:
-            return
-        wider = np.zeros((10, min(max(want, 2 * have), MOST_STRIPS)))
-        wider[:, :have] = self.contact.bondlist
-        self.contact = self.contact._replace(bondlist=wider)
+    def _moving(self) -> tuple:
+        """The arrays that a step changes besides those of the contact."""
+        return self.state, self.ledger
 
     def _judge(self, status: int) -> None:
         if status == 1:
             self.outcome = Outcome.EXCEEDS_TRAVEL
-        if status == 2:
-            raise Missing(f"the bond list outgrew {self.contact.bondlist.shape[1]} entries at step {self.done}; loosen "
-                          "accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1")
         if status == 3:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle"

@@ -39,6 +39,8 @@ PIECE = 0.25  # longest strip in bond lengths
 # two Gauss points a strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
 GROWN = 0.5  # most growth J of one strip of growing bonds
 MOST_GROWN = 16  # strips of a step for its growth alone: after a long rest J has no bound
+SLIGHT = 1e-9  # share of the limit that a step's bonds may miss for strips that are too few: the error falls with the
+# fourth power of their number, and once they are grown nothing of it is left
 TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
 LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies is no better than the force
 
@@ -63,7 +65,8 @@ def _pieces(size, eps, more, law):
     """(strips that a step is cut into, strips of it that still count)."""
     count = max(1.0, size / (PIECE * eps))
     if law[1] == AGED:
-        count = max(count, min(more / GROWN, MOST_GROWN))
+        share = (size / law[2]) ** (1 + min(law[0], 0.0))
+        count = max(count, min(more / GROWN, MOST_GROWN, (share / SLIGHT) ** 0.25))
     count = ceil(count)
     kept = min(count, 1 + ceil(count * (law[6] / (size / eps if law[1] < SHARES else size))))
     return count, kept

@@ -6,6 +6,7 @@ from math import exp
 from numba import njit
 
 from ..flags_kernels import LEAN
+from .list_math_kernels import fexp, flog
 from .list_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
 
 GONE = 1e-8  # share of a bond length that was there when a bond formed
@@ -35,7 +36,7 @@ def merge(bonds, tally, now, law):
                     and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 and law[1] != SHARES:
                 _join_ends(bonds, last, k, now, law)
                 continue
-            grown = law[1] != AGED or _gone(bonds, k, now)
+            grown = _gone(bonds, k, now) if law[1] == AGED else law[1] != SHARES or _even(bonds, last, k, now, law)
             if narrow and grown and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
                     min(age, 200.0)), tally):
                 if last == head + many:
@@ -60,6 +61,21 @@ def merge(bonds, tally, now, law):
 def _gone(bonds, k, now):
     """Whether nothing is left of the starting lengths of a strip."""
     return exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]
+
+
+@njit(error_model="numpy", **LEAN)
+def _even(bonds, i, k, now, law):
+    """Whether the bonds of two strips together weigh alike over them, or so little that it does not matter.
+
+    Of a fractional order the weight R^p of young bonds is far from even: taken as even, it moves the share
+    joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction limit.
+    """
+    p, near, joint = law[0], (now[1] - bonds[9, k]) / law[2], (bonds[8, i] + bonds[8, k]) / law[2]
+    if p == 0.0:
+        return True
+    far = near + joint
+    part = law[4] * (fexp((p + 1) * flog(far)) - fexp((p + 1) * flog(near)))
+    return abs(p) * part * joint <= law[5] * law[5] * far
 
 
 @njit(error_model="numpy", **LEAN)

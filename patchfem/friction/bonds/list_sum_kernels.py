@@ -109,6 +109,23 @@ def spread_over(q, a, b, p):
 
 
 @njit(error_model="numpy", **LEAN)
+def sloped_over(q, a, b, w0, w1, p):
+    """Sums of w |u|^p sgn u and of w |u|^(p + 1) over places from a to b whose weight is linear between them.
+
+    w0, w1: weights at the two Gauss points, seen from b. Where u has one sign they are those of the Gauss points for
+    p = 0, so nothing jumps as the slide q reaches the strip.
+    """
+    step, total = b - a, w0 + w1
+    u, v = q - b, q - a
+    f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
+    odd, even = (g - f) / ((p + 1) * step), (g * v - f * u) / ((p + 2) * step)  # means of |u|^p sgn u, |u|^(p + 1)
+    third = (g * v * v - f * u * u) / ((p + 3) * step)  # of |u|^(p + 1) u
+    slope = 2 * (w1 - w0) / ((SECOND - FIRST) * step)
+    middle = total - slope * 0.5 * (u + v)
+    return middle * odd + slope * even, middle * even + slope * third
+
+
+@njit(error_model="numpy", **LEAN)
 def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
     """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
 
@@ -125,12 +142,11 @@ def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
         if abs(2 * q - a - b) > near * abs(b - a):
             continue
         narrow = abs(b - a) <= coarse * fexp((damage - bonds[2, k]) / 3)
-        if narrow and (p >= 1 or abs(2 * q - a - b) > abs(b - a)):
+        if narrow and p >= 1:
             continue
         less, lower = _powers(q, bonds, k, k + 1, p)
         if narrow:
-            more, higher = spread_over(q, min(a, b), max(a, b), p)
-            more, higher = more * (bonds[5, k] + bonds[6, k]), higher * (bonds[5, k] + bonds[6, k])
+            more, higher = sloped_over(q, a, b, bonds[5, k], bonds[6, k], p)
         else:
             more = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p, True, nodes)
             higher = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p + 1, False, nodes[8:])

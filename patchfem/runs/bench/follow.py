@@ -2,17 +2,14 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil
 
 import numpy as np
 
-from ...core import Missing
-from ...dynamics.march.march import GOAL, MOST_STRIPS
+from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
+from ...dynamics.march.room import keep, lengthened
 from .ledger import frame_numbers, ledger_of
 from .watch import BLOCK, Watch
-
-AGED_PIECES = 17  # strips that a step of growing bonds may add besides those of its length
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,12 +51,17 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
     forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
     states, missed, told = [], 0, 0
     for a, b in pairwise(edges):
-        contact = _with_room(contact, model, slide[a:b + 1])
-        missed += hub.follow_path(slide[a:b + 1].copy(), float(time[b] - time[a]) / float(b - a), model.kind, contact,
-                                  work, GOAL * model.limit, energies[a:b + 1], forces[a:b + 1])
-        if missed and hasattr(contact, "bondlist"):
-            raise Missing(f"the bond list outgrew {contact.bondlist.shape[1]} entries before sample {b} of the bench; "
-                          "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1", "")
+        kept = keep(contact)
+
+        def slid(contact, a=a, b=b):
+            return hub.follow_path(slide[a:b + 1].copy(), float(time[b] - time[a]) / float(b - a), model.kind, contact,
+                                   work, GOAL * model.limit, energies[a:b + 1], forces[a:b + 1])
+
+        failed = slid(contact)
+        while failed and kept is not None:  # a list of bonds misses nothing but room
+            contact = lengthened(contact, kept, f"before sample {b} of the bench")
+            failed = slid(contact)
+        missed += failed
         if b in at:
             states.append((slide[b], next(iter(model.shown(contact).values()), None)))
         if b == last or b - told >= BLOCK:
@@ -67,21 +69,6 @@ def follow(model, time, slide, frames: int, watch: Watch, paced: bool = False) -
             told = b
     return Followed(slide, forces[:, 0], forces[:, 1], energies[:, 1], forces[:, 2], energies[:-1, 0], at, states,
                     missed)
-
-
-def _with_room(contact, model, slide):
-    """The contact with a list of bonds that holds what the samples slide (k,) [m] may add."""
-    if not hasattr(contact, "bondlist"):
-        return contact
-    have = contact.bondlist.shape[1]
-    least = max(min(contact.growth[3], contact.growth[4]), 1e-3 * contact.growth[3])
-    each = np.minimum(np.ceil(4 * np.abs(np.diff(slide)) / least), 4 * ceil(min(contact.law[6] / least, 1e6)) + 1)
-    want = int(contact.tally[1] - contact.tally[0] + (each + AGED_PIECES).sum()) + 256
-    if want <= have or have >= MOST_STRIPS:
-        return contact
-    wider = np.zeros((contact.bondlist.shape[0], min(max(want, 2 * have), MOST_STRIPS)))
-    wider[:, :have] = contact.bondlist
-    return contact._replace(bondlist=wider)
 
 
 def _new_pace(time) -> np.ndarray:

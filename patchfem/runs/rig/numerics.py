@@ -14,6 +14,7 @@ from ..effort import steps_per_cycle
 from .engines import COMPARED, engine_of
 
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
+DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
 
@@ -68,12 +69,15 @@ def unique_steps(model: Model) -> int:
 def quadrature_of(model: Model, numerics: Numerics):
     """How the bonds of a nonlocal law are summed, as a Choice of `friction.bonds.engines`.
 
-    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives.
+    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives. That of a motion
+    which is released shrinks, and a list of all its bonds would outgrow any room: it is taken as DECAYED times that of
+    its start.
     """
     from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy
-    stroke = max(4 * model.speed / omega_of(model.rig.drive) / law.length, 1e-9)
+    left = DECAYED if model.rig.kind == "free" else 1.0
+    stroke = max(4 * left * model.speed / omega_of(model.rig.drive) / law.length, 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return engine_for(law, accuracy.tolerance, stroke, numerics.steps / 2, accuracy.quadrature, tail, accuracy.merge)
 

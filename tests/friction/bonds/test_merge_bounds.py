@@ -1,0 +1,73 @@
+"""The stated error of merging, `engines.Choice.error`, against the list of every bond: forces and step means of any
+path and law, growing bonds and small strokes among them."""
+
+import numpy as np
+import pytest
+from friction_paths import random_walk
+from list_paths import follow_list
+
+from patchfem.friction.bonds.engines import choose
+from patchfem.friction.bonds.parameters import Bonds
+
+GROWN = {"ratio": 0.54, "rest_growth": 0.145, "slip_growth": 7.64, "rest_speed": 4.55e-4}
+
+
+def share(law, path, steps, tolerance):
+    """Largest error of merging over the stated one, and the strips kept of those there are."""
+    moves = np.diff(path)
+    way = np.sign(moves[moves != 0])
+    strokes, dt = 1 + np.count_nonzero(way[1:] != way[:-1]), 2 * np.pi / steps
+    chosen = choose(law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), "merged")
+    whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)
+    moved = np.abs(moves) > 1e-9 * np.abs(moves).max()
+    off = max(np.abs(got.after - whole.after).max(), np.abs(got.mean - whole.mean)[moved].max())
+    return off / chosen.error, got.tally[10] / whole.tally[10]
+
+
+def test_always_step_means_of_merged_bonds_keep_the_bound_where_forces_jump():
+    """Bonds of order 0, their stored energy continuous as the slide comes to a merged strip: with a strip taken as even
+    from there on it jumped, and means over short steps were 2.2 times the bound off."""
+    turn = np.arange(6 * 400 + 1) / 400 * 2 * np.pi
+    path = 0.192 * np.clip(1.3 * np.sin(turn), -1, 1)
+    off, kept = share(Bonds(1.0, 1.0, 0.0, initial=0.0, **GROWN), path, 400, 4e-3)
+    assert off < 1 and kept < 0.2
+
+
+@pytest.mark.parametrize("order", [-0.5, -0.8, 0.3])
+def test_always_young_bonds_of_fractional_order_are_not_spread_evenly(order):
+    """A decay far below the merge width: R^p is steep in young bonds, and strokes taken as even were 6 times the bound
+    off."""
+    turn = np.arange(6 * 400 + 1) / 400 * 2 * np.pi
+    path = 0.00536 * (np.exp(-turn / 6) * np.sin(turn + 1) - np.sin(1))
+    assert share(Bonds(1.0, 1.0, order, "report", initial=0.0), path, 400, 2.9e-3)[0] < 1
+
+
+ORDERS = {"report": [-0.9, -0.5, 0, 0.3, 0.5, 1, 1.5, 2, 3.3], "stretch": [0, 0.3, 0.5, 2, 3.3]}
+
+
+def drawn(rng):
+    """(law, path, steps per cycle) by chance."""
+    reading, steps, size = str(rng.choice([*ORDERS])), int(rng.choice([30, 100, 400])), 10 ** rng.uniform(-2.5, 0.7)
+    order, turn = float(rng.choice(ORDERS[reading])), np.arange(min(8 * steps, 1500) + 1) / steps * 2 * np.pi
+    path = size * (
+        np.sin(turn), np.sin(turn) + 0.3 * np.sin(8.1 * turn), np.clip(1.3 * np.sin(turn), -1, 1),
+        np.exp(-turn / 6) * np.sin(turn + 1) - np.sin(1),
+        random_walk(int(rng.integers(1e6)), turn.size - 1, 1 / np.sqrt(steps)))[rng.integers(5)]
+    grown = {} if rng.random() < 0.4 else {
+        "ratio": rng.uniform(0.2, 1), "rest_growth": size * 10 ** rng.uniform(-3, 2),
+        "slip_growth": 10 ** rng.uniform(-2.5, 1), "rest_speed": size * 10 ** rng.uniform(-4, -1)}
+    return Bonds(1.0, 1.0, order, reading, initial=float(order >= 0 and rng.random() < 0.5), **grown), path, steps
+
+
+def worst_of(seed, count):
+    rng = np.random.default_rng(seed)
+    return max(share(*drawn(rng), 10 ** rng.uniform(-4, -2))[0] for _ in range(count))
+
+
+def test_always_merging_keeps_its_bound_on_15_random_paths():
+    assert worst_of(4, 15) < 1
+
+
+@pytest.mark.slow
+def test_always_merging_keeps_its_bound_on_300_random_paths():
+    assert worst_of(5, 300) < 1
