@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.response.errors import step_error, with_errors
+from patchfem.response.errors import SURE, step_error, with_errors
 from patchfem.response.measures import steady_amplitude
 from patchfem.response.rows import TABLE, of_first, row_of
 
@@ -14,11 +14,11 @@ def test_exact_a_number_behind_a_name_changes_no_row(name):
         assert of_first(full) == name and row_of(full) is TABLE[name]
 
 
-def test_exact_errors_of_further_interfaces_know_the_step():
+def test_exact_further_interfaces_have_errors_by_the_same_rule():
     fine, half, quarter = ({"stick_fraction_2": v, "slip_amplitude_2": 2 * v} for v in (0.5, 0.502, 0.51))
     found = with_errors(fine, step_error(fine, half, quarter, 400))
-    assert found["stick_fraction_2"].error == pytest.approx(0.004 + 0.25 / 400)
-    assert found["slip_amplitude_2"].error == pytest.approx(0.008) and found["slip_amplitude_2"].unit == "m"
+    assert found["stick_fraction_2"].error == pytest.approx(SURE * 0.002 / 3)
+    assert found["slip_amplitude_2"].error == pytest.approx(SURE * 0.004 / 3) and found["slip_amplitude_2"].unit == "m"
 
 
 def test_exact_a_motion_that_stands_still_has_its_own_amplitude():

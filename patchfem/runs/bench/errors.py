@@ -39,8 +39,12 @@ def ladder_of(model, meshed: bool, fine, steps: int) -> list:
     for a merged list of bonds narrower strips."""
     choice = fine.engine.choice
     half, few = Variant(max(4, steps // 8 * 4), False, choice), Variant(max(4, steps // 16 * 4), False, choice)
-    counted = min(steps, 399) if model.load_varies else steps  # first order: twice the change, as of few steps
-    out = [Rung((half, few), lambda *values: step_error(*values, counted))]
+    times = 2.0 if model.load_varies else 1.0  # first order
+
+    def rule(*values) -> dict:
+        return {name: times * error for name, error in step_error(*values, steps).items()}
+
+    out = [Rung((half, few), rule)]
     if meshed:
         out.append(space_rung(few._replace(rough=True), few))
     if fine.engine.kind == LIST and choice.merge > 0:

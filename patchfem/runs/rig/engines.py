@@ -17,6 +17,8 @@ from ...scene.rules import methods
 from ..effort import too_long
 from .pieces.costs import seconds_of_pieces, seconds_of_steps
 
+FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
+
 
 class Variant(NamedTuple):
     """A coarser run of a rig: its Numerics and the Patch that it takes, None under [normal]."""
@@ -150,7 +152,8 @@ def _march_in_time(model: Model, numerics, patch) -> list:
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the march in space: the mesh and the number of shear modes, both at a quarter of the steps."""
+    """Rungs of the march in space: the mesh, the number of shear modes and the width up to which bonds are merged, all
+    at a quarter of the steps."""
     few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
     quarter = Variant(few, patch)
     if coarse is not None and (varies or model.soft):
@@ -158,7 +161,16 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if shape is not None and (varies or (coarse is not None and has(model.friction.law, "bonds"))):
         out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter))
-    return out
+    return [*out, *_merging(few, patch, solution.summed)]
+
+
+def _merging(few, patch, summed) -> list:
+    """The rung of a list of bonds that merges them: half the width, as in a bench; summed: Choice or None."""
+    if summed is None or not summed.merge:
+        return []
+    same, narrow = (Variant(replace(few, choice=replace(summed, merge=share * summed.merge)), patch)
+                    for share in (1.0, FINER))
+    return [Rung((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in change(wide, fine).items()}, same)]
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:

@@ -66,15 +66,19 @@ def drive_with(drive, number: int, level: float):
     return replace(drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level)))
 
 
-def measures(rig, levels, probe, tolerance: float, rubs: bool) -> dict:
+def measures(rig, levels, probe, tolerance: float, rubs: bool, halved=None) -> dict:
     """Measures over all levels: onset_level, jump_level, level_hysteresis, with a reason where they have no value.
 
-    rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load.
+    rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load; halved: the
+    Solution at half the steps, None where nothing hangs on steps.
     """
     unit, size, out = _unit(rig), _size(rig), {}
-    lowest = onset(levels, probe, tolerance, past_onset(*rig.onset)) if rubs else None
+    past = past_onset(*rig.onset)
+    lowest = onset(levels, probe, tolerance, past) if rubs else None
     if lowest is not None:
-        out["onset_level"] = Measure(size * lowest[0], unit, size * lowest[1], 1e-9)
+        other = onset(halved.levels, halved.probe, tolerance, past) if halved is not None else lowest
+        apart = abs(lowest[0] - other[0]) if other is not None else lowest[0]
+        out["onset_level"] = Measure(size * lowest[0], unit, size * (lowest[1] + apart), 1e-9)
     elif rubs:
         out["onset_level"] = Measure(None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.onset))
     if (leap := jump(levels)) is not None:

@@ -15,6 +15,7 @@ from ...response.rows import measures_of
 from ...structure.drive_sizes import omega_of, peak_speed
 from . import levels as rig_levels
 from .interface import model_of
+from .numerics import quadrature_of
 from .solution import Solution, sampled_loop, seen
 from .strips import joined, mark_as_one, other_measures
 
@@ -62,7 +63,12 @@ class _Read:
         ends = window_ends(done.amplitudes, done.phasors, window)
         return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, window),
                         steady_of(rig.drive, *ends), outcome, done.snapshots, done.ledger, seconds, self.contact,
-                        prepare, done.message, levels, probe, held=self.held, own=own)
+                        prepare, done.message, levels, probe, held=self.held, own=own, summed=self.summed())
+
+    def summed(self):
+        """How the bonds are summed, a Choice; None of a law that is no sum."""
+        f = self.model.friction
+        return quadrature_of(self.model, self.numerics) if f is not None and has(f.law, "bonds") else None
 
     def values(self, part, extremes, ledger, stuck: bool = False, drive=None) -> dict:
         """Measures of a MarchResult or of a Mark of it; ledger (4, k) [J] or None; drive: where it is another."""

@@ -20,7 +20,8 @@ LEAST_KEPT = 100  # samples of a run that has no cycles
 
 @dataclass(frozen=True, slots=True)
 class Numerics:
-    """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance."""
+    """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
+    how bonds are summed, None: by the tolerance and the steps."""
 
     engine: str
     steps: int
@@ -29,6 +30,7 @@ class Numerics:
     shear_modes: int | None
     per_point: bool
     pinned: frozenset
+    choice: object = None
 
 
 def choose(model: Model, per_point: bool = False) -> Numerics:
@@ -46,11 +48,25 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
         steps = max(steps, unique_steps(model))
     if not sinusoidal(drive) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / rig.cycles)))
+    if accuracy.steps_per_cycle is None and engine == "march":
+        steps = ending(steps, rig.cycles)
     pinned = {k for k in ("steps_per_cycle", "tail", "merge", "shear_modes") if getattr(accuracy, k) is not None}
     if engine in COMPARED:
         steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Numerics(engine, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
                     frozenset(pinned))
+
+
+def ending(steps: int, cycles: float) -> int:
+    """Steps per cycle, at least `steps` and four times a whole number, as a half and a quarter of them show the order.
+
+    A run ends at a sample, and the last of `cycles` need not be whole. An end off by half a step is an error of first
+    order in all that is read off the last cycles. So that number ends as near as an eighth more steps allows.
+    """
+    least = ceil(steps / 4)
+    if cycles == round(cycles):
+        return 4 * least
+    return 4 * min(range(least, least + max(8, least // 8)), key=lambda k: abs(cycles * k - round(cycles * k)))
 
 
 def unique_steps(model: Model) -> int:
@@ -73,6 +89,8 @@ def quadrature_of(model: Model, numerics: Numerics):
     which is released shrinks, and a list of all its bonds would outgrow any room: it is taken as DECAYED times that of
     its start.
     """
+    if numerics.choice is not None:
+        return numerics.choice
     from ...friction.bonds.engines import choose as engine_for
 
     law, accuracy = model.bonds, model.accuracy

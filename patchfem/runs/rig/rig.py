@@ -49,7 +49,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if numerics.engine not in ("exact", "piecewise", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
-        found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None)
+        found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None, raw.halved)
         extra |= {"levels": levels.shown(rig, raw.levels)}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
     found = with_own(found, raw.own)
@@ -138,7 +138,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         measures = with_errors(found.values, *time, *space, least=engine.least)
         if found.levels and time:
             rung = engine.in_time(model, numerics, patch)[0]
-            found = replace(found, levels=_level_errors(found, rung, made, numerics))
+            found = replace(found, levels=_level_errors(found, rung, made, numerics), halved=made[rung.runs[0]])
         if _enough(model, numerics, found, measures) or not time:
             if spent:
                 seconds["error"] = spent

@@ -19,7 +19,8 @@ class Solution:
     interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
     levels, probe: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
     [m] below which a cycle sticks; own: what the run itself leaves open of its
-    measures; errors: by measure, where the engine has them itself; extra: for the report.
+    measures; errors: by measure, where the engine has them itself; summed: how bonds are, a Choice, None without a sum;
+    halved: the run of levels at half the steps; extra: for the report.
     """
 
     values: dict
@@ -41,6 +42,8 @@ class Solution:
     held: float = 0.0
     own: dict | None = None
     errors: dict | None = None
+    summed: object = None
+    halved: object = None
     extra: dict = field(default_factory=dict)
 
 

@@ -1,0 +1,242 @@
+"""Laws of friction as differential equations between events, for the independent integrator `motion_reference`.
+
+A law holds the numbers of one contact; its state s (k,) and its mode: +-1 the sign of the slide rate, 0 where a contact
+holds (Coulomb) or stretches (elastic-plastic). Nothing here comes from the package.
+"""
+
+import numpy as np
+
+
+class Law:
+    """force(s, v, t), rate(s, v, t): of the state; split(s, v, t): rate of the irreversible part; energy(s), None where
+    it has none; guards(s, v, t): values whose fall through zero ends a stretch; turned: what an event does."""
+
+    size, set_valued, split_by_mode = 1, False, False
+
+    def __init__(self, limit: float, **keys):
+        self.limit, self.mode, self.keys = limit, 1, keys
+        self.side = 1  # of a second border, where a law has one
+
+    def begin(self, v: float, accel: float) -> None:
+        self.mode = 1 if (v if v != 0 else accel) >= 0 else -1
+
+    def guards(self, s, v, t) -> list:
+        return [self.mode * v]
+
+    def turned(self, k: int, s, v, accel: float):
+        self.mode = -self.mode if accel * self.mode <= 0 else self.mode
+        return s
+
+    def scale(self) -> float:
+        """Size of the state, and of the slide that turns it over."""
+        return self.keys.get("bond_length", 1.0) if "stiffness" not in self.keys else \
+            self.limit / self.keys["stiffness"]
+
+    def energy(self, s):
+        return None
+
+
+class Tanh(Law):
+    size = 0
+
+    def force(self, s, v, t):
+        return self.limit * np.tanh(v / self.keys["reference_speed"])
+
+    def rate(self, s, v, t):
+        return np.zeros(0)
+
+    def split(self, s, v, t):
+        return v
+
+
+class Plastic(Law):
+    """F' = mu N v/eps, |F| <= mu N: mode 0 stretches, +-1 slips."""
+
+    split_by_mode = True
+
+    def begin(self, v, accel):
+        self.mode = 0
+
+    def force(self, s, v, t):
+        return self.limit * s[0] / self.keys["bond_length"]
+
+    def rate(self, s, v, t):
+        return np.array([v if self.mode == 0 else 0.0])
+
+    def split(self, s, v, t):
+        return 0.0 if self.mode == 0 else v
+
+    def guards(self, s, v, t):
+        eps = self.keys["bond_length"]
+        return [eps - s[0], eps + s[0]] if self.mode == 0 else [self.mode * v]
+
+    def turned(self, k, s, v, accel):
+        if self.mode:
+            self.mode = 0
+            return s
+        self.mode = 1 - 2 * k
+        return np.array([self.mode * self.keys["bond_length"]])
+
+    def energy(self, s):
+        return 0.5 * self.limit * s[0]**2 / self.keys["bond_length"]
+
+
+class Stretch(Law):
+    """z' = v - |v| z/eps, F = mu N z/eps_0; with growth eps follows 2.10 with |v| floored in a_s/|v|."""
+
+    def __init__(self, limit, **keys):
+        super().__init__(limit, **keys)
+        self.grows = "rest_growth" in keys
+        self.size = 2 if self.grows else 1
+
+    def start(self):
+        return np.array([0.0, self.keys["bond_length"]])[:self.size]
+
+    def force(self, s, v, t):
+        return self.limit * s[0] / self.keys["bond_length"]
+
+    def rate(self, s, v, t):
+        first, k, speed = self.keys["bond_length"], self.keys, self.mode * v
+        if not self.grows:
+            return np.array([v - speed * s[0] / first])
+        last = first * k["kinetic"] / k["static"]
+        ages = k["rest_growth"] / (speed if self.side > 0 else k["rest_speed"])
+        return np.array([v - speed * s[0] / s[1], ages * (first - s[1]) + speed * (last - s[1]) / k["slip_growth"]])
+
+    def split(self, s, v, t):
+        return self.mode * v * s[0] / (s[1] if self.grows else self.keys["bond_length"])
+
+    def begin(self, v, accel):
+        super().begin(v, accel)
+        self.side = 1 if self.grows and abs(v) > self.keys["rest_speed"] else -1
+
+    def guards(self, s, v, t):
+        rest = [self.side * (self.mode * v - self.keys["rest_speed"])] if self.grows else []
+        return [self.mode * v, *rest]
+
+    def turned(self, k, s, v, accel):
+        if k:
+            self.side = -self.side
+            return s
+        return super().turned(k, s, v, accel)
+
+
+class BoucWen(Law):
+    """z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)), F = mu N z."""
+
+    def force(self, s, v, t):
+        return self.limit * s[0]
+
+    def rate(self, s, v, t):
+        n, share, eps = self.keys["exponent"], self.keys["shape"], self.limit / self.keys["stiffness"]
+        way = self.mode * self.side
+        return np.array([v / eps * (1 - abs(s[0])**n * (share * way + 1 - share))])
+
+    def split(self, s, v, t):
+        return v - self.limit / self.keys["stiffness"] * self.rate(s, v, t)[0]
+
+    def guards(self, s, v, t):
+        return [self.mode * v, self.side * s[0]]
+
+    def begin(self, v, accel):
+        super().begin(v, accel)
+        self.side = self.mode
+
+    def turned(self, k, s, v, accel):
+        if k:
+            self.side = -self.side
+            return s
+        return super().turned(k, s, v, accel)
+
+
+class LuGre(Law):
+    """z' = v - k |v| z/g, F = k z + s_1 z' + s_2 v."""
+
+    def rate(self, s, v, t):
+        k = self.keys
+        g = self.limit * (k["kinetic"] + (k["static"] - k["kinetic"]) * np.exp(-(v / k["stribeck_speed"])**2)) \
+            / k["static"]
+        return np.array([v - k["stiffness"] * self.mode * v * s[0] / g])
+
+    def force(self, s, v, t):
+        k = self.keys
+        return k["stiffness"] * s[0] + k["micro_damping"] * self.rate(s, v, t)[0] + k["viscous"] * v
+
+    def split(self, s, v, t):
+        return v - self.rate(s, v, t)[0]
+
+
+class Iwan(Law):
+    """Segalman's sliders by the rules of Masing: the state is the slide; turns of the path are kept on a stack."""
+
+    def __init__(self, limit, **keys):
+        super().__init__(limit, **keys)
+        chi, beta, k = keys["chi"], keys["beta"], keys["stiffness"]
+        self.top = limit * (1 + beta) / (k * (beta + (chi + 1) / (chi + 2)))
+        self.density = k * (chi + 1) / (1 + beta) / self.top**(chi + 1)
+        self.last = k * beta / (1 + beta)
+        self.turns = [(0.0, 0.0)]  # (slide, force), the first the virgin state
+
+    def loading(self, u: float) -> float:
+        """Force of a first loading to u >= 0."""
+        chi, u = self.keys["chi"], min(u, self.top)
+        inside = u**(chi + 2) / (chi + 2) + u * (self.top**(chi + 1) - u**(chi + 1)) / (chi + 1)
+        return self.density * inside + self.last * u
+
+    def tangent(self, u: float) -> float:
+        chi, u = self.keys["chi"], min(u, self.top)
+        return self.density * (self.top**(chi + 1) - u**(chi + 1)) / (chi + 1) + self.last * (u < self.top)
+
+    def force(self, s, v, t):
+        at, force = self.turns[-1]
+        if len(self.turns) == 1:
+            return np.sign(s[0]) * self.loading(abs(s[0]))
+        return force + np.sign(s[0] - at) * 2 * self.loading(abs(s[0] - at) / 2)
+
+    def rate(self, s, v, t):
+        return np.array([v])
+
+    def split(self, s, v, t):
+        at = self.turns[-1][0]
+        way = abs(s[0]) if len(self.turns) == 1 else abs(s[0] - at) / 2
+        return v * (1 - self.tangent(way) / self.keys["stiffness"])
+
+    def guards(self, s, v, t):
+        out = [self.mode * v]
+        if len(self.turns) > 2:  # a minor loop closes where the turn before is reached
+            out.append(self.mode * (self.turns[-2][0] - s[0]))
+        elif len(self.turns) == 2:  # back on the first loading at the other end of the first stroke
+            out.append(self.mode * (-self.turns[1][0] - s[0]))
+        return out
+
+    def turned(self, k, s, v, accel):
+        if k == 0:
+            if accel * self.mode <= 0:
+                self.turns.append((float(s[0]), float(self.force(s, v, 0.0))))
+                self.mode = -self.mode
+            return s
+        self.turns = self.turns[:-2] if len(self.turns) > 2 else self.turns[:1]
+        return s
+
+
+class Coulomb(Law):
+    """|F| <= static while it holds, kinetic against the slide while it slides."""
+
+    size, set_valued, split_by_mode = 0, True, True
+
+    def __init__(self, limit, **keys):
+        super().__init__(limit, **keys)
+        self.kinetic, self.mode = limit * keys.get("kinetic", keys["static"]) / keys["static"], 0
+
+    def begin(self, v, accel):
+        self.mode = int(np.sign(v))
+
+    def rate(self, s, v, t):
+        return np.zeros(0)
+
+    def split(self, s, v, t):
+        return v if self.mode else 0.0
+
+
+LAWS = {"coulomb": Coulomb, "weakening": Coulomb, "convolution": Coulomb, "elastic-plastic": Plastic, "iwan": Iwan,
+        "tanh": Tanh, "bouc-wen": BoucWen, "lugre": LuGre, "stretch": Stretch, "growing": Stretch}

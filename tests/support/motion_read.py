@@ -1,0 +1,162 @@
+"""Measures of a motion of `motion_reference`, each by its definition."""
+
+from itertools import pairwise
+
+import numpy as np
+from motion_reference import Motion
+from scipy.optimize import minimize_scalar
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+
+
+class Window:
+    """The last cycles of a motion: Gauss nodes t, weights w, and the sides of every step, with what is read there."""
+
+    def __init__(self, motion: Motion, stretches, begin: float, end: float, cycles: int):
+        self.motion, self.begin, self.end = motion, begin, end
+        borders = np.linspace(begin, end, cycles + 1)
+        columns = {name: [] for name in ("t", "w", "y", "f", "split", "a", "kind")}
+        self.modes, self.parts = [], []
+        for one in stretches:
+            if one.times[-1] <= begin or one.times[-1] <= one.times[0]:
+                continue
+            self.restore(one)
+            inside = borders[(borders > one.times[0]) & (borders < one.times[-1])]
+            cuts = np.unique(np.concatenate([np.clip(one.times, begin, end), inside]))
+            for low, high in pairwise(cuts):
+                t = (low + high) / 2 + (high - low) / 2 * np.concatenate([[-1.0], NODES, [1.0]])
+                w = (high - low) / 2 * np.concatenate([[0.0], WEIGHTS, [0.0]])
+                self._take(columns, one, t, w)
+        self.t, self.w, self.y = (np.concatenate(columns[name]) for name in ("t", "w", "y"))
+        self.f, self.split, self.a = (np.concatenate(columns[name]) for name in ("f", "split", "a"))
+        self.stuck = np.concatenate(columns["kind"])
+        n, faces = motion.n, motion.plant.faces
+        self.q, self.v = self.y[:, :n] @ faces.T, self.y[:, n:2 * n] @ faces.T
+        self.out = self.y[:, :n] @ motion.plant.output
+
+    def restore(self, one) -> None:
+        """Put the laws into the modes of a stretch."""
+        for k, law in enumerate(self.motion.laws):
+            law.mode, law.side = one.modes[k]
+            if one.turns:
+                law.turns = one.turns[k]
+
+    def _take(self, columns, one, t, w) -> None:
+        m, Y = self.motion, one.solution(t).T
+        self.parts.append((one, t))
+        rates = Y[:, m.n:2 * m.n] @ m.plant.faces.T
+        columns["t"].append(t)
+        columns["w"].append(w)
+        columns["y"].append(Y)
+        columns["f"].append(np.array([m.forces(a, y) for a, y in zip(t, Y)]))
+        columns["a"].append(np.array([self.acceleration(a, y) for a, y in zip(t, Y)]))
+        columns["split"].append(np.array([[law.split(y[part], v, a) for law, part, v in zip(m.laws, m.parts, row)]
+                                          for a, y, row in zip(t, Y, rates)]))
+        columns["kind"].append(np.tile([law.mode == 0 for law in m.laws], (t.size, 1)))
+
+    def acceleration(self, t, y) -> float:
+        m = self.motion
+        own = m.plant.output @ m.slope(t, y)[m.n:2 * m.n]
+        return own + m.drive(t) if m.moving else own
+
+    def top(self, values, of) -> float:
+        """Largest value over the window: that of the nodes, refined in the step where it lies; of(t, y) -> value."""
+        k = int(np.argmax(values))
+        one, t = self.parts[k // (NODES.size + 2)]
+        inside = k % (NODES.size + 2)
+        low, high = t[max(inside - 1, 0)], t[min(inside + 1, t.size - 1)]
+        self.restore(one)
+        found = minimize_scalar(lambda x: -of(x, one.solution(x)), bounds=(low, high), method="bounded",
+                                options={"xatol": 1e-9 * (high - low)})
+        return max(float(values[k]), float(-found.fun))
+
+
+def measures(motion: Motion, stretches, period: float, cycles: float, window: int) -> dict:
+    """Measures by name over the last `window` cycles of a motion; those of a second interface have _2 behind."""
+    s, p, end = motion.s, motion.plant, period * cycles
+    w = Window(motion, stretches, end - window * period, end, window)
+    n, out = motion.n, {}
+    high = w.top(w.out, lambda t, y: p.output @ y[:n])
+    low = w.top(-w.out, lambda t, y: -p.output @ y[:n])
+    out["relative_displacement_amplitude"] = (high + low) / 2
+    out["absolute_acceleration_peak"] = w.top(np.abs(w.a), lambda t, y: abs(w.acceleration(t, y)))
+    sine = s["drive"] in ("sine", "force", "levels")
+    for k, law in enumerate(motion.laws):
+        tail = f"_{k + 1}" if k else ""
+        part = motion.parts[k]
+        out[f"friction_force_peak{tail}"] = w.top(np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k]))
+        slip = _slips(w, law, part, k)
+        out[f"slip_amplitude{tail}"] = (slip.max() - slip.min()) / 2
+        out[f"loop_area{tail}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
+        out[f"stick_fraction{tail}"], starts = _stuck(w, law, k)
+        if k == 0 and sine and starts.size:
+            out["slip_start_phase"] = float(np.angle(np.mean(np.exp(2j * 2 * np.pi / period * starts))) / 2 % np.pi)
+    if window > 1:
+        means = [np.sum((w.w * w.q[:, 0])[(w.t > a) & (w.t < a + period)]) / period
+                 for a in (end - window * period, end - period)]
+        out["drift_per_cycle"] = (means[1] - means[0]) / (window - 1)
+    else:
+        out["drift_per_cycle"] = w.q[-1, 0] - w.q[0, 0]
+    if len(motion.laws) == 1:
+        out["friction_work"] = float(w.y[-1, -1])
+        stored = motion.laws[0].energy(w.y[-1, motion.parts[0]])
+        if motion.laws[0].set_valued or s["law"] == "tanh":
+            stored = 0.0
+        if stored is not None:
+            out["energy_dissipated"] = out["friction_work"] - stored
+    if sine:
+        out |= _periodic(w, motion, period, window)
+    return out
+
+
+def _slips(w: Window, law, part, k: int):
+    """Irreversible part of the slide at all nodes."""
+    q = w.q[:, k]
+    if law.size == 0:
+        return q
+    state = w.y[:, part][:, 0]
+    name = w.motion.s["law"]
+    if name == "iwan":
+        return q - w.f[:, k] / law.keys["stiffness"]
+    return q - state * (law.limit / law.keys["stiffness"] if name == "bouc-wen" else 1.0)
+
+
+def _stuck(w: Window, law, k: int) -> tuple:
+    """(share of the time, starts of slip (j,) [s]): the contact holds while less than half of its slide is
+    irreversible."""
+    if law.split_by_mode:
+        stuck = w.stuck[:, k]
+        share = float(np.sum(w.w * stuck)) / (w.end - w.begin)
+        return share, w.t[1:][stuck[:-1] & ~stuck[1:]]
+    if law.size == 0:
+        return 0.0, np.empty(0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        above = np.where(w.v[:, k] == 0, -0.5, np.abs(w.split[:, k] / w.v[:, k]) - 0.5)
+    step, before, after = np.diff(w.t), above[:-1], above[1:]
+    down, up = np.minimum(before, after), np.maximum(before, after)
+    below = np.where(up < 0, 1.0, np.where(down >= 0, 0.0, -down / np.where(up > down, up - down, 1.0)))
+    rises = (before < 0) & (after >= 0)
+    starts = w.t[:-1][rises] - before[rises] / (after - before)[rises] * step[rises]
+    return float(below @ step) / (w.end - w.begin), starts
+
+
+def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
+    """Stiffness and damping of the first interface, and the distortion of the acceleration."""
+    omega, q, f = 2 * np.pi / period, w.q[:, 0], w.f[:, 0]
+
+    def part(values, order=1):
+        return 2 * np.sum(w.w * values * np.exp(-1j * order * omega * w.t)) / (w.end - w.begin)
+
+    out = {"acceleration_distortion": float(abs(part(w.a, 3)) / abs(part(w.a)))}
+    first = part(q)
+    if np.ptp(q) == 0:
+        return out
+    out["equivalent_stiffness"] = float((part(f) / first).real)
+    if motion.plant.first > 0:
+        each = []
+        for c in range(window):
+            mine = (w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period)
+            area = float(np.sum((w.w * f * w.v[:, 0])[mine]))
+            each.append(area / (2 * np.pi * motion.plant.first * (np.ptp(q[mine]) / 2)**2))
+        out["equivalent_damping"] = float(np.mean(each))
+    return out

@@ -1,0 +1,246 @@
+"""An independent program for `motion_scenes`: DOP853 between located events, and the measures as they are defined.
+
+It reads the numbers of a spec, not the scene, and imports nothing of the package. Energies are integrated beside the
+motion; `motion_read` takes harmonics and means by a Gauss rule on every step of the integrator, peaks from its dense
+output.
+"""
+
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+from motion_laws import LAWS
+from scipy.integrate import solve_ivp
+
+
+class Plant(NamedTuple):
+    """M x'' + C x' + K x = -base a(t) - faces^T F; output (n,), stiffness of the first mode K_1, cubic [N/m3]."""
+
+    M: np.ndarray
+    C: np.ndarray
+    K: np.ndarray
+    base: np.ndarray
+    faces: np.ndarray
+    output: np.ndarray
+    first: float
+    cubic: float
+    fastest: float
+
+
+def plant_of(s: dict) -> Plant:
+    if s["several"]:
+        m = s["masses"]
+        K, C = np.zeros((2, 2)), np.zeros((2, 2))
+        for (i, j), k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
+            row = _row(i, j)
+            K, C = K + k * np.outer(row, row), C + c * np.outer(row, row)
+        M, output = np.diag(m["mass"]), np.array([1.0, 0.0])
+        faces = np.array([_row(*pair) for pair in m["pairs"]])
+        base = -s["mass"] * output if s["drive"] == "force" else np.array(m["mass"])
+        first = 0.0
+    else:
+        column = {key: np.array([mode[key] for mode in s["modes"]]) for key in s["modes"][0]}
+        omega, mass = 2 * np.pi * column["frequency"], s["mass"]
+        M, output, faces = mass * np.eye(omega.size), column["output"], column["slide"][None]
+        K, C = np.diag(mass * omega**2), np.diag(2 * mass * column["damping"] * omega)
+        b = s.get("bonded", {"stiffness": 0.0, "damping": 0.0})
+        K, C = K + b["stiffness"] * faces.T @ faces, C + b["damping"] * faces.T @ faces
+        base = -mass * output if s["drive"] == "force" else mass * column["base"]
+        first = mass * omega[0]**2
+    fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
+    return Plant(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
+
+
+def _row(i: int, j: int) -> np.ndarray:
+    out = np.zeros(3)
+    out[i] += 1
+    out[j] -= 1
+    return out[1:]
+
+
+def drive_of(s: dict):
+    """(a(t) [m s-2], moments where it is not smooth, whether the base moves) of a spec."""
+    kind, size, omega = s["drive"], s["size"], 2 * np.pi * s["frequency"]
+    if kind == "free":
+        return (lambda t: 0.0), [], False
+    if kind == "step":
+        return (lambda t: size), [], True
+    if kind == "sweep":
+        w = s["sweep"]
+        slope = np.sign(w["to"] - w["from"]) * w["rate"]
+        return (lambda t: size * np.sin(2 * np.pi * (w["from"] * t + slope * t * t / 2))), [], True
+    if kind == "levels":
+        length = s["cycles"] / s["frequency"]
+        last = len(s["levels"]) - 1
+
+        def value(t):
+            return s["levels"][min(int(t / length * (1 + 1e-12)), last)] * np.sin(omega * t)
+        return value, [length * (k + 1) for k in range(last)], True
+    if kind == "file":
+        time, value = map(np.array, s["record"])
+        return (lambda t: float(np.interp(t, time, value, right=0.0))), time[1:].tolist(), True
+    return (lambda t: size * np.sin(omega * t)), [], kind != "force"
+
+
+class Stretch(NamedTuple):
+    """One stretch between events: modes of the laws, turns of their paths, dense solution, times of its steps."""
+
+    modes: tuple
+    turns: list
+    solution: object
+    times: np.ndarray
+
+
+class Motion:
+    """The equations of a spec: state (x, x', states of the laws, friction work, work in)."""
+
+    def __init__(self, s: dict):
+        self.s, self.plant = s, plant_of(s)
+        self.drive, self.breaks, self.moving = drive_of(s)
+        loads = s["masses"]["loads"] if s["several"] else [s["load"]]
+        self.laws = [LAWS[s["law"]](s["keys"]["static"] * load, **s["keys"]) for load in loads]
+        self.n = self.plant.M.shape[0]
+        self.inverse = np.linalg.inv(self.plant.M)
+        ends = np.cumsum([2 * self.n, *(law.size for law in self.laws)])
+        self.parts = [slice(a, b) for a, b in pairwise(ends)]
+        self.size = int(ends[-1])
+
+    def start(self) -> np.ndarray:
+        y = np.zeros(self.size + 1)
+        if self.s["drive"] == "free":
+            x = np.array(self.s["start"])
+            y[:self.n] = x
+        for law, part in zip(self.laws, self.parts):
+            if hasattr(law, "start"):
+                y[part] = law.start()
+        return y
+
+    def pull(self, t, y):
+        p, x, v = self.plant, y[:self.n], y[self.n:2 * self.n]
+        out = -p.K @ x - p.C @ v - p.base * self.drive(t)
+        return out - p.cubic * (p.output @ x)**3 * p.output if p.cubic else out
+
+    def forces(self, t, y, pull=None):
+        pull = self.pull(t, y) if pull is None else pull
+        rates = self.plant.faces @ y[self.n:2 * self.n]
+        if not self.laws[0].set_valued:
+            return np.array([law.force(y[part], v, t) for law, part, v in zip(self.laws, self.parts, rates)])
+        out = np.array([law.mode * law.kinetic for law in self.laws])
+        stuck = [k for k, law in enumerate(self.laws) if not law.mode]
+        if stuck:
+            rows = self.plant.faces[stuck]
+            rest = pull - self.plant.faces.T @ out
+            out[stuck] = np.linalg.solve(rows @ self.inverse @ rows.T, rows @ self.inverse @ rest)
+        return out
+
+    def slope(self, t, y):
+        pull, v = self.pull(t, y), y[self.n:2 * self.n]
+        force, rates = self.forces(t, y, pull), self.plant.faces @ v
+        out = np.empty_like(y)
+        out[:self.n], out[self.n:2 * self.n] = v, self.inverse @ (pull - self.plant.faces.T @ force)
+        for law, part, rate in zip(self.laws, self.parts, rates):
+            out[part] = law.rate(y[part], rate, t)
+        out[-1] = force @ rates
+        return out
+
+    def accelerations(self, t, y):
+        return self.plant.faces @ self.slope(t, y)[self.n:2 * self.n]
+
+    def guards(self) -> list:
+        """Events of the modes as they are: (number of the interface, number of the guard, function)."""
+        out = []
+        for k, law in enumerate(self.laws):
+            face, part = self.plant.faces[k], self.parts[k]
+            if law.set_valued and law.mode == 0:
+                for side in (1, -1):
+                    out.append((k, side, lambda t, y, k=k, side=side, law=law: law.limit - side * self.forces(t, y)[k]))
+            elif law.set_valued:
+                out.append((k, 0, lambda t, y, face=face, law=law: law.mode * (face @ y[self.n:2 * self.n])))
+            else:
+                count = len(law.guards(np.zeros(max(law.size, 1)) + 1e-30, 0.0, 0.0))
+                for g in range(count):
+                    out.append((k, g, lambda t, y, face=face, part=part, law=law, g=g:
+                                law.guards(y[part], face @ y[self.n:2 * self.n], t)[g]))
+        for _, _, f in out:
+            f.terminal, f.direction = True, -1
+        return out
+
+    def choose(self, t, y, active) -> None:
+        """Modes of the set-valued interfaces in `active`, none of which slides: the first choice without a
+        contradiction."""
+        for option in sorted(product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c))):
+            for k, mode in zip(active, option):
+                self.laws[k].mode = mode
+            force, accel = self.forces(t, y), self.accelerations(t, y)
+            scale = max(law.limit for law in self.laws) * 1e-9
+            if all(abs(force[k]) <= self.laws[k].limit + scale if not self.laws[k].mode
+                   else self.laws[k].mode * accel[k] * self.plant.M[0, 0] > -scale for k in active):
+                return
+        raise AssertionError("no choice")
+
+    def step(self) -> float:
+        """Longest step [s] of the integrator: a part of the shortest period, and of the slide over which a law
+        relaxes, beyond which dense output is no better than 1e-4."""
+        out = 0.04 / max(self.plant.fastest, self.s["frequency"])
+        if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre"):
+            speed = 3 * self.s["size"] / self.s["seeded"]
+            out = min(out, 0.5 * min(law.scale() for law in self.laws) / speed)
+        elif self.s["law"] == "tanh":
+            out = min(out, 3 * self.s["keys"]["reference_speed"] / self.s["size"])
+        return out
+
+    def run(self, end: float, rtol: float) -> list:
+        """Stretches of the motion from 0 to end [s]."""
+        t, y, out, n = 0.0, self.start(), [], self.n
+        stops = [b for b in self.breaks if 0 < b < end * (1 - 1e-12)] + [end]
+        reach = self.s["size"] / self.s["seeded"]**2
+        atol = np.full(y.size, rtol * 1e-3 * reach)
+        atol[n:2 * n] *= self.s["seeded"]
+        for law, part in zip(self.laws, self.parts):
+            atol[part] = rtol * 1e-2 * (1.0 if self.s["law"] == "bouc-wen" else law.scale())
+        atol[-1] = rtol * 1e-2 * reach * self.laws[0].limit
+        rates = self.plant.faces @ y[n:2 * n]
+        for law, v, a in zip(self.laws, rates, np.zeros(len(self.laws))):
+            law.begin(v, a)
+        if not self.laws[0].set_valued:
+            for law, v, a in zip(self.laws, rates, self.accelerations(t, y)):
+                law.begin(v, a)
+        else:
+            self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
+        step = self.step()
+        same = 0
+        for stop in stops:
+            while t < stop:
+                guards = self.guards()
+                modes = tuple((law.mode, law.side) for law in self.laws)
+                state = [list(law.turns) for law in self.laws if hasattr(law, "turns")]
+                done = solve_ivp(self.slope, (t, stop), y, "DOP853", events=[g[2] for g in guards], rtol=rtol,
+                                 atol=atol, max_step=step, dense_output=True, first_step=min(step / 50, stop - t))
+                out.append(Stretch(modes, state, done.sol, done.t))
+                same = same + 1 if done.t[-1] - t < 1e-9 / self.s["frequency"] else 0
+                assert same < 50, "events without end"
+                t, y = float(done.t[-1]), done.y[:, -1].copy()
+                if done.status == 1:
+                    hit = next(i for i, times in enumerate(done.t_events) if times.size)
+                    self.turn(t, y, *guards[hit][:2])
+                elif self.laws[0].set_valued and t < end:
+                    self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
+        return out
+
+    def turn(self, t, y, k: int, g: int) -> None:
+        """What the event g of interface k changes."""
+        law, n, face = self.laws[k], self.n, self.plant.faces[k]
+        if law.set_valued and law.mode == 0:
+            law.mode = g
+            others = [j for j, one in enumerate(self.laws) if one.mode == 0 and j != k]
+            if others:
+                self.choose(t, y, others)
+            return
+        v = y[n:2 * n]
+        if law.set_valued:
+            v -= self.inverse @ face * (face @ v) / (face @ self.inverse @ face)
+            law.mode = 0
+            self.choose(t, y, [j for j, one in enumerate(self.laws) if one.mode == 0])
+            return
+        accel = self.accelerations(t, y)[k]
+        y[self.parts[k]] = law.turned(g, y[self.parts[k]], face @ v, accel)

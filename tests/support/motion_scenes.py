@@ -1,0 +1,241 @@
+"""Random scenes of rigs: every law, drive and structure, as numbers that a scene and an independent program both read.
+
+`spec(seed)` draws the numbers, `text(spec)` writes the scene, `record(spec)` is the table of a drive from a file.
+"""
+
+import numpy as np
+
+LAWS = ("coulomb", "coulomb", "weakening", "weakening", "elastic-plastic", "elastic-plastic", "iwan", "tanh",
+        "bouc-wen", "lugre", "stretch", "stretch", "growing", "order", "report", "convolution")
+DRIVES = ("sine", "sine", "sine", "sine", "force", "force", "step", "sweep", "levels", "file", "free", "free")
+
+
+def wide(r, low: float, high: float) -> float:
+    """A number whose logarithm is evenly spread."""
+    return float(np.exp(r.uniform(np.log(low), np.log(high))))
+
+
+def spec(seed: int) -> dict:
+    """Numbers of a random scene in SI units, by name; a seed gives the same scene always."""
+    r = np.random.default_rng(seed)
+    law, drive = str(r.choice(LAWS)), str(r.choice(DRIVES))
+    own, mass = wide(r, 20, 400), wide(r, 0.2, 2)
+    omega, size = 2 * np.pi * own, wide(r, 5, 80)
+    out = {"seed": seed, "law": law, "drive": drive, "mass": mass, "size": size,
+           "frequency": own * float(r.choice([1.0, r.uniform(0.5, 1.6)])),
+           "tolerance": float(r.choice([1e-3, 1e-2])), "cycles": int(r.choice([12, 20, 40])), "seeded": omega}
+    out["modes"] = _modes(r, own)
+    base = out["modes"][0]["base"]
+    out["load"] = mass * size * base / 0.3 * wide(r, 0.15, 1.1)
+    reach = size * base / omega**2
+    out |= _law(r, law, out["load"], reach, reach * omega)
+    _structure(r, out, omega)
+    _drive(r, out, own, reach)
+    _contact(r, out)
+    if drive in ("sine", "force", "free", "step") and law in ("coulomb", "weakening") and r.random() < 0.15 \
+            and not out["several"]:
+        out["method"] = "march"
+    if drive in ("sine", "force") and law not in ("order", "report", "growing", "weakening") and r.random() < 0.15 \
+            and not (out["several"] or out["patch"] or out.get("cubic") or out.get("load_amplitude")):
+        out["method"] = "harmonic"
+    return out
+
+
+def _modes(r, own: float) -> list:
+    count, out, left = int(r.choice([1, 1, 2, 3, 4])), [], 1.0
+    for k in range(count):
+        base = float(r.uniform(0.65, 0.9) if k == 0 else r.uniform(-0.25, 0.25))
+        left -= base**2
+        out.append({"frequency": own if k == 0 else own * wide(r, 0.4, 4), "base": base,
+                    "damping": float(r.choice([0.003, 0.01, 0.05, 0.2] + [0.0] * (k == 0 and count == 1))),
+                    "slide": 1.0 if k == 0 else float(r.uniform(-0.4, 0.4)),
+                    "output": 1.0 if k == 0 else float(r.uniform(-0.5, 0.5))})
+    return out
+
+
+def _law(r, law: str, load: float, reach: float, speed: float) -> dict:
+    """Keys of [friction] by name; the lengths are shares of the motion that the drive alone makes."""
+    length, out = reach * wide(r, 0.01, 0.6), {"static": 0.3}
+    if law == "weakening" or law in ("growing", "lugre"):
+        out["kinetic"] = 0.3 * float(r.uniform(0.3, 0.95))
+    if law in ("elastic-plastic", "stretch", "growing", "order", "report", "convolution"):
+        out["bond_length"] = length
+    if law == "tanh":
+        out["reference_speed"] = speed * wide(r, 1e-3, 0.1)
+    if law in ("iwan", "bouc-wen", "lugre"):
+        out["stiffness"] = 0.3 * load / length
+    if law == "iwan":
+        out |= {"chi": float(r.uniform(-0.7, 0.0)), "beta": float(r.choice([0.0, 0.5, 2.0]))}
+    if law == "bouc-wen":
+        out |= {"exponent": float(r.choice([1.0, 2.0, 1.5])), "shape": float(r.choice([0.5, 0.8, 1.0]))}
+    if law == "lugre":
+        out |= {"stribeck_speed": speed * wide(r, 0.01, 0.3), "micro_damping": 0.05 * 0.3 * load / speed,
+                "viscous": 0.01 * 0.3 * load / speed}
+    if law == "growing":
+        out |= {"rest_growth": speed / reach * length * wide(r, 1, 30), "slip_growth": length * wide(r, 0.2, 2),
+                "rest_speed": speed * 0.01}
+    if law == "order":
+        out["order"] = float(r.choice([0.5, 1.5, 2.0]))
+    if law == "report":
+        out["order"] = float(r.choice([0.0, 1.0, 1.0, 2.0]))
+    return {"keys": out}
+
+
+def _structure(r, out: dict, omega: float) -> None:
+    """One interface on modes, or two masses with an interface each; a spring beside the contact, bonded or stiff."""
+    out["several"] = out["law"] not in ("order", "report", "convolution") and r.random() < 0.12
+    if out["several"]:
+        stiff = [out["mass"] * omega**2 * wide(r, 0.3, 2) for _ in range(3)]
+        out["masses"] = {"mass": [out["mass"], out["mass"] * wide(r, 0.3, 2)], "stiffness": stiff,
+                         "damper": [0.01 * float(np.sqrt(k * out["mass"])) for k in stiff],
+                         "loads": [out["load"], out["load"] * wide(r, 0.2, 1)],
+                         "pairs": [[1, 0], [2, 0] if r.random() < 0.5 else [1, 2]]}
+        return
+    if r.random() < 0.12:
+        out["bonded"] = {"stiffness": out["mass"] * omega**2 * wide(r, 0.1, 2),
+                         "damping": out["mass"] * omega * float(r.choice([0.0, 0.01]))}
+    if r.random() < 0.08 and out["law"] not in ("order", "report", "convolution"):
+        out["cubic"] = out["mass"] * omega**2 / (out["size"] / omega**2)**2 * wide(r, 0.01, 0.3)
+
+
+def _drive(r, out: dict, own: float, reach: float) -> None:
+    kind = out["drive"]
+    if out["several"] and kind in ("levels",):
+        kind = out["drive"] = "sine"
+    if kind == "sweep":
+        low, high = own * r.uniform(0.6, 0.9), own * r.uniform(1.1, 1.5)
+        ends = (low, high) if r.random() < 0.5 else (high, low)
+        out["sweep"] = {"from": float(ends[0]), "to": float(ends[1]), "rate": float((high - low) * own / 30)}
+    elif kind == "levels":
+        out["levels"] = [out["size"] * part for part in (0.4, 0.7, 1.0)]
+        out["cycles"] = int(r.choice([8, 15]))
+    elif kind == "file":
+        time = np.arange(0, 12 / own, 1 / (16 * own))
+        parts = [(r.uniform(0.3, 2) * own, r.uniform(0, 6), r.normal()) for _ in range(4)]
+        value = sum(a * np.sin(2 * np.pi * f * time + p) for f, p, a in parts)
+        out["record"] = [time.tolist(), (out["size"] * value / np.abs(value).max()).tolist()]
+    elif kind == "free":
+        count = 2 if out["several"] else len(out["modes"])
+        out["start"] = [reach * float(r.uniform(2, 8)), *(reach * float(r.uniform(-1, 1)) for _ in range(count - 1))]
+
+
+def _contact(r, out: dict) -> None:
+    """One point, its load changing or not, or a patch with or without its shear, tilted or not."""
+    out["patch"] = None
+    if out["several"]:
+        return
+    draw = r.random()
+    if draw < 0.06 and out["law"] in ("coulomb", "elastic-plastic", "tanh", "stretch") and out["drive"] != "levels":
+        out["load_amplitude"], out["load_frequency"] = out["load"] * float(r.uniform(0.1, 0.6)), out["frequency"] / 2
+    elif draw < 0.22:
+        shear = out["law"] in ("coulomb", "elastic-plastic", "stretch") and r.random() < 0.6
+        out["patch"] = {"shear": shear, "tilt": float(r.choice([0.0, wide(r, 1e-5, 2e-4)])), "elements": 24}
+
+
+def _row(table: str, values: dict) -> str:
+    return f"[{table}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
+
+
+def _q(value: float, unit: str) -> str:
+    return f'"{float(value)!r} {unit}"'
+
+
+UNITS = {"bond_length": "m", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s",
+         "micro_damping": "N s/m", "viscous": "N s/m", "rest_growth": "m/s^2", "slip_growth": "m", "rest_speed": "m/s"}
+NAMES = {"weakening": "coulomb", "stretch": "nonlocal", "growing": "nonlocal", "order": "nonlocal",
+         "report": "nonlocal"}
+
+
+def law_keys(s: dict) -> dict:
+    """Keys of the law as a scene writes them."""
+    name = NAMES.get(s["law"], s["law"])
+    out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
+    return out | {k: _q(v, UNITS[k]) if k in UNITS else repr(float(v)) for k, v in s["keys"].items()}
+
+
+def text(s: dict, signal: str = "signal.csv") -> str:
+    """The scene of a spec; signal: name of the file of a recorded drive."""
+    if s["several"]:
+        return _masses(s) + _driven(s, signal) + _accuracy(s)
+    parts = []
+    if s["patch"] is not None:
+        p = s["patch"]
+        parts.append(_row("contact", {"length": '"12.7 mm"', "width": '"12.7 mm"', "height": '"6.35 mm"',
+                                      "load": _q(s["load"], "N"), "substrate": '"Ti-8Al-1Mo-1V"',
+                                      "element_size": _q(12.7e-3 / p["elements"], "m")}))
+        parts += ["[contact.shear]\n"] * p["shear"]
+        parts += [_row("contact.tilt", {"angle": _q(p["tilt"], "rad")})] * (p["tilt"] > 0)
+    else:
+        more = {"amplitude": _q(s["load_amplitude"], "N"), "frequency": _q(s["load_frequency"], "Hz")} \
+            if "load_amplitude" in s else {}
+        parts.append(_row("normal", {"load": _q(s["load"], "N")} | more))
+    parts += [_row("friction", law_keys(s)), _row("structure", {"moving_mass": _q(s["mass"], "kg")})]
+    if "bonded" in s:
+        parts.append(_row("structure.bonded", {"stiffness": _q(s["bonded"]["stiffness"], "N/m"),
+                                               "damping": _q(s["bonded"]["damping"], "N s/m")}))
+    if "cubic" in s:
+        parts.append(_row("structure.stiffening", {"cubic": _q(s["cubic"], "N/m^3")}))
+    for k, mode in enumerate(s["modes"]):
+        parts.append("[" + _row("structure.mode", {"name": f'"m{k}"', "frequency": _q(mode["frequency"], "Hz")} | {
+            key: repr(mode[key]) for key in ("damping", "slide", "base", "output")}).replace("]", "]]", 1))
+    return "".join(parts) + _driven(s, signal) + _accuracy(s)
+
+
+def _masses(s: dict) -> str:
+    m = s["masses"]
+    parts = [_row("structure", {"masses": "[" + ", ".join(_q(one, "kg") for one in m["mass"]) + "]"})]
+    for pair, k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
+        parts.append("[" + _row("structure.spring", {"between": pair, "stiffness": _q(k, "N/m")}).replace("]", "]]", 1))
+        parts.append("[" + _row("structure.damper", {"between": pair, "coefficient": _q(c, "N s/m")}).replace(
+            "]", "]]", 1))
+    for pair, load in zip(m["pairs"], m["loads"]):
+        keys = {"between": pair, "load": _q(load, "N")} | law_keys(s)
+        parts.append("[" + _row("structure.interface", keys).replace("]", "]]", 1))
+    return "".join(parts)
+
+
+def _driven(s: dict, signal: str) -> str:
+    kind, size, out = s["drive"], s["size"], ""
+    force = s["mass"] * size
+    pushed = {"mass": 1} if s["several"] else {}
+    cycles = {"cycles": s["cycles"]}
+    if kind == "free":
+        out = _row("structure.start", {"displacement": "[" + ", ".join(_q(x, "m") for x in s["start"]) + "]"})
+        return out + _row("drive", {"kind": '"free"'} | cycles)
+    if kind == "force":
+        return _row("drive", {"kind": '"force"', "frequency": _q(s["frequency"], "Hz"), "force": _q(force, "N")}
+                    | pushed | cycles)
+    if kind == "step":
+        return _row("drive", {"kind": '"base"', "waveform": '"step"', "acceleration": _q(size, "m/s^2")} | cycles)
+    if kind == "sweep":
+        w = s["sweep"]
+        return _row("drive", {"kind": '"base"', "waveform": '"sweep"', "from": _q(w["from"], "Hz"),
+                              "to": _q(w["to"], "Hz"), "rate": _q(w["rate"], "Hz/s"),
+                              "acceleration": _q(size, "m/s^2")})
+    if kind == "levels":
+        rows = "[" + ", ".join(_q(one, "m/s^2") for one in s["levels"]) + "]"
+        return _row("drive", {"kind": '"base"', "waveform": '"levels"', "frequency": _q(s["frequency"], "Hz"),
+                              "levels": rows} | cycles)
+    if kind == "file":
+        return _row("drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'})
+    return _row("drive", {"kind": '"base"', "frequency": _q(s["frequency"], "Hz"),
+                          "acceleration": _q(size, "m/s^2")} | cycles)
+
+
+def _accuracy(s: dict) -> str:
+    method = {"method": f'"{s["method"]}"'} if "method" in s else {}
+    return _row("accuracy", {"tolerance": s["tolerance"]} | method)
+
+
+def record(s: dict) -> str:
+    """The table of a recorded drive."""
+    return "time [s],acceleration [m/s^2]\n" + "".join(f"{t!r},{a!r}\n" for t, a in zip(*s["record"]))
+
+
+def written(s: dict, folder):
+    """Path of the scene of a spec in a folder, its recorded drive beside it."""
+    path = folder / f"scene{s['seed']}.toml"
+    if "record" in s:
+        (folder / f"signal{s['seed']}.csv").write_text(record(s), "utf-8")
+    path.write_text(text(s, f"signal{s['seed']}.csv"), "utf-8")
+    return path
