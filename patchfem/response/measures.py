@@ -5,7 +5,7 @@ Everything works on samples: values of an exact run and of a march differ only i
 
 import numpy as np
 
-from ..core import Outcome, Response
+from ..core import Response
 from ..dynamics.second_book import gap, sampled_work
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
@@ -153,64 +153,6 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
     return (tail[:, :, 1].max(axis=1) - tail[:, :, 0].min(axis=1)) / 2
 
 
-def classify(amplitudes, tolerance: float, floor: float = 1e-10) -> Outcome:
-    """Class of a motion by the amplitudes of successive windows: steady, transient or grows.
-
-    steady: the last change stays below the tolerance, and so does what a geometric tail would still add. Without a
-    shrinking change the motion grows when it still rises; anything else is transient.
-    """
-    a = np.asarray(amplitudes, float)
-    if a.size == 1:
-        return Outcome.TRANSIENT
-    change, scale = a[-1] - a[-2], tolerance * abs(a[-1]) + floor
-    if a.size == 2:
-        return Outcome.STEADY if abs(change) < scale else Outcome.TRANSIENT
-    rest = tail(a[-3:])
-    rest = np.inf if rest is None else abs(rest)
-    endless = not np.isfinite(rest) and _rises(a) and abs(change) > 0.05 * scale  # 0.05: slower is steady
-    if abs(change) < scale and (rest < scale or not (np.isfinite(rest) or endless)):
-        return Outcome.STEADY
-    return Outcome.GROWS if _rises(a) and not np.isfinite(rest) else Outcome.TRANSIENT
-
-
-def tail(three) -> complex | None:
-    """Rest of a geometric series through three equally spaced values: what it still adds to the last one (Aitken).
-
-    None where the changes do not shrink. Complex values carry a beat: its ratio is complex.
-    """
-    before, change = three[1] - three[0], three[2] - three[1]
-    ratio = change / before if before != 0 else 0.0
-    return change * ratio / (1 - ratio) if abs(ratio) < 0.9995 else None
-
-
-def steady_amplitude(amplitudes, phasors) -> tuple:
-    """Steady amplitude by extrapolation, and its error; (None, None) where no bounded tail can be seen.
-
-    amplitudes, phasors: (w,) of the last cycle of successive windows; the phasor is the drive-frequency part of the
-    motion. What is left of a decaying free motion turns and shrinks by one complex factor per window, so the phasors
-    are extrapolated (Aitken). The waveform, amplitude over |phasor|, settles with the size of that factor. The error is
-    six times the spread of the last estimates plus twice what the waveform still changes; where it is as large as what
-    was added there is no estimate.
-    """
-    a, p = np.asarray(amplitudes, float), np.asarray(phasors, complex)
-    if a.size < 5 or not np.all(np.abs(p[-5:]) > 0):
-        return None, None
-    shape = a[-2:] / np.abs(p[-2:])
-    ends = []
-    for k in range(3):
-        rest = tail(p[p.size - 3 - k:p.size - k])
-        if rest is None:
-            return None, None
-        ends.append(abs(p[p.size - 1 - k] + rest))
-    before, change = abs(p[-2] - p[-3]), abs(p[-1] - p[-2])
-    shrink = min(change / before, 0.9995) if before > 0 else 0.9995 * (change > 0)
-    settle = (shape[-1] - shape[-2]) * shrink / (1 - shrink)
-    value = ends[0] * (shape[-1] + settle)
-    error = 6 * (max(ends) - min(ends)) * shape[-1] + 2 * abs(settle) * ends[0] + 1e-9 * value
-    added = abs(value - a[-1])
-    return (float(value), float(error)) if error < max(added, 1e-6 * value) and value < 20 * a[-1] else (None, None)
-
-
 def window_ends(extremes, phasors, window: int) -> tuple:
     """Amplitudes [m] and phasors [m] of the last cycle of each window of `window` cycles, oldest first.
 
@@ -218,12 +160,3 @@ def window_ends(extremes, phasors, window: int) -> tuple:
     """
     pick = np.arange(len(phasors) - 1, -1, -window)[::-1]
     return (extremes[pick, 1] - extremes[pick, 0]) / 2, phasors[pick]
-
-
-def _rises(a) -> bool:
-    """Whether the last windows rise one after the other by like steps, as noise does not."""
-    steps = np.diff(a[-6:])
-    if a.size < 4 or steps.min() <= 0:
-        return False
-    ratios = steps[1:] / steps[:-1]
-    return bool(np.all(ratios > 0.5) and np.all(ratios < 3))

@@ -2,39 +2,72 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..core import Measure, Outcome
-from ..structure.drive_sizes import sinusoidal
-from .measures import classify, steady_amplitude
+from ..structure.drive_sizes import largest, omega_of, sinusoidal
+from .settling import classify, left_over, mean_amplitude, steady_amplitude
+
+SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
 
 
-def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0) -> tuple:
+def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0) -> tuple:
     """Outcome of a run, and its measures with the steady estimate where there is one.
 
-    Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`). A
-    release or a step is steady once it is at rest: its amplitude below the tolerance of the largest; else the same
-    amplitudes decide, but a release never grows. A sweep or a recorded signal changes to the end: unless it leaves the
-    interface stuck it is transient, without a steady estimate. level_cycles: of each level, 0 without levels.
+    Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`), and what
+    free motion is left in them (`left_over`). A release or a step is steady once it is at rest: its amplitude below the
+    tolerance of the largest; else the same amplitudes decide, but a release never grows. A sweep or a recorded signal
+    changes to the end: unless it leaves the interface stuck it is transient, without a steady estimate. So is an
+    interface that holds while what it holds still rises. level_cycles: of each level, 0 without levels; slowest: rate
+    [1/s] at which the slowest mode decays.
     """
+    if raw.outcome is Outcome.STUCK and still_loads(raw.window, drive.period, tolerance):
+        return Outcome.TRANSIENT, measures
     if raw.outcome is not None:
         return raw.outcome, measures
     if not drive.segments:
         return Outcome.TRANSIENT, measures
-    amplitudes, last = raw.amplitudes, drive.segments[-1]
+    amplitudes, extremes, last = raw.amplitudes, raw.extremes, drive.segments[-1]
+    window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
+    floor = SMALL * largest(drive) / omega_of(drive)**2
     if level_cycles:
-        window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
         amplitudes = amplitudes[-max(1, int(level_cycles / window)):]
+        extremes = None if extremes is None else extremes[-int(level_cycles):]
     if last.amplitude == 0:
-        outcome = Outcome.STEADY if amplitudes[-1] <= tolerance * amplitudes.max() else classify(amplitudes, tolerance)
+        outcome = Outcome.STEADY if amplitudes[-1] <= tolerance * amplitudes.max() else \
+            classify(amplitudes, tolerance, floor)
         return (Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome), measures
-    outcome = classify(amplitudes, tolerance)
+    outcome = classify(amplitudes, tolerance, floor)
     if outcome is Outcome.GROWS:
         return outcome, {k: replace(m, error=None) for k, m in measures.items()}
     steady, error = raw.steady
+    if extremes is not None:
+        if left_over(extremes, window, slowest * window * drive.period) > tolerance * amplitudes[-1] + floor:
+            outcome = Outcome.TRANSIENT
+        if steady is None:
+            steady, error = mean_amplitude(extremes, window)
     if outcome is Outcome.TRANSIENT and steady is not None:
         base = measures["relative_displacement_amplitude"]
         total = error + (base.error or 0.0) * steady / max(abs(base.value), 1e-300)
         measures = measures | {"relative_displacement_amplitude_steady": Measure(steady, "m", float(total), base.floor)}
     return outcome, measures
+
+
+def still_loads(window, period: float, tolerance: float) -> bool:
+    """Whether the force that a stuck interface holds still rises: the stick of a belt outlasts the window then.
+
+    By the mean of the last cycle against that of the first, more than the tolerance of the largest force; in a window
+    of one cycle where it rises all the way. window: Response; period [s] of the drive.
+    """
+    time, forces = window.time, window.extra.get("forces", window.force[:, None])
+    largest_force = np.abs(forces).max(axis=0)
+    if time[-1] - time[0] < 1.5 * period:
+        size = np.abs(forces)
+        rises = np.all(np.diff(size, axis=0) >= -1e-9 * largest_force, axis=0)
+        return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
+    first, last = time <= time[0] + period, time >= time[-1] - period
+    means = [np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)]
+    return bool(np.any(means[1] - means[0] > tolerance * largest_force))
 
 
 def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outcome | None:

@@ -49,6 +49,12 @@ def own_period(modes: ModalBasis) -> float:
     return float(2 * np.pi / alive[0]) if alive.size else 1.0
 
 
+def slowest(modes: ModalBasis) -> float:
+    """Least rate [1/s] at which a damped coordinate decays, half its diagonal of D; 0 where none is damped."""
+    rates = np.diag(modes.dampers) / 2
+    return float(rates[rates > 0].min(initial=np.inf)) if (rates > 0).any() else 0.0
+
+
 def largest(drive) -> float:
     """Largest acceleration of a drive [m s-2], >= 0: of its segments, its samples or its sweep.
 

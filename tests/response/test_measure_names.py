@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.response.errors import SURE, step_error, with_errors
-from patchfem.response.measures import steady_amplitude
 from patchfem.response.rows import TABLE, of_first, row_of
+from patchfem.response.settling import steady_amplitude
 
 
 @pytest.mark.parametrize("name", sorted(TABLE))

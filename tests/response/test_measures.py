@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import G_N, BaseSine, Outcome, Response
+from patchfem.core import G_N, BaseSine, Response
 from patchfem.dynamics.march.march import hermite_extremes
 from patchfem.response import measures
 from patchfem.response.rows import ROWS, TABLE, Seen, measures_of
@@ -169,64 +169,6 @@ def test_order_extremes_of_a_sine():
         errors.append(max(abs(high - 1), abs(low + 1)))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert rates == pytest.approx(4, abs=0.1) and errors[-1] < 1e-7
-
-
-# how a run ended
-
-@pytest.mark.parametrize("ratio", [0.3, 0.8, 0.97, 0.995, -0.6])
-def test_exact_geometric_tail_is_extrapolated(ratio):
-    a = 2.0 - 0.9 * ratio**np.arange(6)
-    assert measures.classify(a, 1e-6) is Outcome.TRANSIENT
-    assert a[-1] + measures.tail(a[-3:]) == pytest.approx(2.0, rel=1e-9)
-    steady, error = measures.steady_amplitude(a, a * np.exp(0.7j))
-    assert steady == pytest.approx(2.0, rel=1e-9) and error < 1e-6
-
-
-@pytest.mark.parametrize("turn", [0.3, 1.0, 2.5])
-def test_exact_a_beat_is_extrapolated_by_its_complex_factor(turn):
-    """A free motion beside the drive: the amplitudes swing about the steady one, the phasors close in on it."""
-    p = 2.0 - 1.1 * (0.9 * np.exp(1j * turn)) ** np.arange(9)
-    steady, error = measures.steady_amplitude(np.abs(p), p)
-    assert steady == pytest.approx(2.0, rel=1e-9) and error < 1e-6
-
-
-def test_exact_two_decays_are_bracketed_by_the_error():
-    n = np.arange(12)
-    a = 1.0 + 0.3 * 0.8**n + 0.1 * 0.4**n
-    steady, error = measures.steady_amplitude(a, a)
-    assert 0 < abs(steady - 1.0) < error
-    assert measures.steady_amplitude(a[:6], a[:6]) == (None, None)  # too early to tell the decays apart
-
-
-def test_always_no_estimate_without_a_shrinking_change():
-    a = 1 + 0.1 * np.arange(8)
-    assert measures.steady_amplitude(a, a) == (None, None)
-    assert measures.steady_amplitude(a[:3], a[:3]) == (None, None)
-
-
-@pytest.mark.parametrize("growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05**np.arange(6)])
-def test_exact_endless_growth(growth):
-    assert measures.classify(growth, 1e-3) is Outcome.GROWS
-
-
-def test_exact_slow_endless_growth_is_not_steady():
-    """Each window adds a tenth of the tolerance, for ever."""
-    assert measures.classify(1 + 1e-4 * np.arange(6), 1e-3) is Outcome.GROWS
-
-
-@settings(max_examples=200)
-@given(st.lists(st.floats(-4e-7, 4e-7), min_size=2, max_size=8), st.floats(0.1, 10))
-def test_always_noise_is_steady(noise, size):
-    assert measures.classify(size * (1 + np.array(noise)), 1e-3) is Outcome.STEADY
-
-
-def test_exact_short_and_odd_runs():
-    assert measures.classify([1.0], 1e-3) is Outcome.TRANSIENT
-    assert measures.classify([1.0, 1.0001], 1e-3) is Outcome.STEADY
-    assert measures.classify([1.0, 1.1], 1e-3) is Outcome.TRANSIENT
-    assert measures.classify([1.0, 1.0, 1.0], 1e-3) is Outcome.STEADY
-    assert measures.classify([0.0, 0.0, 0.0], 1e-3) is Outcome.STEADY
-    assert measures.classify(5 - 0.5 * np.arange(6), 1e-3) is Outcome.TRANSIENT
 
 
 def test_exact_every_row_says_what_it_is():

@@ -44,7 +44,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     ends = window_ends(done.amplitudes, done.phasors, numerics.window)
     return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
                steady_of(drive, *ends), outcome, [], done.ledger, perf_counter() - begin,
-               levels=levels, probe=probe, log=done.log, own=own)
+               levels=levels, probe=probe, log=done.log, own=own, extremes=done.amplitudes)
 
 
 def forces_of(model, patch) -> tuple:

@@ -63,7 +63,8 @@ class _Read:
         ends = window_ends(done.amplitudes, done.phasors, window)
         return Solution(values, done.response, done.window, window_amplitudes(done.amplitudes, window),
                         steady_of(rig.drive, *ends), outcome, done.snapshots, done.ledger, seconds, self.contact,
-                        prepare, done.message, levels, probe, held=self.held, own=own, summed=self.summed())
+                        prepare, done.message, levels, probe, held=self.held, own=own, summed=self.summed(),
+                        extremes=done.amplitudes)
 
     def summed(self):
         """How the bonds are summed, a Choice; None of a law that is no sum."""

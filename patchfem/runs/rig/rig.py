@@ -13,6 +13,7 @@ from ...response.outcome import changing_note, settle
 from ...response.reasons import without_value
 from ...response.run_events import events_of, with_own
 from ...slip.fields import element_fields, point_fields
+from ...structure.drive_sizes import slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
 from ..results.notes import creeping, two_books, unripe, warming
@@ -53,7 +54,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         extra |= {"levels": levels.shown(rig, raw.levels)}
     estimated = estimate and raw.outcome is not Outcome.NOT_CONVERGED
     found = with_own(found, raw.own)
-    outcome, found = settle(raw, without_errors(found, estimated), model.accuracy.tolerance, drive, rig.level_cycles)
+    outcome, found = settle(raw, without_errors(found, estimated), model.accuracy.tolerance, drive, rig.level_cycles,
+                            slowest(rig.modes))
     if f is not None:
         extra["events"] = events_of(raw.window, drive, raw.log, raw.held)
     fields = {}

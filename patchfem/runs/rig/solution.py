@@ -18,9 +18,10 @@ class Solution:
     steady: (steady amplitude, error) or (None, None); outcome: None where the amplitudes decide; snapshots of the
     interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
     levels, probe: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
-    [m] below which a cycle sticks; own: what the run itself leaves open of its
-    measures; errors: by measure, where the engine has them itself; summed: how bonds are, a Choice, None without a sum;
-    halved: the run of levels at half the steps; extra: for the report.
+    [m] below which a cycle sticks; own: what the run itself leaves open of its measures; errors: by measure, where the
+    engine has them itself; summed: how bonds are, a Choice, None without a sum; halved: the run of levels at half the
+    steps; extremes (c, 2) [m]: of the output in every cycle of the run, by which the outcome is judged, None where the
+    engine knows it; extra: for the report.
     """
 
     values: dict
@@ -44,6 +45,7 @@ class Solution:
     errors: dict | None = None
     summed: object = None
     halved: object = None
+    extremes: np.ndarray | None = None
     extra: dict = field(default_factory=dict)
 
 

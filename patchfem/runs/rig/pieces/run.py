@@ -41,7 +41,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     return Solution(values | rings, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
                     steady_of(drive, *ends), outcome, done.snapshots, done.ledger, perf_counter() - begin,
                     found.contact, {"reduce": reduced, "load": loaded}, levels=levels, probe=probe, log=done.log,
-                    held=found.held, own=own)
+                    held=found.held, own=own, extremes=done.amplitudes)
 
 
 class Interfaces:
