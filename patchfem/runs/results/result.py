@@ -82,4 +82,4 @@ def frames_of(patch, time, tau, local, slide) -> dict:
 
 def without_errors(found: dict, estimate: bool) -> dict:
     """The measures as they are, or without their errors where none were estimated."""
-    return found if estimate else {k: Measure(m.value, m.unit, None, m.floor) for k, m in found.items()}
+    return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
