@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import Measure, Outcome
+from ...core import Outcome
 from .patch_rows import TABLE as STATIC
 
 FRAMES = 16  # of the interface, in the last cycle
