@@ -26,11 +26,12 @@ from patchfem.dynamics.march.models import load_kernels
 from patchfem.scene.scene import loads
 said = []
 result = simulate.run(simulate.plan(loads(sys.argv[1])), say=said.append, estimate=False)
+numba = "numba" in sys.modules
 kind = "dynamics.contacts.element_kernels", "friction.laws.elastic_plastic_kernels"
 loop = load_kernels().loop_of(kind).march
 print(json.dumps({"amplitude": result.measures["relative_displacement_amplitude"].value,
                   "peak": result.measures["friction_force_peak"].value, "home": simulate.__file__, "said": said,
-                  "missed": sum(loop.stats.cache_misses.values()),
+                  "numba": numba, "missed": sum(loop.stats.cache_misses.values()),
                   "hit": sum(loop.stats.cache_hits.values())}))
 """
 
@@ -58,12 +59,17 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_march(tmp_path):
     first = march(home, cache)
     assert first["missed"] > 0 and len(first["said"]) == 1 and "compiling" in first["said"][0]
     again = march(home, cache)
-    assert again["missed"] == 0 and again["hit"] > 0 and again["said"] == []
+    assert not again["numba"] and again["missed"] == again["hit"] == 0 and again["said"] == []
     assert (again["amplitude"], again["peak"]) == (first["amplitude"], first["peak"])
+    for path in cache.rglob("*.code"):  # damaged: numba's own cache serves
+        path.write_bytes(path.read_bytes()[:-1])
+    third = march(home, cache)
+    assert third["numba"] and third["missed"] == 0 and third["hit"] > 0 and third["said"] == []
+    assert (third["amplitude"], third["peak"]) == (first["amplitude"], first["peak"])
 
     law = home / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
-    text, count = re.subn(r"(def mean\(.*?\n    return )force / dq, 0.5 \* slope",
-                          r"\g<1>0.8 * force / dq, 0.4 * slope", law.read_text("utf-8"), count=1, flags=re.S)
+    text, count = re.subn(r"(def closed\(.*?stiffness, most, start = num\[e, 2\], )",
+                          r"\g<1>0.8 * ", law.read_text("utf-8"), count=1, flags=re.S)
     assert count == 1
     law.write_text(text, "utf-8")
     edited = march(home, cache)
@@ -76,7 +82,7 @@ def test_exact_key_follows_the_kernels_only(tmp_path, monkeypatch):
     package = copied(tmp_path) / "patchfem"
     assert sorted(package.rglob("*kernels.py"))
     same = compiled.kernel_key()
-    monkeypatch.setattr(compiled, "__file__", str(package / "compiled.py"))
+    monkeypatch.setattr(compiled, "HERE", package)
     assert compiled.kernel_key() == same
     (package / "core.py").write_text("# edited", "utf-8")
     assert compiled.kernel_key() == same

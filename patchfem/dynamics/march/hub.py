@@ -7,7 +7,7 @@ function as an argument is never found on disk again, so `compiled.instance` wri
 from functools import cache
 
 from ... import compiled
-from ..modal_kernels import Plant
+from ..plant import Plant
 
 HERE = "dynamics.march"
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...compiled import load
 from ...core import STICK, BaseSine, ModalBasis, Outcome, Response
+from ..plant import Plant
 from ..propagator import propagator
 from ..second_book import sampled_work
 from .models import ContactModel, load_kernels
@@ -66,13 +66,12 @@ def _response(rows, number, dt, modes, drive) -> Response:
 
 
 def plant_of(modes: ModalBasis, prop):
-    """The modal_kernels.Plant of a basis and its Propagator."""
+    """The Plant of a basis and its Propagator."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     own = (modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output, damping, prop.free,
            prop.push, prop.dense, prop.reach, prop.loss, prop.dense_loss)
     arrays = [np.array(v, float, order="C") for v in own]
-    plant = load("dynamics.modal_kernels").Plant
-    return plant(*arrays, float(prop.dt), float(prop.beta[0, 0]), float(modes.mass), np.zeros((3, modes.omega.size)))
+    return Plant(*arrays, float(prop.dt), float(prop.beta[0, 0]), float(modes.mass), np.zeros((3, modes.omega.size)))
 
 
 def _runner(model):

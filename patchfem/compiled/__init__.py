@@ -1,0 +1,232 @@
+"""Where compiled code is kept: one folder per state of the kernel sources, so an edited law never runs as its old self.
+
+Numba's own cache notices only a change of the file that holds the function, not of the files it calls. A function that
+is handed another one as an argument is never cached at all, so a loop that should run with any law is a text of its own
+per law: `instance` writes it beside the compiled code, with the import of the law exchanged.
+
+`load` and `instance` give `Kernels`, which import the module of compiled code, and with it numba, only where a function
+of it is called whose machine code is not kept yet (`machine`).
+"""
+
+import ast
+import hashlib
+import os
+import platform
+import re
+import sys
+import tempfile
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+from . import machine
+
+HERE = Path(__file__).parents[1]  # the package
+
+
+def kernel_key() -> str:
+    """Hash of every *kernels.py of the package, the numba version and the kind of CPU."""
+    digest = hashlib.sha256()
+    for source in sorted(HERE.rglob("*kernels.py")):
+        digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
+    made_by = f"{version('numba')} {version('llvmlite')} {sys.version_info[:2]}"
+    digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _cpu() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor()
+
+
+def cache_folder() -> Path:
+    """The user's cache folder for this state of the kernels, or a temporary one where that cannot be written."""
+    base = os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    for root in (Path(base), Path(tempfile.gettempdir())):
+        folder = root / "patchfem" / kernel_key()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe = folder / f".probe{os.getpid()}"
+            probe.touch()
+            probe.unlink()
+            return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix="patchfem"))
+
+
+class Kernels:
+    """A module of compiled code that is imported when it is needed.
+
+    `__name__` is that of the module. An attribute is a function to call, a constant that stands in its text, or, with
+    the module imported, anything else of it.
+    """
+
+    def __init__(self, name: str, text: Path, bring):
+        self.__name__, self._text, self._bring, self._entries = name, text, bring, {}
+
+    def __getattr__(self, name: str):
+        if name.startswith("__"):
+            raise AttributeError(f"{self.__name__} has no {name}")
+        if name not in self._entries:
+            if name in _constants(self._text):
+                return _constants(self._text)[name]
+            kept = f"{self.__name__.removeprefix('patchfem.')}.{name}-"
+            if not any(one.startswith(kept) for one in _kept()):
+                here = getattr(self.module(), name)
+                if not hasattr(here, "overloads"):
+                    return here
+            self._entries[name] = Entry(self, name, kept)
+        return self._entries[name]
+
+    def module(self):
+        """The module itself."""
+        return self._bring()
+
+
+class Entry:
+    """A function of a module of compiled code: its kept machine code where there is some, else by numba."""
+
+    def __init__(self, home: Kernels, name: str, kept: str):
+        self.home, self.name, self.kept = home, name, kept
+        self.words, self.codes = machine.Words(), {}
+
+    def __call__(self, *arguments):
+        try:
+            kinds, words = zip(*map(self.words.of, arguments))
+        except machine.Unfit:
+            return self.function()(*arguments)
+        code = self.codes.get(kinds)
+        if code is None:
+            path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
+            code = machine.found(path)
+            if code is None:
+                answer = self.function()(*arguments)
+                machine.keep(path, self.function(), arguments)
+                self.codes[kinds] = False
+                return answer
+            self.codes[kinds] = code
+        return code(b"".join(words)) if code else self.function()(*arguments)
+
+    def function(self):
+        """The function of the module, which numba compiles or finds in its cache."""
+        return getattr(self.home.module(), self.name)
+
+    def __getattr__(self, name: str):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.function(), name)
+
+
+@cache
+def _constants(path: Path) -> dict:
+    """Names of a module that stand for numbers or texts, read from its text."""
+    out = {}
+    for line in ast.parse(path.read_text("utf-8")).body:
+        if isinstance(line, ast.Assign) and len(line.targets) == 1:
+            try:
+                value, target = ast.literal_eval(line.value), line.targets[0]
+            except ValueError:
+                continue
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            values = value if isinstance(target, ast.Tuple) else [value]
+            out |= {name.id: one for name, one in zip(names, values) if isinstance(name, ast.Name)}
+    return out
+
+
+@cache
+def _kept() -> list:
+    """Names of the files of machine code that were there when the process began."""
+    try:
+        return os.listdir(_prepared() / "code")
+    except OSError:
+        return []
+
+
+def load(module: str, say=None):
+    """A module of the package, such as "dynamics.modal_kernels", its compiled code cached on disk; `say` is told when
+    nothing is there yet and it has to compile first. Modules named *kernels come as `Kernels`."""
+    _prepared(say)
+    return _kernels(module) if module.endswith("kernels") else import_module(f"patchfem.{module}")
+
+
+@cache
+def _kernels(module: str) -> Kernels:
+    name = f"patchfem.{module}"
+    return Kernels(name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name))
+
+
+def instance(module: str, parts: dict, say=None):
+    """A module of compiled code with others in place of modules that it imports, as `Kernels`.
+
+    module: as of `load`; parts: name under which the module imports another (`from . import other as name`) -> the
+    module, or its name as of `load`, that takes its place and must offer the same functions. The text differs from the
+    file in these lines alone, so its lines have the numbers of the file in every traceback. It is kept in the folder of
+    the compiled code, under a name with the hash of its content, and written in one move: processes may ask for it at
+    once, and the package may be read-only. ValueError where the module has no such part.
+    """
+    text = HERE.joinpath(*module.split(".")).with_suffix(".py").read_text("utf-8")
+    for part, other in parts.items():
+        name = other.__name__ if hasattr(other, "__name__") else f"patchfem.{other}"
+        text, count = re.subn(rf"(?m)^from \.[\w.]* import \w+ as {part}$", f"import {name} as {part}", text)
+        if count != 1:
+            raise ValueError(f"patchfem.{module} imports its part {part} {count} times, not once")
+    return written(f"{module}_{digest(text)}", text, say, [one for one in parts.values() if isinstance(one, Kernels)])
+
+
+def digest(text: str) -> str:
+    """Short hash of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def written(module: str, text: str, say=None, parts=()):
+    """The module of compiled code, named as of `load`, whose text is kept in the folder of the compiled code.
+
+    parts: Kernels that the text imports, brought before it.
+    """
+    name = f"patchfem.{module}"
+    path = _prepared(say) / "instances" / f"{module}.py"
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        draft = path.with_suffix(f".{os.getpid()}")
+        draft.write_text(text, "utf-8")
+        draft.replace(path)
+
+    def bring():
+        if name not in sys.modules:
+            for part in parts:
+                part.module()
+            spec = spec_from_file_location(name, path)
+            sys.modules[name] = module_from_spec(spec)
+            spec.loader.exec_module(sys.modules[name])
+        return sys.modules[name]
+
+    return Kernels(name, path, bring)
+
+
+def _prepared(say=None) -> Path:
+    """The folder of the compiled code, made known to numba; `say` is told, once, where nothing is in it."""
+    folder = _folder()
+    if say is not None:
+        _told(say)
+    return folder
+
+
+@cache
+def _folder() -> Path:
+    folder = cache_folder()
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    if "numba" in sys.modules:
+        sys.modules["numba"].config.CACHE_DIR = str(folder)
+    return folder
+
+
+@cache
+def _told(say) -> None:
+    if not any(_folder().rglob("*.nbi")):
+        say("compiling the time loop for this machine, once (10 to 30 s)")

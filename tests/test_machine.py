@@ -1,0 +1,161 @@
+"""Machine code in files of its own: the same bits as through numba, and nothing for what could not run without it."""
+
+import json
+from math import exp, tan
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import njit
+
+from patchfem.compiled import Entry, Kernels, load, machine
+
+
+class Inner(NamedTuple):
+    places: np.ndarray
+    scale: float
+
+
+class Outer(NamedTuple):
+    first: np.ndarray
+    inner: Inner
+    count: int
+    grid: np.ndarray
+
+
+def weighed(first, outer, step, out):
+    """Sums with calls of the C library in them; writes, counts and returns one of each kind."""
+    total = 0.0
+    for i in range(outer.count):
+        total += exp(-outer.inner.places[i] * outer.inner.scale) * tan(outer.first[i])
+        for j in range(outer.grid.shape[1]):
+            total += outer.grid[i, j] * step
+        out[i] = total
+    return outer.count + first, (total, outer.inner.places.size)
+
+
+def filled(out, value):
+    for i in range(out.size):
+        out[i] = value
+
+
+def refusing(value):
+    if value < 0:
+        raise ValueError("negative")
+    return value * 2
+
+
+def lengthened(count):
+    return np.zeros(count).size
+
+
+def some_arguments():
+    rng = np.random.default_rng(3)
+    grid = rng.normal(size=(9, 14))[::2, 1::3]  # neither rows nor columns lie together
+    return 3, Outer(rng.normal(size=5), Inner(rng.normal(size=7), 0.7), 5, grid), 1e-3, np.zeros(5)
+
+
+def kept(path, function, *arguments):
+    """(what numba answers, the function read back from its file or None)."""
+    made = njit(error_model="numpy", _nrt=function is lengthened)(function)
+    answer = made(*arguments)
+    return answer, machine.found(path) if machine.keep(path, made, arguments) else None
+
+
+def words_of(*arguments) -> bytes:
+    words = machine.Words()
+    return b"".join(words.of(one)[1] for one in arguments)
+
+
+@pytest.fixture(scope="module")
+def weighing(tmp_path_factory):
+    path, given = tmp_path_factory.mktemp("code") / "weighed.code", some_arguments()
+    made = njit(error_model="numpy", _nrt=False)(weighed)
+    answer = made(*given)
+    assert machine.keep(path, made, given)
+    return path, given, answer, machine.found(path), made
+
+
+def test_exact_the_same_bits_from_the_file(weighing):
+    _, (first, outer, step, out), answer, code, made = weighing
+    mine = np.zeros(5)
+    assert code(words_of(first, outer, step, mine)) == answer == (8, (answer[1][0], 7))
+    assert np.array_equal(mine, out) and answer[1][0] == out[-1] != 0
+    other = outer._replace(count=2, inner=Inner(-outer.inner.places, 1.5))  # other words, not those of the first call
+    assert code(words_of(-1, other, 2.0, mine)) == made(-1, other, 2.0, np.zeros(5)) == (1, (mine[1], 7))
+    assert mine[1] == pytest.approx(weighed(-1, other, 2.0, out)[1][0], rel=1e-13)
+
+
+@pytest.mark.parametrize("damage", [
+    lambda text: text[:-1], lambda text: text[:40], lambda text: b"", lambda text: b"{}\n" + text,
+    lambda text: text[:-9] + bytes([text[-9] ^ 1]) + text[-8:],
+    lambda text: text.replace(b'"tan"', b'"tam"'), lambda text: text.replace(b'"tan"', b'"PyErr_Clear"'),
+], ids=["cut", "cut early", "empty", "no head", "one bit", "no such function", "Python's"])
+def test_refuses_a_damaged_file(weighing, tmp_path, damage):
+    text = weighing[0].read_bytes()
+    assert json.loads(text.partition(b"\n")[0])["calls"] == ["tan"]
+    (tmp_path / "a.code").write_bytes(damage(text))
+    assert machine.found(tmp_path / "a.code") is None and machine.found(tmp_path / "none.code") is None
+
+
+def test_exact_nothing_returned_and_what_was_raised(tmp_path):
+    out = np.zeros(3)
+    answer, code = kept(tmp_path / "filled.code", filled, out, 2.5)
+    other = np.zeros(4)
+    assert code(words_of(other, -1.5)) is answer is None and other.tolist() == [-1.5] * 4
+    answer, code = kept(tmp_path / "refusing.code", refusing, 2.0)
+    assert answer == code(words_of(2.0)) == 4.0
+    with pytest.raises(RuntimeError, match="status"):
+        code(words_of(-1.0))
+
+
+def test_refuses_what_numba_alone_can_run(tmp_path):
+    assert kept(tmp_path / "a.code", lengthened, 3) == (3, None)  # it allocates
+    for unfit in (True, "text", 1j, [1.0], None, np.float32(1), (1.0, None)):
+        with pytest.raises(machine.Unfit):
+            machine.Words().of(unfit)
+    made = njit(refusing)
+    made(1.0)
+    assert not machine.keep(tmp_path / "none" / "folder" / "a.code", made, (1.0,))  # nowhere to write to
+    assert not machine.keep(tmp_path / "a.code", made, (1,))  # never compiled for these
+    assert not list(tmp_path.iterdir())
+
+
+def test_always_kinds_tell_types_apart():
+    words, grid = machine.Words(), np.zeros((4, 4))
+    still = np.zeros(4)
+    still.flags.writeable = False
+    kinds = [words.of(one)[0] for one in (1.0, 1, grid, grid.T, grid[::2, ::2], grid[0], grid.astype(np.float32), still,
+                                          (1.0, 1), (1, 1), Inner(grid[0], 1.0), ())]
+    assert kinds[3] == "<f82C"[:-1] + "F" and len(set(kinds)) == len(kinds)
+    assert words.of(np.float64(1.0)) == words.of(1.0) and words.of(np.int64(7)) == words.of(7)
+
+
+def test_always_a_tuple_is_remembered_as_itself(weighing):
+    """Tuples come and go at the same addresses; one that is remembered is kept alive, so none is taken for another."""
+    _, (first, outer, step, _), _, code, made = weighing
+    words, mine = machine.Words(), np.zeros(5)
+    for k in range(20):
+        other = outer._replace(inner=Inner(outer.inner.places * k, 0.1 * k))
+        row = b"".join(words.of(one)[1] for one in (first, other, step, mine))
+        assert code(row) == made(first, other, step, np.zeros(5))
+    assert len(words.known) <= machine.PARTS
+
+
+def test_exact_constants_are_read_without_the_module(tmp_path):
+    path = tmp_path / "some_kernels.py"
+    path.write_text('"""Text."""\nimport nothing_there\nSTILL, MOVES = 0, 1\nNAME = "a"\nFAR = 1e-3\nOTHER = FAR * 2\n')
+    brought = []
+    module = Kernels("patchfem.some_kernels", path, lambda: brought.append(1))
+    assert (module.STILL, module.MOVES, module.NAME, module.FAR) == (0, 1, "a", 1e-3) and not brought
+    with pytest.raises(AttributeError):
+        module.OTHER  # noqa: B018
+    assert brought
+
+
+def test_exact_a_function_is_one_of_its_module():
+    kernels = load("dynamics.one_mode.event_kernels")
+    assert kernels is load("dynamics.one_mode.event_kernels")
+    assert isinstance(kernels.batch, Entry) and kernels.batch.py_func is kernels.module().batch.py_func
+    with pytest.raises(AttributeError, match="no_such"):
+        kernels.no_such  # noqa: B018
