@@ -24,6 +24,7 @@ from pathlib import Path
 from . import machine
 
 HERE = Path(__file__).parents[1]  # the package
+PLAIN = (ast.Constant, ast.Name, ast.Load, ast.Tuple, ast.BinOp, ast.UnaryOp, ast.operator, ast.unaryop)  # arithmetic
 
 
 def kernel_key() -> str:
@@ -86,6 +87,7 @@ class Kernels:
 
     def module(self):
         """The module itself."""
+        _prepared()
         return self._bring()
 
 
@@ -129,10 +131,10 @@ def _constants(path: Path) -> dict:
     out = {}
     for line in ast.parse(path.read_text("utf-8")).body:
         if isinstance(line, ast.Assign) and len(line.targets) == 1:
-            try:
-                value, target = ast.literal_eval(line.value), line.targets[0]
-            except ValueError:
+            if any((isinstance(part, ast.Name) and part.id not in out) or not isinstance(part, PLAIN)
+                   for part in ast.walk(line.value)):
                 continue
+            value, target = eval(compile(ast.Expression(line.value), str(path), "eval"), {}, out), line.targets[0]
             names = target.elts if isinstance(target, ast.Tuple) else [target]
             values = value if isinstance(target, ast.Tuple) else [value]
             out |= {name.id: one for name, one in zip(names, values) if isinstance(name, ast.Name)}
@@ -152,11 +154,12 @@ def load(module: str, say=None):
     """A module of the package, such as "dynamics.modal_kernels", its compiled code cached on disk; `say` is told when
     nothing is there yet and it has to compile first. Modules named *kernels come as `Kernels`."""
     _prepared(say)
-    return _kernels(module) if module.endswith("kernels") else import_module(f"patchfem.{module}")
+    return kernels(module) if module.endswith("kernels") else import_module(f"patchfem.{module}")
 
 
 @cache
-def _kernels(module: str) -> Kernels:
+def kernels(module: str) -> Kernels:
+    """The module of compiled code of this name, nothing of it loaded."""
     name = f"patchfem.{module}"
     return Kernels(name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name))
 

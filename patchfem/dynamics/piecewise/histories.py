@@ -68,10 +68,9 @@ class PieceRun:
     end: tuple
 
 
-def warm_up(say=None) -> None:
-    """Load the compiled loop; `say` is told where it has to be compiled first."""
-    load(f"{HERE}.march_kernels", say)
-    load(f"{HERE}.dense_kernels", say)
+def warm_up(say=None) -> tuple:
+    """The compiled loop and the sums over its rows; `say` is told where they have to be compiled first."""
+    return load(f"{HERE}.march_kernels", say), load(f"{HERE}.dense_kernels", say)
 
 
 def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, travel: float = np.inf,
@@ -97,11 +96,8 @@ class _Run:
     """Rows as they come: what is summed is summed, all but turning points and slips is forgotten before the window."""
 
     def __init__(self, modes, drive, groups, cycles, window, travel, start, memory):
-        warm_up()
-        from . import dense_kernels, march_kernels
-
         self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
-        self.kernels, self.dense = march_kernels, dense_kernels
+        self.kernels, self.dense = warm_up()
         self.table, self.plant = table_of(self.groups), plant_of(modes)
         self.clock, self.room = clock_of(drive, len(self.groups)), room_of(self.plant)
         n, count = modes.omega.size, max(1, ceil(cycles - 1e-9))
@@ -113,11 +109,11 @@ class _Run:
         wanted = np.zeros(count)
         wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
         self.books, self.cycles, self.period = books_of(count, wanted, travel), cycles, drive.period
-        self.width = march_kernels.HEAD + 2 * n + march_kernels.EACH * len(self.groups)
+        self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.kept, self.events, self.count = [], 0, [], 0
         self.before, self.outcome, self.snapshots = np.zeros(len(self.groups)), None, []
         self.passed = False
-        self.begun = march_kernels.stored(self.motion, self.plant, self.table, self.memory)
+        self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
 
     def until(self, cycles: float, whole: bool, progress=None) -> list:
         """Rows up to a time in cycles: all of them, or where not `whole` only turning points and slips."""

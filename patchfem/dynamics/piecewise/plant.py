@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...compiled import kernels
 from ...core import ModalBasis, PatchfemError
-from . import drive_kernels as kinds
-from . import series_kernels as series
+
+kinds, series = kernels("dynamics.piecewise.drive_kernels"), kernels("dynamics.piecewise.series_kernels")
 
 
 class Plant(NamedTuple):

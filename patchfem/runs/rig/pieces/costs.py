@@ -7,7 +7,6 @@ import numpy as np
 from ....effects import has
 from ....friction.record import law_from
 from ....model.model import Model
-from ....model.patch import CHOSEN_POINTS, block_shear
 from ....structure.drive_sizes import fastest
 from ...effort import steps_per_cycle
 
@@ -27,6 +26,8 @@ def sizes(model: Model) -> tuple:
             element = law_from(one.numbers, load).element(load)
             mine, most = int(element.numbers[1]), float(element.numbers[2:2 + int(element.numbers[1])].sum())
         if model.soft:
+            from ....model.patch import CHOSEN_POINTS, block_shear
+
             patch = model.patch
             most = 1 / (1 / most + 1 / block_shear(patch))
             mine = CHOSEN_POINTS if patch.chosen else round(patch.length / patch.size) + 1
