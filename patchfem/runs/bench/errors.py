@@ -5,10 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...effects import listed
 from ...response.coarser import Rung, estimate, space_rung
 from ...response.errors import change, step_error
 from . import bench
-from .engine import LIST
+from .engine import LIST, PLANE, STEPPED
+from .law import tail_of
 from .watch import Watch
 
 FINER = 0.5  # merge width of the run that shows what merging does
@@ -31,7 +33,7 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
         return bench.run(model, on, variant.steps, watch=Watch(variant.choice, say))
 
     errors, seconds = estimate(solve, fine.values, ladder_of(model, coarse is not None, fine, steps))
-    return [*errors, *([stated(model, fine)] if fine.engine.kind == LIST else [])], seconds
+    return [*errors, *([stated(model, fine)] if sum_error(model, fine.engine) else [])], seconds
 
 
 def ladder_of(model, meshed: bool, fine, steps: int) -> list:
@@ -53,11 +55,18 @@ def ladder_of(model, meshed: bool, fine, steps: int) -> list:
     return out
 
 
+def sum_error(model, engine) -> float:
+    """Bound of the error of the sum over bonds, as a share of the friction limit [1]; 0 without such a sum."""
+    if engine.kind == LIST:
+        return engine.choice.error
+    return tail_of(model) if engine.kind in (STEPPED, PLANE) and listed(model.friction) else 0.0
+
+
 def stated(model, fine) -> dict:
     """Error by measure name that follows from the bound of the sum over bonds, which is a share of the friction limit:
     forces and slip directly, work as that share of what went to and fro, the store as that of a bond length at the
     limit."""
-    error, f, power = fine.engine.choice.error, model.friction, float(np.abs(np.diff(fine.ledger[0])).sum())
+    error, f, power = sum_error(model, fine.engine), model.friction, float(np.abs(np.diff(fine.ledger[0])).sum())
     force = error * f.static
     out = {"friction_force_peak": force * float(fine.load.max()), "friction_ratio_end": force,
            "friction_ratio_peak": force, "slip_amplitude": error * f.bond_length, "work_check": error}

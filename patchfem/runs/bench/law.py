@@ -23,10 +23,15 @@ def law_for(model, patch=None):
         return Recursion(law)
     from ...friction.bonds.quadrature import Quadrature
 
-    if engine == "direct":
-        return Quadrature(law, 0.0)
-    tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
-    return Quadrature(law, tail)
+    return Quadrature(law, tail_of(model))
+
+
+def tail_of(model) -> float:
+    """What the cut-off of the NumPy sum over bonds may lose, as a share of the friction limit [1]."""
+    accuracy = model.accuracy
+    if accuracy.quadrature == "direct":
+        return 0.0
+    return accuracy.tail if accuracy.tail is not None else 1e-3 * accuracy.tolerance
 
 
 def pressed(model, patch) -> tuple:

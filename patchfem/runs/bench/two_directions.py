@@ -4,6 +4,7 @@ import numpy as np
 
 from ...friction.bonds.quadrature import Quadrature
 from ...friction.bonds.recursion import Recursion
+from .law import tail_of
 from .ledger import Slid, frame_numbers, ledger_of, split
 from .stepped import refuse_costly
 from .watch import BLOCK, Watch
@@ -48,9 +49,7 @@ def law_for(model):
     law = model.bonds
     if law.reading == "stretch" and law.order == 1:
         return Recursion(law)
-
-    tail = model.accuracy.tail if model.accuracy.tail is not None else 1e-3 * model.accuracy.tolerance
-    return Quadrature(law, tail)
+    return Quadrature(law, tail_of(model))
 
 
 def _pressed(model, patch) -> tuple:

@@ -9,6 +9,8 @@ from dataclasses import replace
 from importlib import import_module
 from typing import NamedTuple
 
+import numpy as np
+
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
@@ -18,6 +20,8 @@ from ..effort import too_long
 from .pieces.costs import seconds_of_pieces, seconds_of_steps
 
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
+LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
+LESS = 0.1  # tail of that run
 
 
 class Variant(NamedTuple):
@@ -152,8 +156,8 @@ def _march_in_time(model: Model, numerics, patch) -> list:
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the march in space: the mesh, the number of shear modes and the width up to which bonds are merged, all
-    at a quarter of the steps."""
+    """Rungs of the march in space: the mesh, the number of shear modes and the sum over bonds, at a quarter of the
+    steps."""
     few, varies, out = _fewer(numerics, 4), model.rig.load_varies, []
     quarter = Variant(few, patch)
     if coarse is not None and (varies or model.soft):
@@ -161,16 +165,39 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if shape is not None and (varies or (coarse is not None and has(model.friction.law, "bonds"))):
         out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter))
-    return [*out, *_merging(few, patch, solution.summed)]
+    return [*out, *_summed(model, few, patch, solution)]
 
 
-def _merging(few, patch, summed) -> list:
-    """The rung of a list of bonds that merges them: half the width, as in a bench; summed: Choice or None."""
-    if summed is None or not summed.merge:
+def _summed(model: Model, few, patch, solution) -> list:
+    """Rungs of a list of bonds: its stated bound on forces and energies, and, where it merges or its tail was set
+    loose, the change of the motion with narrower strips and a smaller tail, at the steps of `few`."""
+    choice = solution.summed
+    if choice is None or not choice.error:
         return []
-    same, narrow = (Variant(replace(few, choice=replace(summed, merge=share * summed.merge)), patch)
-                    for share in (1.0, FINER))
-    return [Rung((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in change(wide, fine).items()}, same)]
+    out = [Rung((), lambda fine: stated(model, patch, choice.error, fine, solution))]
+    if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
+        finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
+        same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
+        out.append(Rung((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in change(wide, fine).items()},
+                        same))
+    return out
+
+
+def stated(model: Model, patch, error: float, values: dict, solution) -> dict:
+    """Errors by measure name that follow from the bound of a sum over bonds, a share of the friction limit.
+
+    error: of the sum [1]; values: measures of the run. Forces and slip have it directly, work as that share of what
+    went to and fro, the store as that of a bond length at the limit, all else as a share of its value.
+    """
+    load = patch.pressure.load if patch is not None else model.point.load
+    force, ledger = error * model.friction.static * load, solution.window.extra["ledger"][0]
+    span = solution.window.time[-1] - solution.window.time[0]
+    passed = error * solution.book["passed"]
+    direct = {"friction_force_peak": force, "slip_amplitude": error * model.friction.bond_length, "work_check": error,
+              "energy_stored": force * model.friction.bond_length, "friction_work": passed, "energy_dissipated": passed,
+              "loop_area": error * float(np.abs(np.diff(ledger)).sum()) * model.rig.drive.period / max(span, 1e-300),
+              "energy_balance": 0.0, "normal_load": 0.0}
+    return {name: direct.get(name, error * abs(value)) for name, value in values.items()}
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
