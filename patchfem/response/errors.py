@@ -19,6 +19,7 @@ from .rows import of_first, row_of
 ORDERS = 2**1.7, 2**2.3  # ratios of two changes at halved steps that show second order
 SURE = 2.2  # times the error that follows from the order: 95 % of these are below 1.5 to 2 times it
 LOOSE = 1.3  # times the larger change: 95 % of the errors of irregular measures lie below 0.4 to 1.1 of it
+GROWS = 1.5  # times that where the later change is the larger one: nothing converges yet
 # of measures that hang on few steps, or are small differences
 LOOSER = {"stick_fraction": 1.5, "slip_start_phase": 1.4, "drift_per_cycle": 2.0, "equivalent_damping": 1.3,
           "secant_stiffness": 1.3}
@@ -57,7 +58,8 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
         elif gap and ORDERS[0] <= earlier / gap <= ORDERS[1]:
             out[name] = max(SURE * abs(gap) / (earlier / gap - 1), LEAST * typical * value)
         else:
-            out[name] = LOOSE * LOOSER.get(of_first(name), 1.0) * max(sizes[name], SHARE * typical * value)
+            grows = GROWS if abs(earlier) < abs(gap) else 1.0
+            out[name] = grows * LOOSE * LOOSER.get(of_first(name), 1.0) * max(sizes[name], SHARE * typical * value)
         out[name] += row_of(name).grain / steps
     return out
 

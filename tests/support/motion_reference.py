@@ -36,7 +36,7 @@ def plant_of(s: dict) -> Plant:
             K, C = K + k * np.outer(row, row), C + c * np.outer(row, row)
         M, output = np.diag(m["mass"]), np.array([1.0, 0.0])
         faces = np.array([_row(*pair) for pair in m["pairs"]])
-        base = -s["mass"] * output if s["drive"] == "force" else np.array(m["mass"])
+        base = -s["mass"] * output if forced(s) else np.array(m["mass"])
         first = 0.0
     else:
         column = {key: np.array([mode[key] for mode in s["modes"]]) for key in s["modes"][0]}
@@ -45,10 +45,15 @@ def plant_of(s: dict) -> Plant:
         K, C = np.diag(mass * omega**2), np.diag(2 * mass * column["damping"] * omega)
         b = s.get("bonded", {"stiffness": 0.0, "damping": 0.0})
         K, C = K + b["stiffness"] * faces.T @ faces, C + b["damping"] * faces.T @ faces
-        base = -mass * output if s["drive"] == "force" else mass * column["base"]
+        base = -mass * output if forced(s) else mass * column["base"]
         first = mass * omega[0]**2
     fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
     return Plant(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
+
+
+def forced(s: dict) -> bool:
+    """Whether a force drives the rig of a spec, not its base."""
+    return s.get("forced", s["drive"] == "force")
 
 
 def _row(i: int, j: int) -> np.ndarray:
@@ -68,7 +73,7 @@ def drive_of(s: dict):
     if kind == "sweep":
         w = s["sweep"]
         slope = np.sign(w["to"] - w["from"]) * w["rate"]
-        return (lambda t: size * np.sin(2 * np.pi * (w["from"] * t + slope * t * t / 2))), [], True
+        return (lambda t: size * np.sin(2 * np.pi * (w["from"] * t + slope * t * t / 2))), [], not forced(s)
     if kind == "levels":
         length = s["cycles"] / s["frequency"]
         last = len(s["levels"]) - 1
@@ -78,7 +83,7 @@ def drive_of(s: dict):
         return value, [length * (k + 1) for k in range(last)], True
     if kind == "file":
         time, value = map(np.array, s["record"])
-        return (lambda t: float(np.interp(t, time, value, right=0.0))), time[1:].tolist(), True
+        return (lambda t: float(np.interp(t, time, value, right=0.0))), time[1:].tolist(), not forced(s)
     return (lambda t: size * np.sin(omega * t)), [], kind != "force"
 
 
