@@ -2,13 +2,13 @@
 
 from numba import njit
 
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series
 from .march_kernels import EACH, HEAD, moved, speed_series
 from .series_kernels import fastest, largest, motion_series, powers, value
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def unfold(row, h, plant, clock, room):
     """Fill the room with the series of the piece of a row over h [s]; the highest power."""
     n, faces = plant.square.size, plant.faces.shape[0]
@@ -27,7 +27,7 @@ def unfold(row, h, plant, clock, room):
     return top
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def evaluate(rows, owner, tau, plant, clock, room, out):
     """Motion at tau (j,) [s] after the starts of the rows owner (j,), rising.
 
@@ -60,7 +60,7 @@ def evaluate(rows, owner, tau, plant, clock, room, out):
             out[j, to + 5] = row[at + 6] + row[at + 3] * abs(step)
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def peak(rows, plant, clock, moving, room):
     """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included."""
     best, poly = 0.0, room.polys[plant.faces.shape[0]]

@@ -9,19 +9,20 @@ from math import cos, exp, expm1, pi, sin
 
 from numba import njit
 
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import FAST, LEAN
+from .series_kernels import TWICE
 
 SINE, LINE, CHIRP, LOG_CHIRP = 0.0, 1.0, 2.0, 3.0  # kinds of a segment
 CYCLE, OFFSET, KIND, CONSTANT, AMPLITUDE, OMEGA, PHASE, SLOPE, DISPLACED, RATE = range(10)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def since(segment, cycle, offset, period):
     """Time [s] since a segment began."""
     return (cycle - segment[CYCLE]) * period + (offset - segment[OFFSET])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def phase_of(segment, cycle, offset, period):
     """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
     if segment[KIND] == SINE:
@@ -34,7 +35,7 @@ def phase_of(segment, cycle, offset, period):
     return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (2 * pi)
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def drive_series(segment, cycle, offset, period, h, top, waves):
     """Fill waves[0] (>= top + 1,) with the series over u = t/h of a drive [m s-2] from the time (cycle, offset) on.
 
@@ -45,7 +46,7 @@ def drive_series(segment, cycle, offset, period, h, top, waves):
         turn = segment[OMEGA] * h
         wave[0], wave[1] = segment[AMPLITUDE] * sin(theta), segment[AMPLITUDE] * cos(theta) * turn
         for k in range(2, top + 1):
-            wave[k] = -wave[k - 2] * turn * turn / (k * (k - 1))
+            wave[k] = -wave[k - 2] * (turn * turn * TWICE[k])
         wave[0] += segment[CONSTANT]
         return
     time = since(segment, cycle, offset, period)
@@ -62,7 +63,7 @@ def drive_series(segment, cycle, offset, period, h, top, waves):
         wave[k] *= segment[AMPLITUDE]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def swept(kind, omega, theta, slope, h, top, waves):
     """Fill waves[0] with the series of the sine of a swept phase, by s' = phi' c and c' = -phi' s; waves[2] with phi'.
 
@@ -80,7 +81,7 @@ def swept(kind, omega, theta, slope, h, top, waves):
         wave[k + 1], cosine[k + 1] = s / (k + 1), c / (k + 1)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def squared(kind, omega, slope, top, waves):
     """Multiply waves[0] by the series of the swept omega squared."""
     wave, square = waves[0], waves[2]

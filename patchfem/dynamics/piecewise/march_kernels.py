@@ -9,7 +9,7 @@ from math import cos, pi, sin
 
 from numba import njit
 
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series, phase_of
 from .memory_kernels import carried, give_way, tangent, threshold, turn
 from .series_kernels import (
@@ -17,6 +17,7 @@ from .series_kernels import (
     _WEIGHT,
     EPS,
     NONE,
+    OVER,
     REACH,
     fastest,
     first_root,
@@ -31,10 +32,11 @@ DONE, FULL, TRAVEL, PILED = 0, 1, 2, 3  # how `march` returns
 NOTHING, YIELDS, TURNS, OUTPUT_TURNS, STOPS = 0, 1, 2, 3, 4  # what ends a piece
 HEAD, EACH = 8, 8  # columns of a row: of the piece, then of every interface behind z and v
 TINY = 1e-14  # of the terms of a speed: below it a slide at a turning point has no acceleration
+AT_ONCE = 1e-12  # share of a piece in which what stood still stands still: two turning points at one place
 MOST_IDLE = 1000.0  # events in a row without progress
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def left_of(clock, stop):
     """Time [s] to the next border: of the drive's segments, of the cycle, or `stop` (cycle, offset)."""
     now, period = clock.now, clock.period[0]
@@ -47,7 +49,7 @@ def left_of(clock, stop):
     return max(left, 0.0)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def arrive(clock, stop, left):
     """Step onto the border `left` [s] away."""
     now, period = clock.now, clock.period[0]
@@ -66,7 +68,7 @@ def arrive(clock, stop, left):
         now[2] = k
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def heading(poly, top, rests):
     """(order of the first term of a speed that counts, its sign); poly: its series; rests: it is zero at first."""
     if not rests and poly[0] != 0.0:
@@ -80,7 +82,7 @@ def heading(poly, top, rests):
     return 0, 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def speed_series(row, coefs, top, poly):
     """Fill poly (top,) with the series of the rate over u of row (n,) times the coordinates."""
     for k in range(top):
@@ -90,16 +92,16 @@ def speed_series(row, coefs, top, poly):
         poly[k] = (k + 1) * part
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def moved(poly, top, u):
     """Integral from 0 to u of a speed whose series is poly (top,)."""
-    out = poly[top - 1] / top
+    out = poly[top - 1] * OVER[top]
     for k in range(top - 2, -1, -1):
-        out = out * u + poly[k] / (k + 1)
+        out = out * u + poly[k] * OVER[k + 1]
     return out * u
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def crossing(poly, top, room, limit, spare):
     """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by `room` the way it goes; NONE
     if it does not. room > 0 [m], signed; spare: room for a polynomial."""
@@ -109,11 +111,11 @@ def crossing(poly, top, room, limit, spare):
         return NONE
     spare[0] = way * room
     for k in range(top):
-        spare[k + 1] = -way * poly[k] / (k + 1)
+        spare[k + 1] = -way * poly[k] * OVER[k + 1]
     return polish(spare, 0, top, 0.0, limit, limit * room / end)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def next_event(top, plant, table, memory, clock, room):
     """(u, what, face, sign) of the first event of a piece; u = 1 and NOTHING where none ends it.
 
@@ -141,7 +143,7 @@ def next_event(top, plant, table, memory, clock, room):
         root = crossing(poly, top, gap, u, polys[faces])
         if root <= u:
             u, what, face, sign = root, YIELDS, f, way
-    if not plant.along:
+    if plant.along < 0:
         poly, spare = polys[faces + 1], polys[faces]
         speed_series(plant.output, room.coefs, top, poly)
         order, way = heading(poly, top, clock.rest[faces] == 1.0)
@@ -153,47 +155,70 @@ def next_event(top, plant, table, memory, clock, room):
     return u, what, face, sign
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def at_four(poly, low, top, u):
+    """Values of a polynomial as in `value` at four places."""
+    a = b = c = d = poly[top]
+    for k in range(top - 1, low - 1, -1):
+        part = poly[k]
+        a, b, c, d = a * u[0] + part, b * u[1] + part, c * u[2] + part, d * u[3] + part
+    return a, b, c, d
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def rates_at_four(coefs, i, top, u):
+    """Rates over u of the coordinate i at four places."""
+    a = b = c = d = top * coefs[top, i]
+    for k in range(top - 1, 0, -1):
+        part = k * coefs[k, i]
+        a, b, c, d = a * u[0] + part, b * u[1] + part, c * u[2] + part, d * u[3] + part
+    return a, b, c, d
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def sums(x, u, h, top, plant, clock, books, room):
     """Add the work of the drive, the viscous loss and the phasor of a piece up to u to the books, by Gauss points."""
-    n, count, nodes = plant.square.size, points(x * u), room.nodes
-    ledger, wave = books.ledger, nodes[n]
-    for g in range(count):
-        nodes[n + 1, g], wave[g] = u * _PLACE[count, g], room.waves[0, top]
-    for k in range(top - 1, -1, -1):
-        for g in range(count):
-            wave[g] = wave[g] * nodes[n + 1, g] + room.waves[0, k]
-    for i in range(n):
-        for g in range(count):
-            nodes[i, g] = top * room.coefs[top, i]
-        for k in range(top - 1, 0, -1):
-            for g in range(count):
-                nodes[i, g] = nodes[i, g] * nodes[n + 1, g] + k * room.coefs[k, i]
-    for g in range(count):
-        weight, push, loss = plant.mass * u * _WEIGHT[count, g], 0.0, 0.0
+    n, count, ledger, nodes = plant.square.size, points(x * u), books.ledger, room.nodes
+    work, lost, passed_by = 0.0, 0.0, 0.0
+    for g in range(0, count, 4):  # four points at a time in registers
+        place = (u * _PLACE[count, g], u * _PLACE[count, g + 1], u * _PLACE[count, g + 2], u * _PLACE[count, g + 3])
+        weight = _WEIGHT[count, g:g + 4]
+        wave = at_four(room.waves[0], 0, top, place)
+        push = (0.0, 0.0, 0.0, 0.0)
         for i in range(n):
-            push -= plant.base[i] * nodes[i, g]
-            if plant.coupled:
+            rate = rates_at_four(room.coefs, i, top, place)
+            push = (push[0] - plant.base[i] * rate[0], push[1] - plant.base[i] * rate[1],
+                    push[2] - plant.base[i] * rate[2], push[3] - plant.base[i] * rate[3])
+            nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[i, 3] = rate
+            if not plant.coupled:
+                lost += plant.damping[i, i] * (weight[0] * rate[0]**2 + weight[1] * rate[1]**2 + weight[2] * rate[2]**2
+                                               + weight[3] * rate[3]**2)
+        if plant.coupled:
+            for i in range(n):
                 for j in range(n):
-                    loss += nodes[i, g] * plant.damping[i, j] * nodes[j, g]
-            else:
-                loss += plant.damping[i, i] * nodes[i, g]**2
-        ledger[0] += weight * push * wave[g]
-        ledger[1] += weight * loss / h
-        ledger[2] += weight * abs(push * wave[g])
+                    for k in range(4):
+                        lost += weight[k] * nodes[i, k] * plant.damping[i, j] * nodes[j, k]
+        power = (weight[0] * push[0] * wave[0], weight[1] * push[1] * wave[1], weight[2] * push[2] * wave[2],
+                 weight[3] * push[3] * wave[3])
+        work += power[0] + power[1] + power[2] + power[3]
+        passed_by += abs(power[0]) + abs(power[1]) + abs(power[2]) + abs(power[3])
+    ledger[0] += plant.mass * u * work
+    ledger[1] += plant.mass * u * lost / h
+    ledger[2] += plant.mass * u * passed_by
     cycle = int(clock.now[0])
     if books.wanted[cycle] == 1.0:
         for g in range(count):
-            at = clock.now[1] + h * nodes[n + 1, g]
+            share = u * _PLACE[count, g]
+            at = clock.now[1] + h * share
             out, angle = 0.0, 2 * pi * at / clock.period[0]
             for i in range(n):
-                out += plant.output[i] * value(room.coefs[:, i], 0, top, nodes[n + 1, g])
+                out += plant.output[i] * value(room.coefs[:, i], 0, top, share)
             out *= 2 * u * h * _WEIGHT[count, g] / clock.period[0]
             books.phasors[cycle, 0] += out * cos(angle)
             books.phasors[cycle, 1] -= out * sin(angle)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def write(row, motion, span, theta, first, plant, table, memory, clock):
     """A row of a piece as it begins: time, span, phase, segment, what begins it, cycle, then z, v, then of every
     interface force, springs, share that slips, its limit, slip, work, loss, direction."""
@@ -210,7 +235,7 @@ def write(row, motion, span, theta, first, plant, table, memory, clock):
         row[at + 7] = memory.way[f]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def advance(u, h, top, motion, plant, table, memory, clock, books, room):
     """Move coordinates, slides and elements to u, with the energies that the elements take; whether the output passes
     the travel."""
@@ -242,7 +267,7 @@ def advance(u, h, top, motion, plant, table, memory, clock, books, room):
     widen(out, clock, books)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def widen(out, clock, books):
     """Take an output [m] into the extremes of its cycle."""
     cycle = int(clock.now[0])
@@ -250,7 +275,7 @@ def widen(out, clock, books):
     books.extremes[cycle, 1] = max(books.extremes[cycle, 1], out)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def stored(motion, plant, table, memory):
     """Energy of the modes and of the elements [J]."""
     out = 0.0
@@ -262,7 +287,21 @@ def stored(motion, plant, table, memory):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def wait(motion, plant, table, memory):
+    """A little longer [s] than until the next element yields, by the speeds of the slides."""
+    out = 1e300
+    for f in range(plant.faces.shape[0]):
+        speed = 0.0
+        for i in range(plant.square.size):
+            speed += plant.faces[f, i] * motion[1, i]
+        gap = threshold(f, 1.0 if speed > 0 else -1.0, table, memory) - memory.place[f]
+        if speed * gap > 0:
+            out = min(out, gap / speed)
+    return 1.3 / REACH * out
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def output_of(motion, plant):
     """Motion of the output [m]."""
     out = 0.0
@@ -271,7 +310,7 @@ def output_of(motion, plant):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def happen(what, face, sign, plant, table, memory, clock):
     """Change the elements, and note what stands still, as the event asks."""
     if what == YIELDS:
@@ -279,7 +318,7 @@ def happen(what, face, sign, plant, table, memory, clock):
     elif what == TURNS:
         turn(face, memory)
         clock.rest[face] = 1.0
-        if plant.along:
+        if plant.along == face:
             clock.rest[plant.faces.shape[0]] = 1.0
     elif what == OUTPUT_TURNS:
         clock.rest[face] = 1.0
@@ -287,7 +326,7 @@ def happen(what, face, sign, plant, table, memory, clock):
         memory.force[face] = carried(face, table, memory)[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def passed(top, plant, motion, room, travel, u):
     """u at which the output, monotone up to `u`, passes +-travel [m]; NONE if it does not."""
     faces = plant.faces.shape[0]
@@ -299,7 +338,7 @@ def passed(top, plant, motion, room, travel, u):
     return crossing(poly, top, (travel if step > 0 else -travel) - here, u, room.polys[faces])
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def march(stop, motion, plant, table, memory, clock, books, room, rows):
     """Run from the clock's time to `stop` (cycle, offset [s]).
 
@@ -318,7 +357,7 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
         for f in range(faces):
             room.springs[f] = tangent(f, table, memory)[0]
         rate = max(fastest(plant, room.springs), segment[RATE], 1 / clock.period[0])
-        h = min(REACH / rate, left)
+        h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
         whole = h == left
         top = powers(rate * h)
         drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
@@ -335,8 +374,9 @@ def march(stop, motion, plant, table, memory, clock, books, room, rows):
                 write(rows[used], motion, u * h, theta, first, plant, table, memory, clock)
                 used += 1
             sums(rate * h, u, h, top, plant, clock, books, room)
-            for f in range(faces + 1):
-                clock.rest[f] = 0.0
+            if u > AT_ONCE:
+                for f in range(faces + 1):
+                    clock.rest[f] = 0.0
             if whole and u == 1.0:
                 advance(u, h, top, motion, plant, table, memory, clock, books, room)
                 arrive(clock, stop, left)

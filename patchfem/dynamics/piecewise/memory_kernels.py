@@ -9,10 +9,10 @@ same, whatever the number of elements. Twin: elements one by one, in the tests.
 
 from numba import njit
 
-from ...friction.flags_kernels import LEAN
+from ...friction.flags_kernels import FAST, LEAN
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def threshold(face, way, table, memory):
     """Slide [m] at which the next element of an interface slips in the direction `way`; infinite where all slip."""
     first, top = memory.slipping[face], memory.depth[face] - 1
@@ -21,7 +21,7 @@ def threshold(face, way, table, memory):
         memory.at[face, top] if first < table.count[face] else way * 1e300
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def give_way(face, way, table, memory):
     """Let the next element slip in the direction `way`, or the whole innermost group that had slipped this way."""
     top = memory.depth[face] - 1
@@ -32,7 +32,7 @@ def give_way(face, way, table, memory):
         memory.depth[face] = top
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def turn(face, memory):
     """Stop all elements that slip: they stay one group, stretched to their yield slides."""
     if memory.slipping[face] == 0:
@@ -46,7 +46,7 @@ def turn(face, memory):
     memory.way[face] = 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def carried(face, table, memory):
     """(force [N], elastic energy [J]) of the elements of an interface, group by group."""
     first, place = memory.slipping[face], memory.place[face]
@@ -63,7 +63,7 @@ def carried(face, table, memory):
     return force, 0.5 * energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def tangent(face, table, memory):
     """(stiffness [N/m] of the elements that hold, share of the friction limit of those that slip, their limit [N])."""
     first, all_of = memory.slipping[face], table.count[face]

@@ -15,8 +15,8 @@ class Plant(NamedTuple):
 
     square: (n,) omega^2 [1/s2]; damping: (n, n) D [1/s], coupled: whether it is more than its diagonal; base, output:
     (n,); faces: (i, n); mass [kg]; reach: (i,) |face|^2/mass [1/kg], how much a spring there adds to a square of a
-    rate; square_most, damping_most: norms of the modes' own; along: 1 where the output moves as the first interface
-    does.
+    rate; square_most, damping_most: norms of the modes' own; along: number of an interface that
+    moves as the output does, -1 where none does.
     """
 
     square: np.ndarray
@@ -36,11 +36,11 @@ def plant_of(modes: ModalBasis) -> Plant:
     """The Plant of a basis."""
     damping, faces = np.array(modes.dampers, float), np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
-    along = len(faces) == 1 and bool(np.abs(np.outer(faces[0], output) - np.outer(output, faces[0])).max() == 0)
+    along = next((k for k, face in enumerate(faces) if not np.any(np.outer(face, output) - np.outer(output, face))), -1)
     coupled = bool(np.any(damping != np.diag(np.diag(damping))))
     return Plant(np.array(modes.omega, float)**2, np.ascontiguousarray(damping), np.array(modes.base, float),
                  np.ascontiguousarray(faces), output, (faces**2).sum(axis=1) / modes.mass, float(modes.mass),
-                 float(modes.omega.max()**2), float(np.linalg.norm(damping, 2)), int(coupled), int(along))
+                 float(modes.omega.max()**2), float(np.linalg.norm(damping, 2)), int(coupled), along)
 
 
 class Clock(NamedTuple):
@@ -109,7 +109,7 @@ def _lines(record) -> list:
 
 class Room(NamedTuple):
     """Room of the loop: coefs (terms, n), waves (3, terms) of the drive, polys (i + 3, terms), pull and springs (i,),
-    nodes (n + 5, 16) of the sums, hulls of the search for roots."""
+    nodes (n, 4) of the sums, hulls of the search for roots."""
 
     coefs: np.ndarray
     waves: np.ndarray
@@ -123,9 +123,9 @@ class Room(NamedTuple):
 def room_of(plant: Plant) -> Room:
     """Fresh Room for a Plant."""
     faces, n = plant.faces.shape
-    wide = series.MOST + 2
+    wide = series.MOST + 5
     return Room(np.zeros((wide, n)), np.zeros((3, wide)), np.zeros((faces + 3, wide)), np.zeros(faces), np.zeros(faces),
-                np.zeros((n + 5, 16)), np.zeros((series.DEEP + 2, series.WIDE)))
+                np.zeros((n, 4)), np.zeros((series.DEEP + 2, series.WIDE)))
 
 
 class Books(NamedTuple):
