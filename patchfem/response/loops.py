@@ -8,7 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .measures import ROUND
+
 CLOSE = 1e-9  # of a period: nearer samples are the two sides of an event
+MOVES = 1e-3  # of the largest step of the slide: a rest has ended, whatever round-off moved in it
 
 
 class Turn(NamedTuple):
@@ -66,11 +69,11 @@ def _turn(time, y, v, near: float) -> tuple:
 
 def _beside(slide, force, at: int, value: float) -> float | None:
     """Mean of the forces at the last sample before and the first after a rest at the slide `value`, or None."""
-    rest = 1e-9 * np.ptp(slide)  # a sample apart from an event is 1e-5 of the range away, at 400 a cycle
-    away = np.abs(slide - value) > rest
-    away[at] = False
-    before, after = np.flatnonzero(away[:at]), np.flatnonzero(away[at + 1:])
-    return float(force[before[-1]] + force[at + 1 + after[0]]) / 2 if before.size and after.size else None
+    step = np.abs(np.diff(slide))
+    moves = step > MOVES * step.max(initial=0.0)
+    moves &= np.maximum(np.abs(slide[1:] - value), np.abs(slide[:-1] - value)) > ROUND * np.abs(slide).max(initial=0.0)
+    before, after = np.flatnonzero(moves[:at]), np.flatnonzero(moves[at:])
+    return float(force[before[-1]] + force[at + after[0] + 1]) / 2 if before.size and after.size else None
 
 
 def half_range(turns) -> float:
