@@ -10,7 +10,6 @@ from ..dynamics.second_book import gap, sampled_work
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
-STILL = 1e-5  # of the largest step of the slide: what a step solve leaves in a stick, 2e-6 seen at 6400 steps a cycle
 
 
 def energy_balance(book: dict) -> float:
@@ -53,7 +52,7 @@ def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     kept = slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
     slid, slide, time = np.abs(np.diff(slip[kept])), np.abs(np.diff(window.slide[kept])), window.time[kept]
-    still = slide <= np.maximum(STILL * slide.max(), ROUND * np.abs(window.slide).max(initial=0.0))
+    still = slide <= ROUND * np.abs(window.slide).max(initial=0.0)
     above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SHARE
     before, after = above[:-1], above[1:]
     rise = np.abs(after - before)

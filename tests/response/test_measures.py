@@ -1,7 +1,7 @@
 """Measures on signals whose answers are known by hand."""
 
 from dataclasses import replace
-from math import asin, cos, pi
+from math import acos, asin, cos, pi
 
 import numpy as np
 import pytest
@@ -79,6 +79,23 @@ def test_exact_slip_with_pauses(floor):
     assert found["slip_amplitude"] == pytest.approx(cos(start) - floor * (pi / 2 - start), rel=1e-6)
     assert found["stick_fraction"] == pytest.approx(2 * level / pi, abs=1 / steps)
     assert found["slip_start_phase"] == pytest.approx(level, abs=1e-6)
+
+
+@pytest.mark.parametrize("amplitude", [1.2, 3.0, 30.0])
+def test_exact_stick_of_an_element_behind_its_spring(amplitude):
+    """A slide A sin with a slider behind a spring of length 1: after every reversal it sticks until the slide has come
+    back by 2, arccos(1 - 2/A) later; between samples to 1/steps."""
+    steps = 2000
+    time, phase = cycles_of(3, steps)
+    slide, slip, stretch = amplitude * np.sin(phase), np.zeros(phase.size), 0.0
+    for k in range(1, phase.size):
+        stretch = min(max(stretch + slide[k] - slide[k - 1], -1.0), 1.0)
+        slip[k] = slide[k] - stretch
+    late = slice(steps, None)
+    found = measures.slip_measures(response(time[late], slip=slip[late], slide=slide[late]), DRIVE, steps)
+    turn = acos(1 - 2 / amplitude)
+    assert found["stick_fraction"] == pytest.approx(turn / pi, abs=1 / steps)
+    assert found["slip_start_phase"] == pytest.approx((pi / 2 + turn) % pi, abs=2 * pi / steps)
 
 
 def test_exact_slip_of_a_resting_and_of_a_sliding_interface():

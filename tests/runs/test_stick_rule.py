@@ -1,0 +1,86 @@
+"""The stick fraction and the phase of the first slip: one rule, by event times and by samples."""
+
+from math import pi
+
+import pytest
+
+from patchfem.runs.plan import plan
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+SCENE = """\
+[normal]
+load = "0.8 N"
+[friction]
+{law}
+static = 1.0
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "a"
+frequency = "{own} Hz"
+damping = 0.02
+slide = 1.0
+{more}
+[drive]
+kind = "force"
+frequency = "{drive} Hz"
+force = "1 N"
+cycles = {cycles}
+"""
+SECOND = '[[structure.mode]]\nname = "b"\nfrequency = "0.55 Hz"\ndamping = 0.02\nslide = 0.4\nbase = 0.0\noutput = 0.2'
+
+
+def text(law, omega, more="", cycles=20):
+    return SCENE.format(law=law, more=more, own=0.5 / pi, drive=omega / (2 * pi), cycles=cycles)
+
+
+def both(scene, steps: int) -> list:
+    """(stick fraction, phase) by the engine of events and by the march, and whether the first was no march."""
+    out = []
+    for more in ("", f'[accuracy]\nmethod = "march"\nsteps_per_cycle = {steps}\n'):
+        found = run(plan(loads(scene + more)), estimate=False)
+        out.append((found.measures["stick_fraction"].value, found.measures["slip_start_phase"].value,
+                    found.extra["engine"]))
+    assert out[0][2] != "march" == out[1][2]
+    return out
+
+
+@pytest.mark.parametrize("law, omega, more", [
+    ('law = "elastic-plastic"\nbond_length = "0.2 m"', 0.7, ""),
+    ('law = "elastic-plastic"\nbond_length = "0.05 m"', 0.5, SECOND)])
+def test_order_stick_by_samples_comes_to_stick_by_events(law, omega, more):
+    """By samples an event lies within its step: 1/steps of a cycle and 2 pi/steps of phase for each, four a cycle."""
+    for steps in (400, 3200):
+        (exact, start, _), (found, phase, _) = both(text(law, omega, more), steps)
+        assert 0.02 < exact < 0.98 and abs(found - exact) < 4 / steps
+        assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
+
+
+NULLS = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", "acceleration_distortion",
+         "slip_start_phase")
+
+
+@pytest.mark.parametrize("drive, reason", [
+    ('kind = "free"\ndisplacement = "3 m"\nduration = "20 s"', "sine"),
+    ('kind = "force"\nwaveform = "step"\nforce = "2 N"\nduration = "20 s"', "sine"),
+    ('kind = "force"\nwaveform = "sweep"\nfrom = "0.1 Hz"\nto = "0.2 Hz"\nrate = "0.002 Hz/s"\nforce = "2 N"', "sine"),
+    ('kind = "force"\nfrequency = "0.1 Hz"\nforce = "2 N"\ncycles = 0.5', "whole cycle")])
+def test_exact_what_a_run_has_not_is_null_with_the_reason(drive, reason):
+    """A stuck release printed a stiffness of 4.5e5 +- 1.1e5 N/m: nothing repeats without a sine."""
+    scene = text('law = "coulomb"', 1.0)
+    found = run(plan(loads(scene[:scene.index("[drive]")] + f"[drive]\n{drive}\n"))).measures
+    for name in NULLS[:4]:
+        assert found[name].value is None and found[name].error is None and reason in found[name].reason, name
+
+
+@pytest.mark.parametrize("load, reason", [("0.8 N", "never sticks"), ("8 N", "holds throughout")])
+def test_exact_a_phase_wants_a_slip_out_of_a_stick(load, reason):
+    """Far above the limit it slides through; below it nothing slips, and the loop has no width."""
+    scene = text('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')
+    found = run(plan(loads(scene))).measures
+    assert found["slip_start_phase"].value is None and reason in found["slip_start_phase"].reason
+    held = load == "8 N"
+    assert found["stick_fraction"].value == held
+    for name in NULLS[:3]:
+        assert (found[name].value is None) is held, name
