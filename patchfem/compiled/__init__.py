@@ -28,7 +28,7 @@ PLAIN = (ast.Constant, ast.Name, ast.Load, ast.Tuple, ast.BinOp, ast.UnaryOp, as
 
 
 def kernel_key() -> str:
-    """Hash of every *kernels.py of the package, the numba version and the kind of CPU."""
+    """Hash of every *kernels.py of the package, the numba version, the kind of CPU and what it can do."""
     digest = hashlib.sha256()
     for source in sorted(HERE.rglob("*kernels.py")):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
@@ -40,9 +40,11 @@ def kernel_key() -> str:
 def _cpu() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
-        return next(line for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
+    except OSError:
         return platform.processor()
+    # the same model offers fewer instructions where a virtual machine hides some
+    found = [line for line in dict.fromkeys(lines) if line.startswith(("model name", "flags", "Features"))]
+    return " ".join(found) or platform.processor()
 
 
 def cache_folder() -> Path:
