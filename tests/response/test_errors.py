@@ -103,8 +103,8 @@ def test_always_runs_of_another_order_have_a_bar_that_holds(order):
 
 
 def test_always_a_measure_that_hardly_changes_knows_what_the_others_do():
-    """The main measures change by 1e-3 of their size without an order; work that stayed by chance has a share of it."""
+    """The main measures change by 1e-3 of their size without an order; a loop area that stayed has a share of it."""
     values = {name: 3.0 for name in MAIN}
     half, quarter = ({name: 3.0 * (1 + gap) for name in MAIN} for gap in (1e-3, -1e-3))
-    half["friction_work"] = quarter["friction_work"] = 3.0 + 1e-9
-    assert step_error(values, half, quarter, 400)["friction_work"] >= 0.2 * 3e-3
+    half["loop_area"] = quarter["loop_area"] = 3.0 + 1e-9
+    assert step_error(values, half, quarter, 400)["loop_area"] >= 0.2 * 3e-3

@@ -8,8 +8,9 @@ import numpy as np
 
 
 class Law:
-    """force(s, v, t), rate(s, v, t): of the state; split(s, v, t): rate of the irreversible part; energy(s), None where
-    it has none; guards(s, v, t): values whose fall through zero ends a stretch; turned: what an event does."""
+    """force(s, v, t), rate(s, v, t): of the state; reversible(s) [m]: what of the slide springs back; split(s, v, t):
+    rate of the rest; energy(s), None where it has none; guards(s, v, t): values whose fall through zero ends a stretch;
+    turned: what an event does."""
 
     size, set_valued, split_by_mode = 1, False, False
 
@@ -34,6 +35,10 @@ class Law:
 
     def energy(self, s):
         return None
+
+    def reversible(self, s) -> float:
+        """What of the slide springs back [m]."""
+        return s[0] if self.size else 0.0
 
 
 class Tanh(Law):
@@ -135,6 +140,9 @@ class BoucWen(Law):
     def split(self, s, v, t):
         return v - self.limit / self.keys["stiffness"] * self.rate(s, v, t)[0]
 
+    def reversible(self, s):
+        return self.limit / self.keys["stiffness"] * s[0]
+
     def guards(self, s, v, t):
         return [self.mode * v, self.side * s[0]]
 
@@ -175,7 +183,7 @@ class Iwan(Law):
         self.top = limit * (1 + beta) / (k * (beta + (chi + 1) / (chi + 2)))
         self.density = k * (chi + 1) / (1 + beta) / self.top**(chi + 1)
         self.last = k * beta / (1 + beta)
-        self.turns = [(0.0, 0.0)]  # (slide, force), the first the virgin state
+        self.turns = [(0.0, 0.0, 0.0)]  # (slide, force, mean stretch), the first the virgin state
 
     def loading(self, u: float) -> float:
         """Force of a first loading to u >= 0."""
@@ -183,23 +191,37 @@ class Iwan(Law):
         inside = u**(chi + 2) / (chi + 2) + u * (self.top**(chi + 1) - u**(chi + 1)) / (chi + 1)
         return self.density * inside + self.last * u
 
-    def tangent(self, u: float) -> float:
+    def stretch(self, u: float) -> float:
+        """Mean stretch of the sliders at a first loading to u, weighted by what each carries at most."""
         chi, u = self.keys["chi"], min(u, self.top)
-        return self.density * (self.top**(chi + 1) - u**(chi + 1)) / (chi + 1) + self.last * (u < self.top)
+        inside = u**(chi + 3) / (chi + 3) + u * (self.top**(chi + 2) - u**(chi + 2)) / (chi + 2)
+        return (self.density * inside + self.last * self.top * u) / self.limit
+
+    def held(self, u: float) -> float:
+        """Rate of that mean stretch over the slide."""
+        chi, u = self.keys["chi"], min(u, self.top)
+        inside = (self.top**(chi + 2) - u**(chi + 2)) / (chi + 2)
+        return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
+
+    def masing(self, s, of, start: int) -> float:
+        """A first loading `of` by the rules of Masing from the last turn, whose own value is turn[start]."""
+        turn, way = self.turns[-1], s[0] - self.turns[-1][0]
+        if len(self.turns) == 1:
+            return np.sign(s[0]) * of(abs(s[0]))
+        return turn[start] + np.sign(way) * 2 * of(abs(way) / 2)
 
     def force(self, s, v, t):
-        at, force = self.turns[-1]
-        if len(self.turns) == 1:
-            return np.sign(s[0]) * self.loading(abs(s[0]))
-        return force + np.sign(s[0] - at) * 2 * self.loading(abs(s[0] - at) / 2)
+        return self.masing(s, self.loading, 1)
+
+    def reversible(self, s) -> float:
+        return self.masing(s, self.stretch, 2)
 
     def rate(self, s, v, t):
         return np.array([v])
 
     def split(self, s, v, t):
-        at = self.turns[-1][0]
-        way = abs(s[0]) if len(self.turns) == 1 else abs(s[0] - at) / 2
-        return v * (1 - self.tangent(way) / self.keys["stiffness"])
+        way = abs(s[0]) if len(self.turns) == 1 else abs(s[0] - self.turns[-1][0]) / 2
+        return v * (1 - self.held(way))
 
     def guards(self, s, v, t):
         out = [self.mode * v]
@@ -212,7 +234,7 @@ class Iwan(Law):
     def turned(self, k, s, v, accel):
         if k == 0:
             if accel * self.mode <= 0:
-                self.turns.append((float(s[0]), float(self.force(s, v, 0.0))))
+                self.turns.append((float(s[0]), float(self.force(s, v, 0.0)), float(self.reversible(s))))
                 self.mode = -self.mode
             return s
         self.turns = self.turns[:-2] if len(self.turns) > 2 else self.turns[:1]

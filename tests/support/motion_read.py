@@ -15,7 +15,7 @@ class Window:
     def __init__(self, motion: Motion, stretches, begin: float, end: float, cycles: int):
         self.motion, self.begin, self.end = motion, begin, end
         borders = np.linspace(begin, end, cycles + 1)
-        columns = {name: [] for name in ("t", "w", "y", "f", "split", "a", "kind")}
+        columns = {name: [] for name in ("t", "w", "y", "f", "split", "back", "a", "kind")}
         self.modes, self.parts = [], []
         for one in stretches:
             if one.times[-1] <= begin or one.times[-1] <= one.times[0]:
@@ -28,7 +28,7 @@ class Window:
                 w = (high - low) / 2 * np.concatenate([[0.0], WEIGHTS, [0.0]])
                 self._take(columns, one, t, w)
         self.t, self.w, self.y = (np.concatenate(columns[name]) for name in ("t", "w", "y"))
-        self.f, self.split, self.a = (np.concatenate(columns[name]) for name in ("f", "split", "a"))
+        self.f, self.split, self.back, self.a = (np.concatenate(columns[name]) for name in ("f", "split", "back", "a"))
         self.stuck = np.concatenate(columns["kind"])
         n, faces = motion.n, motion.plant.faces
         self.q, self.v = self.y[:, :n] @ faces.T, self.y[:, n:2 * n] @ faces.T
@@ -52,6 +52,7 @@ class Window:
         columns["a"].append(np.array([self.acceleration(a, y) for a, y in zip(t, Y)]))
         columns["split"].append(np.array([[law.split(y[part], v, a) for law, part, v in zip(m.laws, m.parts, row)]
                                           for a, y, row in zip(t, Y, rates)]))
+        columns["back"].append(np.array([[law.reversible(y[part]) for law, part in zip(m.laws, m.parts)] for y in Y]))
         columns["kind"].append(np.tile([law.mode == 0 for law in m.laws], (t.size, 1)))
 
     def acceleration(self, t, y) -> float:
@@ -90,9 +91,8 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     sine = s["drive"] in ("sine", "force", "levels")
     for k, law in enumerate(motion.laws):
         tail = f"_{k + 1}" if k else ""
-        part = motion.parts[k]
         out[f"friction_force_peak{tail}"] = w.top(np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k]))
-        slip = _slips(w, law, part, k)
+        slip = w.q[:, k] - w.back[:, k]
         out[f"slip_amplitude{tail}"] = (slip.max() - slip.min()) / 2
         out[f"loop_area{tail}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
         out[f"stick_fraction{tail}"], starts = _stuck(w, law, k)
@@ -114,18 +114,6 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     if sine:
         out |= _periodic(w, motion, period, window)
     return out
-
-
-def _slips(w: Window, law, part, k: int):
-    """Irreversible part of the slide at all nodes."""
-    q = w.q[:, k]
-    if law.size == 0:
-        return q
-    state = w.y[:, part][:, 0]
-    name = w.motion.s["law"]
-    if name == "iwan":
-        return q - w.f[:, k] / law.keys["stiffness"]
-    return q - state * (law.limit / law.keys["stiffness"] if name == "bouc-wen" else 1.0)
 
 
 def _stuck(w: Window, law, k: int) -> tuple:
