@@ -16,12 +16,12 @@ from motion_read import measures
 from motion_reference import Motion
 from motion_scenes import spec, written
 
-from patchfem.core import PatchfemError
+from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.model.model import build
 from patchfem.response.rows import TABLE, of_first
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
-from patchfem.scene.scene import load
+from patchfem.scene.scene import SceneError, load
 
 FINER = 16  # times the steps of the run that stands for the truth
 LONGEST = 90  # seconds of a scene
@@ -77,7 +77,7 @@ def compared(seed: int, folder: Path) -> dict:
     out = {"seed": seed, "law": s["law"], "drive": s["drive"], "rows": []}
     try:
         result = run(load(path))
-    except PatchfemError as error:
+    except (PatchfemError, SceneError, Missing, NotConverged) as error:
         return out | {"refused": str(error)}
     out |= {"engine": result.extra["engine"], "outcome": str(result.outcome),
             "steps": result.extra.get("steps_per_cycle")}

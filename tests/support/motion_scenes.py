@@ -125,7 +125,8 @@ def _contact(r, out: dict) -> None:
     if out["several"]:
         return
     draw = r.random()
-    if draw < 0.06 and out["law"] in ("coulomb", "elastic-plastic", "tanh", "stretch") and out["drive"] != "levels":
+    varies = out["law"] in ("coulomb", "elastic-plastic", "tanh", "stretch") and "cubic" not in out
+    if draw < 0.06 and varies and out["drive"] != "levels":
         out["load_amplitude"], out["load_frequency"] = out["load"] * float(r.uniform(0.1, 0.6)), out["frequency"] / 2
     elif draw < 0.22:
         shear = out["law"] in ("coulomb", "elastic-plastic", "stretch") and r.random() < 0.6

@@ -1,0 +1,57 @@
+"""Do the bars of a motion hold? Random rigs of every law, drive and structure against the truth of `motion_bars`.
+
+`python tests/support/motion_bars.py 5000 300 FILE` is the whole campaign, tests/README.md has its result.
+"""
+
+import numpy as np
+import pytest
+from motion_bars import compared, held, score
+from motion_laws import LAWS
+from motion_scenes import spec, text
+
+from patchfem.scene.scene import loads
+
+FEW = (11, 21, 30, 111)  # exact, in pieces, exact, a march
+
+
+@pytest.mark.parametrize("seed", FEW)
+def test_always_the_bars_of_a_random_rig_hold_the_independent_program(seed, tmp_path):
+    found = compared(seed, tmp_path)
+    assert found["rows"] and found["truth"] == "reference"
+    assert not [row for row in found["rows"] if not held(row)]
+
+
+@pytest.mark.slow
+def test_always_nineteen_of_twenty_bars_of_forty_rigs_hold(tmp_path):
+    """The share that holds; that of bars within five times the true error is a statement on cost, not on truth."""
+    found = score([compared(seed, tmp_path) for seed in range(6000, 6040)])
+    assert found["coverage"] >= 0.95 and found["right"] >= 0.8, found["misses"]
+
+
+def test_always_every_random_scene_is_one():
+    """Two hundred of them are accepted as they are written, and all laws and drives are among them."""
+    specs = [spec(seed) for seed in range(200)]
+    for one in specs:
+        if one["drive"] != "file":  # its record is a file beside the scene
+            loads(text(one))
+    assert {one["law"] for one in specs} >= set(LAWS) | {"order", "report"}
+    assert {one["drive"] for one in specs} == {"sine", "force", "step", "sweep", "levels", "file", "free"}
+
+
+def test_exact_the_sliders_of_the_independent_iwan_law():
+    """Kinked line of two straight pieces for beta without end; slip force and first slope for any; Masing's rule wipes
+    out a minor loop."""
+    keys = {"static": 0.3, "stiffness": 1e6, "chi": -0.4, "beta": 0.5}
+    law = LAWS["iwan"](30.0, **keys)
+    assert law.loading(law.top) == pytest.approx(30.0, rel=1e-12)
+    assert law.loading(1e-12) / 1e-12 == pytest.approx(1e6, rel=1e-3)
+    assert law.loading(2 * law.top) == law.loading(law.top)
+    path, force = [0.8, -0.5, 0.3, -0.5, 0.9], []
+    for end in path:
+        slide = np.array([end * law.top])
+        while [g for g in law.guards(slide, 0.0, 0.0)[1:] if g < 0]:
+            law.turned(1, slide, 0.0, 0.0)
+        force.append(float(law.force(slide, 0.0, 0.0)))
+        law.turned(0, slide, 0.0, -law.mode)
+    assert force[3] == pytest.approx(force[1], rel=1e-12)
+    assert force[4] == pytest.approx(law.loading(0.9 * law.top), rel=1e-12)
