@@ -10,6 +10,7 @@ from .signals import ORDER, TERMS, derivative
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 GRID = np.linspace(0.0, 1.0, 9)
+TOGETHER = 4096  # pieces whose powers are held at once
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -173,6 +174,11 @@ def loop_of(batch: Batch, modes: ModalBasis, live) -> tuple:
 
     (12 k,) each.
     """
+    parts = [_loop_of(batch.cut(slice(k, k + TOGETHER)), modes, live) for k in range(0, len(batch), TOGETHER)]
+    return tuple(np.concatenate(columns) for columns in zip(*parts))
+
+
+def _loop_of(batch: Batch, modes: ModalBasis, live) -> tuple:
     z, v = _nodes(batch)
     tau = batch.span[:, None] * NODES
     face = np.asarray(modes.interfaces, float)[0]

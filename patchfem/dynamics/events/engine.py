@@ -13,7 +13,8 @@ import numpy as np
 from ...core import ModalBasis, NotConverged, PatchfemError, Start
 from .clock import TURN, clock_of
 from .event_list import BORDER, Recorder, kind_of
-from .signals import EPS, ONE, ORDER, TERMS, first_root
+from .following import Follower, sine_series, watched
+from .signals import BERNSTEIN, EPS, ONE, ORDER, TERMS, first_root
 from .stick_sets import NOISE, Entry, StickSet, System, settle
 
 
@@ -47,10 +48,12 @@ class Engine:
     """A run of Coulomb friction from event to event.
 
     static, kinetic: friction forces [N] of every interface, (i,) or one for all, 0 <= kinetic <= static; cycles:
-    length; start: None for rest. PatchfemError for other forces and for an interface that no mode moves.
+    length; start: None for rest; long: whether pieces as long as a slow drive allows are taken where the motion merely
+    follows it (`following`). PatchfemError for other forces and for an interface that no mode moves.
     """
 
-    def __init__(self, modes: ModalBasis, drive, static, kinetic, cycles: float, start: Start | None = None):
+    def __init__(self, modes: ModalBasis, drive, static, kinetic, cycles: float, start: Start | None = None,
+                 long: bool = False):
         faces = np.asarray(modes.interfaces, float)
         self.static = np.broadcast_to(np.asarray(static, float), (len(faces),)).copy()
         self.kinetic = np.broadcast_to(np.asarray(kinetic, float), (len(faces),)).copy()
@@ -63,7 +66,7 @@ class Engine:
         self.limit = self.static[self.live]
         self.clock, self.recorder, self.modes = clock_of(drive, cycles), Recorder(), modes
         self.system = System(modes, self.faces, self.limit, self.kinetic[self.live], self.clock.entries)
-        self.sine = bool(drive.segments)
+        self.sine, self.long, self.follower, self.followers = bool(drive.segments), long, None, {}
         n = modes.omega.size
         self.n = n
         self.z, self.v = (np.zeros(n), np.zeros(n)) if start is None else (np.array(start.z, float),
@@ -136,6 +139,17 @@ class Engine:
                 self.recorder.add(clock.time, clock.theta, int(self.live[c]), what, float(self.held[c]))
         self.signs = signs
         self.orders = dict(self.choice.orders)
+        if self.long and self.sine:
+            self._slowly()
+
+    def _slowly(self) -> None:
+        """Look for long pieces from here on, where the drive is slow beside the modes."""
+        key = self.clock.omega, self.unit
+        if key not in self.followers:
+            self.followers[key] = Follower(self.system, self.clock, self.unit)
+        self.follower = self.followers[key] if self.followers[key].useful else None
+        if self.follower is not None:
+            self.follower.begin()
 
     def _keep(self) -> None:
         """Take the round-off of the stuck slides out of the coordinates."""
@@ -163,36 +177,53 @@ class Engine:
 
     def _piece(self, first: bool) -> tuple:
         """Next Piece and the event at its end: (face, sign of its slip after it as first guess) or None."""
-        clock, flow, n = self.clock, self.flow, self.n
-        span, event = min(self.unit, clock.left), None
-        if flow.frozen and self.sine:
-            coefs = np.zeros((TERMS, n))
+        clock, unit = self.clock, self.unit
+        forced = self.follower.follows(self) if self.follower is not None and not self.flow.frozen else None
+        if self.flow.frozen and self.sine:
+            unit = self.unit if self.follower is None else self.follower.long
+            coefs, span, event = np.zeros((TERMS, self.n)), min(unit, clock.left), None
             wait, face, sign = self._release()
             if wait < span:
                 span, event = wait, (face, sign)
+        elif forced is not None:
+            unit = self.follower.long
+            coefs = forced.coefs(self.push, self.held, clock.amplitude, clock.theta, unit)
+            base = sine_series(clock.amplitude, clock.theta, clock.omega * unit)
+            signals = watched(coefs, unit, base, self.push, self.system, self.flow)
+            span, event = self._next(unit, signals @ BERNSTEIN.T, signals.__getitem__)
         else:
             entry = self._fill()
-            out = flow.flat @ entry
-            coefs = out[:TERMS * n].reshape(TERMS, n)
-            hull = out[TERMS * n:].reshape(-1, TERMS)
-            for c, s in enumerate(self.choice.signs):
-                if self.choice.held[c]:
-                    continue
-                if s == 0:
-                    b = hull[c]
-                    clear = -self.limit[c] < b.min() and b.max() < self.limit[c]
-                else:
-                    clear = hull[c].min() > 0 if s > 0 else hull[c].max() < 0
-                if not clear or (c, 1) in self.orders or (c, -1) in self.orders:
-                    when, sign = self._root(c, s, flow.watch[c] @ entry, span)
-                    if when < span or (when == span and event is None):
-                        span, event = when, (c, sign)
+            out = self.flow.flat @ entry
+            coefs = out[:TERMS * self.n].reshape(TERMS, self.n)
+            span, event = self._next(unit, out[TERMS * self.n:].reshape(-1, TERMS),
+                                     lambda c: self.flow.watch[c] @ entry)
         coefs[0] = self.z
-        drive = (clock.constant, clock.amplitude, clock.omega) if self.sine else clock.drive_now(self.unit)
-        piece = Piece(clock.time, clock.cycle, clock.theta, span, self.unit, coefs, drive, self.signs, self.held,
-                      self.choice.given, self.push, flow, first, event)
+        drive = (clock.constant, clock.amplitude, clock.omega) if self.sine else clock.drive_now(unit)
+        piece = Piece(clock.time, clock.cycle, clock.theta, span, unit, coefs, drive, self.signs, self.held,
+                      self.choice.given, self.push, self.flow, first, event)
         self.orders = {}
         return piece, event
+
+    def _next(self, unit: float, hull, signal) -> tuple:
+        """Span of a piece of `unit` [s], and the event at its end or None.
+
+        hull (i, TERMS): what is watched of every face in Bernstein form; signal(face): its series (TERMS,).
+        """
+        span, event = min(unit, self.clock.left), None
+        for c, s in enumerate(self.choice.signs):
+            if self.choice.held[c]:
+                continue
+            if s == 0:
+                b = hull[c]
+                clear = -self.limit[c] < b.min() and b.max() < self.limit[c]
+            else:
+                clear = hull[c].min() > 0 if s > 0 else hull[c].max() < 0
+            if not clear or (c, 1) in self.orders or (c, -1) in self.orders:
+                when, sign = self._root(c, s, signal(c), span / unit)
+                when *= span
+                if when < span or (when == span and event is None):
+                    span, event = when, (c, sign)
+        return span, event
 
     def _release(self) -> tuple:
         """Next release while nothing can move: (time to it, face, sign), from the phase at which a sine passes the
@@ -214,19 +245,21 @@ class Engine:
                     best = min(best, (wait, c, sign))
         return best
 
-    def _root(self, c: int, sign: int, coefs, span: float) -> tuple:
-        """First event of a face in a piece: (time in the piece, sign guessed after it); (inf, 0) if there is none."""
-        shrink = ONE if span == self.unit else (span / self.unit)**ORDER
+    def _root(self, c: int, sign: int, coefs, share: float) -> tuple:
+        """First event of a face in the first `share` of a series: (part of the share, sign guessed after it).
+
+        (inf, 0) if there is none.
+        """
+        shrink = ONE if share == 1 else share**ORDER
         if sign:
-            found = self._first(coefs * (sign * shrink), self.orders.get((c, sign), 0), 0.0)
-            return (found * span, 0) if found < inf else (inf, 0)
+            return self._first(coefs * (sign * shrink), self.orders.get((c, sign), 0), 0.0), 0
         best = (inf, 0)
         for side in (1, -1):
             margin = coefs * (-side * shrink)
             margin[0] += self.limit[c]
             found = self._first(margin, self.orders.get((c, side), 0), self.limit[c])
             if found < inf:
-                best = min(best, (found * span, side))
+                best = min(best, (found, side))
         return best
 
     @staticmethod

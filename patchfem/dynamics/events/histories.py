@@ -53,7 +53,7 @@ def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: i
     if start is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError("structure.travel: the start lies beyond it; raise travel or start nearer to the middle")
     kept = _Kept(modes, drive, cycles, window, travel)
-    engine, waiting = Engine(modes, drive, static, kinetic, cycles, start), []
+    engine, waiting = Engine(modes, drive, static, kinetic, cycles, start, True), []
     kept.live = engine.live
     for piece in engine.pieces():
         waiting.append(piece)
@@ -204,10 +204,13 @@ class _Kept:
 
 def _largest(series, share) -> float:
     """Largest size of series (k, TERMS) over shares (k,) of their units."""
-    piece, u = batches.turning_points(series, share)
-    every = np.arange(len(series))
-    values = [series[:, 0], batches.values_at(series, every, share), batches.values_at(series, piece, u)]
-    return float(max(np.abs(x).max(initial=0.0) for x in values))
+    top = 0.0
+    for k in range(0, len(series), batches.TOGETHER):
+        part, ends = series[k:k + batches.TOGETHER], share[k:k + batches.TOGETHER]
+        piece, u = batches.turning_points(part, ends)
+        values = [part[:, 0], batches.values_at(part, np.arange(len(part)), ends), batches.values_at(part, piece, u)]
+        top = max(top, *(float(np.abs(x).max(initial=0.0)) for x in values))
+    return top
 
 
 def _shift(batch, gone: float):

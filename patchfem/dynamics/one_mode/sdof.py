@@ -13,7 +13,7 @@ from ..events.event_list import ROOM, EventLog
 from ..events.histories import LEAST, SAMPLES, EventRun
 from . import sdof_kernels
 from .sdof_keep import keep
-from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, response, starts, states
+from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, response, starts, states, stretches
 
 COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
@@ -164,7 +164,9 @@ class _Run:
         full = self._with_corners(self._with_cycle(wide, first), max(0.0, end - max(2, self.window) * self.period))
         rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > first)]
         low, high = np.maximum(rows[:, 0], first) - rows[:, 0], np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0]
-        owner, tau, weight = panels(low, high, block.fastest)
+        part, *ends = stretches(low, high, rows, block)
+        owner, tau, weight = panels(*ends)
+        owner = part[owner]
         z, v, _ = states(tau, rows, owner, block)
         loop = (rows[owner, 0] + tau, weight, block.slide * z, block.slide * v, force(tau, rows, owner, block))
         stored = 0.5 * mass * (self.state[4]**2 + block.w**2 * self.state[3]**2)

@@ -92,12 +92,15 @@ def book_slip(span, direction, theta, push, b, v0, g0, bc, bs, shift, v1, a1, o,
     closed = (beta > 1e-3 * om * om and (beta - om * om)**2 + (alpha * om)**2 > 1e-6 * om**4
               and alpha * alpha < 16 * beta and span * o[6] > 0.7)
     reach, fast = 2.2 / max(om, sqrt(beta)), o[2] + o[3] if o[4] == 1.0 else 0.0
+    slow = beta / fast if fast > 0.0 else 0.0
     turns = abs(push) < abs(b)
     at, v, a, y, sine, cosine = 0.0, v0, g0 - alpha * v0, 0.0, bs, bc
     while at < span:
         end = span
         if not closed:
-            end = min(span, at + (min(2.2 / fast, reach) if at * fast < 40.0 and fast > 0.0 else reach))
+            if fast > 0.0:  # both decays of an overdamped mode die out, the fast one first
+                reach = 2.2 / max(om, fast if at * fast < 40.0 else slow if at * slow < 40.0 else om)
+            end = min(span, at + reach)
         if turns:
             end = min(end, at + _turn(theta + om * at, push, b) / om)
         if end <= at:

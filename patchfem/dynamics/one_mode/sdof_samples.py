@@ -25,9 +25,12 @@ class OneMode:
     drive: object
 
     @property
-    def fastest(self) -> float:
-        """Largest angular frequency [rad/s]."""
-        return max(self.w, float(self.segments[:, 4].max()))
+    def fading(self) -> float:
+        """Time [s] after which the free motion of a slip is round-off; infinite without damping."""
+        slow = self.decay
+        if slow >= self.w:  # the slower of its two rates; at critical damping half, for u exp(-decay u)
+            slow = self.w**2 / (slow + np.sqrt((slow - self.w) * (slow + self.w))) / 2
+        return 40 / slow if slow > 0 else np.inf
 
 
 def turn(angle):
@@ -193,8 +196,26 @@ def response(time, z, v, gain, pushed, block: OneMode) -> Response:
                     block.output * gain + moving, base, pushed, slide)
 
 
-def panels(low, high, fastest: float) -> tuple:
-    """(number of the interval, time, weight) of 12 Gauss points per panel of 1.5 rad, intervals [low, high] (k,)."""
+def stretches(low, high, rows, block: OneMode) -> tuple:
+    """Parts of the intervals [low, high] (k,) of phases rows (k, 10): (number of the interval, from, to, rate [rad/s]).
+
+    A slip moves as fast as mode and drive until its free motion has died out, and a stick as the drive from the first.
+    """
+    om = block.segments[rows[:, 9].astype(int), 4]
+    fades = np.where(rows[:, 3] == 0, -np.inf, block.fading)
+    if not (fades < high).any():
+        return np.arange(len(rows)), low, high, np.maximum(block.w, om)
+    middle = np.clip(fades, low, high)
+    owner, begin, end = np.repeat(np.arange(len(rows)), 2), *(np.stack(pair, axis=1).ravel() for pair in
+                                                            ((low, middle), (middle, high)))
+    rate = np.stack([np.maximum(block.w, om), om], axis=1).ravel()
+    kept = end > begin
+    return owner[kept], begin[kept], end[kept], rate[kept]
+
+
+def panels(low, high, fastest) -> tuple:
+    """(number of the interval, time, weight) of 12 Gauss points per panel of 1.5 rad, intervals [low, high] (k,) with
+    the angular frequencies `fastest`, (k,) or one for all."""
     count = np.maximum(1, np.ceil((high - low) * fastest / 1.5).astype(int))
     owner = np.repeat(np.arange(count.size), count)
     inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
@@ -216,10 +237,12 @@ def peak_force(low, high, rows, block: OneMode) -> float:
 
 def _peak(curve, low, high, rows, block: OneMode) -> float:
     """Largest size of a curve that gives its value, rate and second rate at tau in the phases `owner`."""
-    count = np.maximum(5, np.ceil((high - low) * block.fastest * 8).astype(int) + 1)
+    part, low, high, fastest = stretches(low, high, rows, block)
+    count = np.maximum(5, np.ceil((high - low) * fastest * 8).astype(int) + 1)
     owner = np.repeat(np.arange(count.size), count)
     inside = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
     tau = low[owner] + (high - low)[owner] * inside / (count[owner] - 1)
+    owner = part[owner]
     value, rate, _ = curve(tau, rows, owner, block)
     top = float(np.abs(value).max())
     turn = np.flatnonzero((owner[:-1] == owner[1:]) & (rate[:-1] * rate[1:] < 0)

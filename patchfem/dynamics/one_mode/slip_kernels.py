@@ -9,10 +9,11 @@ of roots.
 `o` below: (beta, alpha, decay, own, kind, om, top) of `oscillator`.
 """
 
-from math import cos, exp, expm1, hypot, inf, sin, sqrt
+from math import acos, atan2, cos, exp, expm1, hypot, inf, sin, sqrt
 
 TERMS = 15  # of the power series: rounding at a reach of 0.3
 REACH = 0.3
+LATE = 0.1  # angle of the drive in a step below which it is slow beside the mode
 
 
 def oscillator(w, decay, om):
@@ -208,6 +209,35 @@ def over_parts(v0, a0, size, bc, bs, o):
     return abs(quick) * fast**4, abs(late) * slow**4, om**5 * size / sqrt(weight)
 
 
+def forced_part(v0, a0, bc, bs, o):
+    """Speed of a slip once the free motion has died out, vc cos(om u) + vs sin(om u): (vc, vs, free, slow).
+
+    v0, a0: speed and acceleration at first. The free speed stays within free exp(-slow u).
+    """
+    beta, alpha, decay, own, kind, om = o[0], o[1], o[2], o[3], o[4], o[5]
+    x, y = beta - om * om, alpha * om
+    weight = x * x + y * y
+    vc, vs = om * (bc * x + bs * y) / weight, om * (bc * y - bs * x) / weight
+    v, a = v0 - vc, a0 - om * vs
+    if kind == 0.0:
+        return vc, vs, hypot(v, (a + decay * v) / own), decay
+    if kind == 1.0:
+        fast = -(decay + own)
+        slow = beta / fast
+        return vc, vs, (abs(a - slow * v) + abs(a - fast * v)) / (slow - fast), -slow
+    return vc, vs, abs(v) + 0.74 * abs(a + decay * v) / decay, 0.5 * decay  # u exp(-decay u/2) <= 2/(e decay)
+
+
+def clear(u, vc, vs, free, om):
+    """Time from u on in which vc cos(om u) + vs sin(om u) stays above `free`; 0 where it is not above it at u."""
+    size, angle = hypot(vc, vs), om * u
+    now = vc * cos(angle) + vs * sin(angle)
+    if now <= free:
+        return 0.0
+    past = atan2(vc * sin(angle) - vs * cos(angle), now)  # since the largest forced speed
+    return max(0.0, (acos(min(1.0, free / size)) - past) / om)
+
+
 def stop(v0, g0, bc, bs, o, limit):
     """First time in (0, limit] at which the speed, positive just after 0, is back at zero; with shift and acceleration
     there.
@@ -224,6 +254,9 @@ def stop(v0, g0, bc, bs, o, limit):
     if o[4] == 1.0:
         quick, late, forced = over_parts(v0, g0 - alpha * v0, size, bc, bs, o)
         rest = late + forced
+    # far below the mode, leaps with the drive alone are worth a look
+    late = stride * om < LATE and beta * alpha > 0.0 and limit > 8 * stride
+    vc, vs, rings, slow = forced_part(v0, g0 - alpha * v0, bc, bs, o) if late else (0.0, 0.0, 0.0, 0.0)
     y, u, v, a, co, so, peak = 0.0, 0.0, v0, g0 - alpha * v0, 1.0, 0.0, 0.0
     for _ in range(200000):  # a guard: a slip that needs more is lost
         j = om * (bc * co - bs * so) - alpha * a - beta * v
@@ -236,6 +269,15 @@ def stop(v0, g0, bc, bs, o, limit):
             if v <= 1e-14 * peak:  # a speed of round-off: this is the end
                 return u, y, a
         peak = max(peak, v)
+        if late and u > 0.0:
+            s = (1.0 - 1e-9) * clear(u, vc, vs, rings * exp(-slow * u) + 1e-13 * peak, om)
+            if s >= limit - u:
+                return -1.0, 0.0, 0.0
+            if s > 4 * stride:
+                u += s
+                co, so = cos(om * u), sin(om * u)
+                y, v, a = moved(u, co, so, v0, g0, bc, bs, o)
+                continue
         h = min(stride, limit - u)
         k = -om * om * (bc * so + bs * co) - alpha * j - beta * a
         m = bend(v, a, size, h, o)

@@ -1,0 +1,120 @@
+"""What the exact engine is expected to cost, the engine that is chosen for it, and that the cost is bounded."""
+
+from dataclasses import replace
+from time import process_time
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.core import Missing
+from patchfem.dynamics.events.engine import Engine
+from patchfem.runs import effort
+from patchfem.runs.rig.engines import engine_of
+from patchfem.runs.rig.exact import forces_of
+from patchfem.structure.drives import Recorded
+
+CHAIN = """[structure]
+masses = ["1 kg", "2 kg"]
+output_mass = 2
+[[structure.spring]]
+between = [1, 0]
+stiffness = "4e5 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "3e5 N/m"
+[[structure.damper]]
+between = [2, 1]
+coefficient = "900 N s/m"
+[[structure.interface]]
+between = [2, 0]
+law = "coulomb"
+static = 0.3
+load = "20 N"
+[drive]
+kind = "base"
+frequency = "{} Hz"
+acceleration = "5 g"
+cycles = 3
+"""
+MODES = """[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+"""
+YAW = """[[structure.mode]]
+name = "yaw"
+frequency = "129 Hz"
+damping = 0.003
+slide = 0.095
+"""
+RUBS = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+SLOW = '[drive]\nkind = "base"\nfrequency = "0.0003404368455286208 Hz"\nacceleration = "5 g"\ncycles = 12\n'
+SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n' \
+    'acceleration = "7 g"\n'
+
+
+def pieces(model) -> int:
+    """Pieces that the general engine takes."""
+    rig = model.rig
+    return sum(1 for _ in Engine(rig.modes, rig.drive, *forces_of(model, None), rig.cycles, rig.start, True).pieces())
+
+
+@pytest.mark.parametrize("text", [CHAIN.format(0.01), CHAIN.format(0.0004), CHAIN.format(40), MODES + YAW + SLOW,
+                                  MODES + RUBS + SWEEP])
+def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
+    model = pf.plan(text).model
+    expected, took = effort.exact_effort(model)[0], pieces(model)
+    assert took / 4 < expected < 4 * took
+
+
+def test_exact_a_linear_rig_under_a_drive_far_below_its_modes():
+    """It took a piece for every second radian of 5e6 cycles of its modes: it never came to an end."""
+    begin = process_time()
+    result = pf.run(MODES + YAW + SLOW)
+    assert process_time() - begin < 20  # 0.15 s on a quiet machine
+    assert result.plan.engine == "exact"
+    w = 2 * np.pi * np.array([143.0, 129.0])
+    wanted = 5 * 9.80665 / w[0]**2  # the output is the first mode's alone
+    assert result.measures["relative_displacement_amplitude"].value == pytest.approx(wanted, rel=1e-9)
+    assert result.measures["energy_balance"].value < 1e-12
+
+
+@pytest.mark.parametrize("frequency", ["0.01 Hz", "0.0003 Hz"])
+@pytest.mark.parametrize("kinetic", [None, 0.2])
+def test_exact_one_mode_under_a_drive_far_below_it(frequency, kinetic):
+    """Stick-slip of a spring: the slide lags by the limit; the energy closes."""
+    text = MODES + RUBS + SLOW.replace("0.0003404368455286208 Hz", frequency).replace("5 g", "18 g")
+    result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
+    model = result.plan.model
+    assert effort.exact_effort(model)[1] < 20
+    limit, k = 0.3 * 26 * 4.4482216152605, 0.884 * (2 * np.pi * 143)**2
+    wanted = 0.884 * 18 * 9.80665 / k - limit / k
+    if kinetic is None:
+        assert result.measures["relative_displacement_amplitude"].value == pytest.approx(wanted, rel=1e-5)
+        assert result.measures["loop_area"].value == pytest.approx(4 * limit * wanted, rel=1e-5)
+    assert result.measures["energy_balance"].value < 1e-12
+
+
+def test_always_a_motion_that_rings_for_ever_is_left_to_the_march():
+    text = MODES.replace("0.003", "0") + RUBS + SLOW.replace("5 g", "18 g")
+    plan = pf.plan(text)
+    assert plan.engine == "march" and effort.exact_effort(plan.model)[1] > 600
+
+
+def test_refuses_an_exact_run_without_end():
+    text = MODES.replace("0.003", "0") + RUBS + SLOW.replace("5 g", "18 g") + '[accuracy]\nmethod = "exact"\n'
+    with pytest.raises(Missing, match=r'drive\.cycles .* accuracy\.method = "march"'):
+        pf.run(text)
+
+
+def test_always_sweeps_and_records_are_exact_where_that_is_affordable():
+    model = pf.plan(MODES + RUBS + SWEEP).model
+    assert engine_of(model).name == "exact"
+    for rows, engine in ((2000, "exact"), (400_000, "march")):
+        time = np.arange(rows) * 1e-5
+        rig = replace(model.rig, drive=Recorded(time, np.sin(900 * time), 1 / 143), waveform="file")
+        assert engine_of(replace(model, rig=rig)).name == engine
