@@ -1,4 +1,5 @@
-"""Exact motion under Coulomb friction: closed form between stops and releases.
+"""Exact motion under Coulomb friction: series between stops and releases, under any drive.
 
-Read `engine` first, then `sdof` for one mode.
+A drive of constants and sines enters by its phase, a sweep or a record by its local series; a drive far below the modes
+by long pieces (`following`). Read `engine` first, then `signals` and `stick_sets`; `sdof` of `one_mode` for one mode.
 """

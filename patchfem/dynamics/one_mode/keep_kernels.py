@@ -52,9 +52,9 @@ def by_points(u0, u1, v, g0, bc, bs, w, o):
     return out
 
 
-def add_phasors(phasors, position, per, z, direction, v, g0, bc, bs, span, o):
+def add_phasors(phasors, position, per, z, direction, v, g0, bc, bs, span, shift, speed, o):
     """Add 2/per times the integral of z exp(-i w t) over a phase to its cycles of phasors (c, 2); position: its start
-    [cycles], z there."""
+    [cycles], z there; shift and speed at its end."""
     w, first = 2 * pi / per, int(position + 1e-12)
     last = max(first, int(position + span / per - 1e-12))
     turn = w * per * (position - first)
@@ -65,17 +65,17 @@ def add_phasors(phasors, position, per, z, direction, v, g0, bc, bs, span, o):
         u1 = span if k == last else (k + 1 - position) * per
         e1 = complex(cos(w * u1), -sin(w * u1))
         part = complex(0.0, z / w) * (e1 - e0)
-        if direction != 0.0 and plain and (u1 - u0) * o[6] > LEAST:
-            if u0 > 0.0:
-                y0, v0, _ = motion(u0, v, g0, bc, bs, o)
+        y1, v1 = shift, speed
+        if direction != 0.0 and k < last:
             y1, v1, _ = motion(u1, v, g0, bc, bs, o)
+        if direction != 0.0 and plain and (u1 - u0) * o[6] > LEAST:
             part += direction * by_parts(u0, u1, e0, e1, y0, y1, v0, v1, g0, bc, bs, w, o)
         elif direction != 0.0:
             part += direction * by_points(u0, u1, v, g0, bc, bs, w, o)
         part *= start
         phasors[k, 0] += part.real
         phasors[k, 1] += part.imag
-        u0, e0 = u1, e1
+        u0, e0, y0, v0 = u1, e1, y1, v1
 
 
 def listed_event(events, memo, time, theta, interface, what, slide):
@@ -86,7 +86,7 @@ def listed_event(events, memo, time, theta, interface, what, slide):
 
 
 def keep(rows, mode, segments, clock, phasors, events, memo):
-    """Take in phases `rows` (r, 10) of `sdof_kernels.march`.
+    """Take in consecutive phases `rows` (r, 10) of `sdof_kernels.march`.
 
     mode: (w, decay); clock: (cycle's length, slide per coordinate, 1 where there is friction). Adds to phasors (c, 2),
     per cycle; writes changes of direction and of segment to events (e, 5): time, phase, interface, what, slide; memo
@@ -103,7 +103,11 @@ def keep(rows, mode, segments, clock, phasors, events, memo):
         if direction != 0.0:
             shift, speed, _ = motion(0.5 * span, v, g0, bc, bs, o)
         memo[3] = max(memo[3], v * v + beta * z * z, speed * speed + beta * (z + direction * shift)**2)
-        add_phasors(phasors, time / per, per, z, direction, v, g0, bc, bs, span, o)
+        if k + 1 < rows.shape[0]:  # the next phase begins where this one ends
+            shift, speed = direction * (rows[k + 1, 4] - z), rows[k + 1, 5]
+        elif direction != 0.0:
+            shift, speed, _ = motion(span, v, g0, bc, bs, o)
+        add_phasors(phasors, time / per, per, z, direction, v, g0, bc, bs, span, shift, speed, o)
         if span > 0.0:
             if s != memo[2]:
                 listed_event(events, memo, time, theta, -1.0, BORDER, 0.0)
