@@ -82,7 +82,8 @@ def exact_effort(model: Model) -> tuple:
     """
     rig, modes = model.rig, model.rig.modes
     drive, n, faces = rig.drive, modes.omega.size, len(modes.interfaces)
-    damper = float(np.max(2 * modes.zeta * modes.omega) if modes.damping is None else np.linalg.norm(modes.damping, 2))
+    damper = float(np.max(2 * modes.zeta * modes.omega) if modes.damping is None else
+                   np.linalg.norm(modes.damping, 2 if n <= MANY else inf))
     rate = (damper + sqrt(damper**2 + 4 * float(modes.omega.max())**2)) / 2
     ringing, events = rate * drive.period, _events(model, rate * drive.period)
     slow = ringing > 20
