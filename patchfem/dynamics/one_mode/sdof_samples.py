@@ -26,9 +26,9 @@ class OneMode:
 
     @property
     def fading(self) -> float:
-        """Time [s] after which the free motion of a slip is round-off; infinite without damping."""
-        slow = self.decay
-        if slow >= self.w:  # the slower of its two rates; at critical damping half, for u exp(-decay u)
+        """Time [s] after which the free motion of a slip is round-off; infinite without damping or spring."""
+        slow = self.decay if self.w else 0.0
+        if slow >= self.w > 0:  # the slower of its two rates; at critical damping half, for u exp(-decay u)
             slow = self.w**2 / (slow + np.sqrt((slow - self.w) * (slow + self.w))) / 2
         return 40 / slow if slow > 0 else np.inf
 
