@@ -1,11 +1,16 @@
 """What a run keeps of its motion, and how it is said to have ended, for every engine and drive."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
 from patchfem.core import G_N, Outcome
+from patchfem.model.model import build
 from patchfem.runs.plan import plan
+from patchfem.runs.rig.march import run_march
+from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -170,3 +175,21 @@ def test_exact_rising_levels_do_not_grow():
     text = MODE.replace("0.003", "0.5") + LEVELS.replace('"3 g", "6 g"', sizes).replace("15", "2")
     found = run(plan(loads(text)), estimate=False)
     assert found.outcome == "transient"
+
+
+@pytest.mark.parametrize("text", [
+    TANH + MODE + SINE.replace("cycles = 30", "cycles = 25.5"), TANH + MODE + SECOND + SWEEP,
+    SOFT + MODE.replace("[structure]", '[structure]\ntravel = "0.9 mm"') + SINE.replace("6 g", "9 g")
+    + '[accuracy]\nmethod = "march"\n',
+], ids=["part of a cycle", "sweep", "travel"])
+def test_exact_a_run_for_an_error_has_the_measures_of_a_whole_one(text):
+    """It keeps nothing from before the last cycles and reads the same from these."""
+    model = build(loads(text))
+    numerics = replace(choose(model), engine="march", steps=100)
+    full, bare = (run_march(model, replace(numerics, whole=whole), None) for whole in (True, False))
+    assert bare.values == full.values and bare.outcome == full.outcome
+    for name in ("time", "output", "force", "slip"):
+        assert np.array_equal(getattr(bare.window, name), getattr(full.window, name)), name
+    assert np.array_equal(bare.amplitudes[-1:], full.amplitudes[-1:])
+    count = bare.response.time.size
+    assert count < full.response.time.size and np.array_equal(bare.response.output, full.response.output[-count:])

@@ -92,41 +92,46 @@ def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float =
 
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
-          start=None, marks=()) -> MarchResult:
+          start=None, marks=(), whole: bool = True) -> MarchResult:
     """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
 
     window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers of
-    whole cycles after which a Mark is kept besides. The outcome is set
-    for travel and where a step missed its residual or the motion is not finite (not_converged, `message` says what);
-    Missing when a bond list overflows.
+    whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from before the
+    last cycles of a run without marks. The outcome is set for travel and where a step missed its residual or the motion
+    is not finite (not_converged, `message` says what); Missing when a bond list overflows.
     """
 
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total = round(cycles * steps_per_cycle)
     last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
     asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
+    whole = whole or bool(asked)
     size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
     while run.done < total and run.outcome is None:
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
-        if len(last) == last.maxlen and samples < MOST_KEPT:
+        if whole and len(last) == last.maxlen and samples < MOST_KEPT:
             pick = _thinned(last[0][1], run)
             kept.append(last[0][1][pick])
             kept_at.append(last[0][0] + pick)
             samples += len(pick)
         last.append((first, rows, work))
-        extremes.append(_extremes(rows, modes, run.prop.dt))
-        phasors.append(_phasor(rows, modes, first, steps_per_cycle))
+        if whole:
+            extremes.append(_extremes(rows, modes, run.prop.dt))
+            phasors.append(_phasor(rows, modes, first, steps_per_cycle))
         if run.done in asked:
             found.append(replace(_mark(run, list(last)[-window:], extremes[-window:]), after=run.fork(run.drive)))
         size = steps_per_cycle
         if progress is not None:
             progress(run.done / total)
     run.check()
+    if not whole:
+        extremes = [_extremes(rows, modes, run.prop.dt) for _, rows, _ in last]
+        phasors = [_phasor(rows, modes, first, steps_per_cycle) for first, rows, _ in last]
     end = _mark(run, list(last)[-window:], extremes)
-    whole, start = _joined(list(last))
-    number = np.concatenate([*kept_at, start + np.arange(len(whole))])
-    full = run.response(np.concatenate([*kept, whole]), number)
+    rows, start = _joined(list(last))
+    number = np.concatenate([*kept_at, start + np.arange(len(rows))])
+    full = run.response(np.concatenate([*kept, rows]), number)
     return MarchResult(full, end.window, end.step_force, end.amplitudes, np.array(phasors), end.ledger, run.outcome,
                        snapshots, end.work, run.done / steps_per_cycle, run.message, tuple(found))
 

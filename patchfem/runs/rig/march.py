@@ -30,7 +30,7 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     begin = perf_counter()
     frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
     done = hub.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
-                     frames, say, progress, rig.start, rig_levels.ends(rig))
+                     frames, say, progress, rig.start, rig_levels.ends(rig), numerics.whole)
     seconds = perf_counter() - begin
     done = joined(done, patch) if rig.strips_slide_apart else done
     return _Read(model, numerics, patch, contact).solution(done, seconds, {"reduce": reduced, "load": loaded})

@@ -21,7 +21,8 @@ LEAST_KEPT = 100  # samples of a run that has no cycles
 @dataclass(frozen=True, slots=True)
 class Numerics:
     """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
-    how bonds are summed, None: by the tolerance and the steps."""
+    how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
+    the last cycles, which a run for an error need not."""
 
     engine: str
     steps: int
@@ -31,6 +32,7 @@ class Numerics:
     per_point: bool
     pinned: frozenset
     choice: object = None
+    whole: bool = True
 
 
 def choose(model: Model, per_point: bool = False) -> Numerics:

@@ -131,7 +131,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         return found, numerics, with_errors(found.values) | curve_measures(found.extra)
 
     def solve(variant):
-        return go(model, variant.numerics, variant.patch)
+        return go(model, replace(variant.numerics, whole=False), variant.patch)
 
     space, spent = estimate(solve, found.values, engine.in_space(model, numerics, patch, coarse, found), made)
     while True:
