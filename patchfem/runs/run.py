@@ -83,7 +83,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     seconds["total"] = perf_counter() - begin
     apart = "strip" if model.patch is not None else "interface"
     return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + loose(result),
-                   extra=result.extra | {"notes": notes})
+                   extra=result.extra | {"notes": [*notes, *result.extra.get("notes", [])]})
 
 
 def _unloaded(model: Model) -> bool:

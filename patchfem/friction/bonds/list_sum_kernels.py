@@ -20,6 +20,7 @@ from .list_math_kernels import FAST, fexp, flog, share, tabled
 
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
 SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
+AT_PLACE = 1e-14  # of the path: a slide as near to a place is at it
 FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, seen from the end of a strip
 
 
@@ -359,14 +360,13 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
 def first_bonds(q, path, damage, law):
     """(force [1], energy [m]) per unit mu_s N of the initial bonds, of density m_0 and unstressed at q = 0.
 
+    Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides.
     q, path [m], damage [1]: now; law: `list_numbers.law_numbers`.
     """
     p, eps0, m0, norm = law[0], law[2], law[3], law[4]
-    if m0 == 0 or path <= 0:
+    if m0 == 0 or abs(q) <= AT_PLACE * path:
         return 0.0, 0.0
     if law[1] <= POWER:
-        if q == 0:
-            return 0.0, 0.0
         f = m0 * norm * fexp(p * flog(abs(q) / eps0) - damage)
         return f * np.sign(q), f * abs(q) / (p + 1)
     f = m0 * norm * fexp(p * flog(path / eps0) - path / eps0)

@@ -27,6 +27,7 @@ PIECE = 0.25  # longest Gauss piece in bond lengths
 SLIGHT = 0.1  # strips so short against their distance and the bond length, or of so little growth J, take three points
 MOST_GROWN = 16  # pieces of a strip for its growth, one each e-fold
 FULL_GROWN = 36.0  # growth J after which nothing is left of the length that a bond started with
+AT_PLACE = 1e-14  # of the path since: a slide as near to the place of a cohort is at it
 COLUMNS = ("q", "path", "damage", "growth", "mature", "way", "length", "eps")
 
 
@@ -102,7 +103,8 @@ def _cohorts(state: Strips, which, law: Bonds) -> np.ndarray:
     x, far = (state.now[1] - state.path[which]) / law.length, _size(u)
     stretched = law.reading == "stretch"
     size, harm = (far / law.length, damage) if stretched else (x, x)
-    force = np.where(far == 0, 0.0, np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm
+    at_place = far <= AT_PLACE * (state.now[1] - state.path[which])  # the mean of both sides of a jump
+    force = np.where(at_place, 0.0, np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm
                                            - gammaln(law.order + 1)))
     unit = u / np.where(far > 0, far, 1.0)[:, None]
     return np.column_stack([force[:, None] * unit, force * far / (law.order + 1 if stretched else 1.0)])

@@ -5,7 +5,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
-from ..results.notes import two_books, unripe, warming
+from ..results.notes import of_growth, two_books, unbounded, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import FAR, ended, reach, travelled
 from . import bench
@@ -16,11 +16,8 @@ from .watch import Watch
 def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     """Run a plan of kind bench; arguments as `run.run` has them."""
     model, f = what.model, what.model.friction
-    if has(f.law, "bonds") and f.order < 0 and f.initial_bonds > 0:
-        warnings = [*warnings, "friction.order below 0 with friction.initial_bonds: the traction is infinite at the "
-                    "first instant, so friction peaks depend on the step; set initial_bonds = 0"]
     if has(f.law, "bonds"):
-        warnings = [*warnings, *unripe(model.bonds, model.speed)]
+        warnings = [*warnings, *unbounded(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
             warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
                         "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
@@ -40,9 +37,12 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
-    outcome = ended(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral)
+    outcome, notes = ended(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral), []
+    if has(f.law, "bonds"):
+        peak = fine.values["friction_ratio_peak"] / f.static if f.static > 0 and not model.load_varies else None
+        notes = of_growth(model.bonds, peak)
     return Result(what, outcome, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
-                  {"engine": fine.engine.name, "steps": steps})
+                  {"engine": fine.engine.name, "steps": steps, "notes": notes})
 
 
 def _overhang(asked, patch, fine) -> list:

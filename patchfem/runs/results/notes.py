@@ -8,6 +8,7 @@ from ...core import Outcome
 from ...friction.bonds.parameters import ripening
 
 BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
+BOUND = 1e-3  # share of mu_s N that friction may exceed before a run says so
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -41,6 +42,38 @@ def creeping(law, outcome, found) -> list:
         return []
     return [f"the motion creeps by {drift.value / law.length:.2g} bond lengths a cycle: bonds that are damaged at any "
             "stretch do so under a biased load; friction.breakaway of half the swing of the force over mu N stops it"]
+
+
+def unbounded(law) -> list:
+    """Warning, as a list, of initial bonds of negative order: they pull without a bound in the first instant.
+
+    Bonds that form later never do: grown or not, theirs is at most the share P(p + 1, R/eps_0) of mu_s N.
+    """
+    if law.order >= 0 or law.initial == 0:
+        return []
+    return ["friction.order below 0 with friction.initial_bonds: the traction is infinite at the first instant, so "
+            "friction peaks depend on the step; set initial_bonds = 0"]
+
+
+def of_growth(law, peak: float | None) -> list:
+    """Notes, as a list, on what growing bonds mean.
+
+    peak: largest friction force of the run over mu_s N [1], None where the load changes.
+    """
+    if not law.grows:
+        return []
+    if law.reading == "report":
+        return [] if law.initial == 0 else [
+            "as printed the initial bonds keep the bond length eps_0, whatever the growth of all that form later"]
+    out = []
+    if law.order > 1:
+        out.append(f"order = {law.order:g} with growth bounds no friction: a bond that formed short pulls by the power "
+                   "of its stretch over that length and breaks the later, the longer bonds have grown since; order "
+                   "<= 1 stays near mu_s N")
+    if peak is not None and peak > 1 + BOUND:
+        out.append(f"friction reaches {peak:.3g} mu_s N, as bonds that formed short hold on while the length grows; "
+                   "reading = \"report\" with order <= 0 keeps to mu_s N")
+    return out
 
 
 def two_books(values: dict, engine: str, steps: int | None) -> list:

@@ -16,14 +16,14 @@ from ...slip.fields import element_fields, point_fields
 from ...structure.drive_sizes import slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
-from ..results.notes import creeping, two_books, unripe, warming
+from ..results.notes import creeping, of_growth, two_books, unbounded, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant
 from .levels import with_errors as level_errors
 from .numerics import choose, quadrature_of, refuse_costly
-from .solution import curve_measures
+from .solution import borne, curve_measures
 
 
 def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
@@ -62,7 +62,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if patch is not None:
         fields = rig_fields(model, numerics, patch, raw)
     found |= without_value(found, raw.window, drive, f is not None)
-    extra |= {"book": raw.book, "period": drive.period} | _behind(model, numerics, raw.contact)
+    extra |= {"book": raw.book, "period": drive.period, "notes": _notes(model, patch, raw)}
+    extra |= _behind(model, numerics, raw.contact)
     warnings = [*warnings, *_said(model, patch, raw, outcome, found)]
     warnings = [*warnings, *two_books(found, numerics.engine, extra.get("steps_per_cycle"))]
     warnings = [*warnings, *changing_note(outcome, drive), *raw.notes, *([raw.message] if raw.message else [])]
@@ -83,6 +84,16 @@ def _behind(model, numerics, contact) -> dict:
     return out
 
 
+def _notes(model, patch, raw) -> list:
+    """What the law of a run means, as far as it has to be said."""
+    f = model.friction
+    if f is None or not has(f.law, "bonds"):
+        return []
+    limit = f.static * borne(model, patch)
+    steady = limit > 0 and not model.rig.load_varies
+    return of_growth(model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None)
+
+
 def _said(model, patch, raw, outcome, found) -> list:
     """Warnings of the law and of the load, in this run."""
     f, out = model.friction, warming(model, patch, raw.response, raw.book["friction"])
@@ -91,7 +102,8 @@ def _said(model, patch, raw, outcome, found) -> list:
                f"{0.5493 * f.reference_speed:.3g} m/s"]
     if f is not None and has(f.law, "bonds"):
         law = model.bonds
-        out = [*out, *unripe(law, float(np.abs(raw.window.slide_rate).max())), *creeping(law, outcome, found)]
+        peak = float(np.abs(raw.window.slide_rate).max())
+        out = [*out, *unbounded(law), *unripe(law, peak), *creeping(law, outcome, found)]
     out = [*out, *created_warning(model, raw.book, model.rig.cycles)]
     if patch is not None and model.rig.load_varies:
         out = [*out, *shear_note(model, raw.contact)]
