@@ -42,3 +42,22 @@ def distortion(window, drive) -> float | None:
     if drive.moving:  # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return float(abs(third) / abs(first)) if abs(first) > 0 else None
+
+
+def friction_harmonic(window, modes, drive) -> complex:
+    """First Fourier coefficient [N] of the friction of the one interface, from the balance of every coordinate.
+
+    F1 = m sum_i s_i r_i / sum_i s_i^2 with r = -base a1 - (z'')1 - D (z')1 - omega^2 z1 (3.4) and slide s. It holds
+    what acts within a step as a whole, the blow that ends a slide too. window: Response over whole cycles of a drive
+    that ends as a sine, without forces beside drive and friction.
+    """
+    last = [part for part in drive.segments if part.start < window.time[-1]][-1]
+    time, omega = window.time, last.omega
+    wave = np.exp(-1j * omega * time[[0, -1]])
+    first = np.array([motion_harmonic(time, z, v, omega) for z, v in zip(window.modal.T, window.modal_rate.T)])
+    ends = 2 / (time[-1] - time[0]) * (window.modal[-1] * wave[1] - window.modal[0] * wave[0])
+    rates = ends + 1j * omega * first
+    gains = np.array([acceleration_harmonic(time, z, v, omega) for z, v in zip(window.modal.T, window.modal_rate.T)])
+    push = -1j * last.amplitude * np.exp(1j * (last.phase - omega * last.start))
+    rest = -modes.base * push - gains - modes.dampers @ rates - modes.omega**2 * first
+    return complex(modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide))

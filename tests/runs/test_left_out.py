@@ -153,6 +153,20 @@ def test_exact_the_nearer_of_stop_and_end_of_the_piece_ends_a_growing_motion(tra
     assert ran(text + drive, False).outcome == outcome
 
 
+@pytest.mark.parametrize("law, more, engine", [
+    (COULOMB, "", "exact"), (COULOMB, '[accuracy]\nmethod = "march"\nsteps_per_cycle = 100\n', "march"),
+    (COULOMB.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"'), "", "piecewise"),
+    (COULOMB, '[accuracy]\nmethod = "harmonic"\n', "harmonic")])
+def test_exact_every_engine_and_a_level_in_between_leave_the_piece(law, more, engine):
+    """60 g move the block by 48 mm on a piece of 12.7 mm, after 30 cycles as in the middle one of three levels."""
+    sine = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "60 g"\ncycles = 30\n'
+    found = ran(COATED + law + MODE + sine + more, False)
+    assert found.extra["engine"] == engine and found.outcome == "leaves_contact"
+    if engine != "harmonic":
+        steps = sine.replace('acceleration = "60 g"', 'waveform = "levels"\nlevels = ["5 g", "60 g", "5 g"]')
+        assert ran(COATED + law + MODE + steps + more, False).outcome == "leaves_contact"
+
+
 # ------------------------------------------------------------------------------------- approaches that no load reaches
 @pytest.mark.parametrize("offset", ["5", "-5"])
 def test_refuses_an_approach_whose_middle_opens_as_the_load_grows(offset):

@@ -12,7 +12,8 @@ from ...response import run_events
 from ...response.measures import step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
-from ...structure.drive_sizes import omega_of, peak_speed
+from ...response.spectrum import friction_harmonic, motion_harmonic
+from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
 from .interface import model_of
 from .numerics import quadrature_of
@@ -84,20 +85,27 @@ class _Read:
         energy = book["power"] + book["peak_stored"]
         known["work_check"] = gap(book["sampled"], book["booked"], book["passed"], energy)
         found = measures_of(seen(self.model, self.patch, part.window, extremes, book, self.numerics.steps, drive=drive,
-                                 loop=self._loop(part), ledger=ledger, known=known, jumps=self.jumps,
+                                 loop=self._loop(part, drive), ledger=ledger, known=known, jumps=self.jumps,
                                  still=self.held if self.contact.set_valued else 0.0))
         others = not self.model.rig.strips_slide_apart
         return found | (other_measures(part.window, drive, self.numerics.steps) if others else {})
 
-    def _loop(self, part) -> tuple | None:
-        """Loop of the first interface, or of all strips; the others have their own."""
-        w, drive = part.window, self.model.rig.drive
+    def _loop(self, part, drive) -> tuple | None:
+        """Loop of the first interface, or of all strips; the others have their own.
+
+        Where nothing acts beside drive and friction its harmonics are those of the motion (`friction_harmonic`).
+        """
+        w, rig = part.window, self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
         if len(self.model.rig.names) > 1:
             work = float(part.step_force @ np.diff(w.slide))
         span = w.time[-1] - w.time[0]
         work *= drive.period / span if span > 0 else 0.0
+        alone = len(rig.modes.interfaces) == 1 and not (rig.load_varies or rig.strips_slide_apart or rig.bends)
+        if alone and sinusoidal(drive) and whole(span, drive):
+            slide = motion_harmonic(w.time, w.slide, w.slide_rate, omega_of(drive))
+            return w.slide, slide, friction_harmonic(w, rig.modes, drive), work
         return sampled_loop(w, drive, work, step_harmonic(w.time, part.step_force, omega_of(drive)) if span > 0 else 0j)
 
     def _levels(self, done) -> tuple:

@@ -1,0 +1,99 @@
+"""Harmonics of a motion from uneven samples, of its acceleration where it jumps, and of the friction behind it."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from patchfem.core import BaseSine, Response
+from patchfem.model.model import build
+from patchfem.response import spectrum
+from patchfem.runs.rig.engines import EXACT
+from patchfem.runs.rig.numerics import choose
+from patchfem.scene.scene import loads
+
+OMEGA, PERIOD = 2.0, pi
+
+
+def uneven(count: int, steps: int):
+    """Times of `count` cycles with both ends, crowded in places, some an ulp apart."""
+    time = np.linspace(0, count * PERIOD, count * steps + 1)
+    times = np.unique(np.concatenate([time, time[3::7] + 0.2 * PERIOD / steps, np.nextafter(time[5::11], 0)]))
+    return times[times <= time[-1]]
+
+
+def test_order_harmonic_of_a_motion():
+    errors = []
+    for steps in (40, 80, 160):
+        t = uneven(3, steps)
+        y = 0.7 + np.sin(OMEGA * t) + 0.4 * np.cos(3 * OMEGA * t)
+        v = OMEGA * (np.cos(OMEGA * t) - 1.2 * np.sin(3 * OMEGA * t))
+        errors.append(abs(spectrum.motion_harmonic(t, y, v, OMEGA) + 1j)
+                      + abs(spectrum.motion_harmonic(t, y, v, 3 * OMEGA) - 0.4))
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.2) and errors[-1] < 1e-7
+
+
+@pytest.mark.parametrize("steps", [8, 100])
+def test_exact_harmonics_of_an_acceleration_that_jumps(steps):
+    """y'' = +-1 by half cycles: 4/(pi n) in every odd harmonic. A parabola in each half is its own cubic."""
+    t = np.unique(np.concatenate([uneven(2, steps), np.arange(5) * PERIOD / 2]))
+    half, part = np.divmod(t, PERIOD / 2)
+    way = 1 - 2 * (half % 2)
+    speed, place = way * (part - PERIOD / 4), way * (part**2 / 2 - PERIOD / 4 * part)
+    for n in (1, 3):
+        found = spectrum.acceleration_harmonic(t, place, speed, n * OMEGA)
+        assert found == pytest.approx(-4j / (pi * n), abs=1e-3 if steps == 8 else 1e-9)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_exact_distortion_with_and_without_a_moving_base(moving):
+    """y'' = 3 sin + 0.5 sin 3 beside a base of 2 sin: 0.5/5, and 0.5/3 under a force."""
+    t = np.linspace(0, 4 * PERIOD, 1601)
+    y = -3 / OMEGA**2 * np.sin(OMEGA * t) - 0.5 / (3 * OMEGA)**2 * np.sin(3 * OMEGA * t)
+    v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
+    zero = np.zeros(t.size)
+    window = Response(t, zero[:, None], zero[:, None], zero, zero, y, v, zero, zero, zero, zero)
+    found = spectrum.distortion(window, BaseSine(2.0, OMEGA, moving))
+    assert found == pytest.approx(0.5 / (5 if moving else 3), rel=1e-7)
+
+
+SCENE = """\
+[normal]
+load = "0.8 N"
+[friction]
+law = "coulomb"
+static = 1.0
+kinetic = {kinetic}
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "a"
+frequency = "0.15915494309189535 Hz"
+damping = 0.02
+slide = 1.0
+[[structure.mode]]
+name = "b"
+frequency = "0.55 Hz"
+damping = 0.02
+slide = 0.4
+base = 0.0
+output = 0.2
+[drive]
+kind = "{kind}"
+frequency = "0.08 Hz"
+{size}
+cycles = 12
+"""
+
+
+@pytest.mark.parametrize("kind, size", [("force", 'force = "1 N"'), ("base", 'acceleration = "1 m/s^2"')])
+@pytest.mark.parametrize("kinetic", [1.0, 0.7])
+def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
+    """Two modes, sticking and sliding, by the event engine: from the motion alone and from the force's own series."""
+    text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
+    model = build(loads(text))
+    found = EXACT.run(model, choose(model), None)
+    w, drive = found.window, model.rig.drive
+    slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)
+    stiffness = (spectrum.friction_harmonic(w, model.rig.modes, drive) / slide).real
+    assert stiffness == pytest.approx(found.values["equivalent_stiffness"], abs=1e-8)
