@@ -8,6 +8,8 @@ from numba.core.options import DefaultOptions
 
 # no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
 LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+# of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
+INNER = LEAN | {flag: True for flag in ("no_cpython_wrapper", "no_cfunc_wrapper") if hasattr(DefaultOptions, flag)}
 FAST = {"reassoc", "contract", "arcp"}
 
 
@@ -21,3 +23,9 @@ def middle(num, mem, e, v, dt):
 def closed(num, mem, e, free, beta):
     """The `closed` of laws whose step has no closed form: (0 [m], 0 [N], False)."""
     return 0.0, 0.0, False
+
+
+@njit(error_model="numpy", **LEAN)
+def knee(num):
+    """The `knee` of laws whose rates have no kink at a speed: 0 [m/s]."""
+    return 0.0

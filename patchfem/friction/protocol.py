@@ -16,6 +16,13 @@ eps [m] besides, the bond length of the step. num[e, 0] is left to the loops. Wh
 more: press in varying loads; at_end(num, e, before, speed, travel) -> (force, slopes over speed and travel) at the end
 of a step in comparison methods; of form "flow" in harmonic balance flow(num, e, z, dq, dt) -> (stretch z [m] after, its
 slopes over z, dq and dt) and pull(num, e, z, v) -> (force, its slopes over z and v).
+
+A law that is smooth between reversals may offer its rates, for integrators of high order: an Element with `sizes`, the
+size of each of the l states y that move with time. turn (3,) holds the direction of the slide, the path [m] to the next
+kink and 1 above, 0 below the speed of the knee; dq [m] is the slide since the motion began. begin(num, mem, way, y) ->
+path to the next kink sets y from the memory; rate(num, mem, turn, dq, v, y, out) -> force [N] writes dy/dt into out;
+shown(num, mem, turn, dq, q, v, y) -> (force, stored energy, irreversible part of q); finish(num, mem, turn, dq, v, y)
+-> energy dissipated [J], or nan, moves the memory; knee(num) -> speed [m/s] at which the rates have a kink, 0 for none.
 """
 
 from typing import NamedTuple
@@ -43,7 +50,8 @@ class Element(NamedTuple):
     start; limit: largest force [N], or the size of the force where none is largest; length [m]: slide over which it
     stretches before it slips, 0 where nothing stretches; bounded: whether no force exceeds the limit. form: what the
     memory is made of, for engines that look inside: "parallel" elements side by side, "points" of bonds, "places" of
-    bonds under the pressure of the lower piece, "speed" alone and no memory, "flow" of one number, or "".
+    bonds under the pressure of the lower piece, "speed" alone and no memory, "flow" of one number, or "". sizes: of the
+    states of its rate form, None where it has none.
     """
 
     kernels: str
@@ -53,3 +61,4 @@ class Element(NamedTuple):
     length: float = 0.0
     bounded: bool = True
     form: str = ""
+    sizes: tuple | None = None

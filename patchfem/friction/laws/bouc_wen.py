@@ -34,7 +34,7 @@ class BoucWen:
         eps."""
         numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
         return Element("friction.laws.bouc_wen_kernels", numbers, np.zeros(1), self.static * load, self.length,
-                       form="flow")
+                       form="flow", sizes=(1.0,))
 
     def start(self, sigma):
         """State (z [1], pressure (m,) [Pa]) before any motion: z = 0 under the pressure sigma (m,) [Pa]."""

@@ -5,14 +5,14 @@ num: limit [N], eps [m], n, s; mem: z. Along the slide x = |dq|/eps, y = z sgn(d
 are turned around by Newton's method on x as an integral over y or w, by a Gauss rule on short pieces.
 """
 
-from math import exp, expm1, log, log1p
+from math import exp, expm1, inf, log, log1p, nan
 
 import numpy as np
 from numba import njit
 
-from ..flags_kernels import LEAN, closed, middle
+from ..flags_kernels import LEAN, closed, knee, middle
 
-__all__ = ["closed", "commit", "flow", "mean", "middle", "pull", "state"]
+__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w
@@ -186,3 +186,35 @@ def pull(num, e, z, v):
     """(force [N] at a stretch z = eps times the z of the law [m], its slopes over the stretch [N/m] and the speed [N
     s/m], 0)."""
     return num[e, 1] / num[e, 2] * z, num[e, 1] / num[e, 2], 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def begin(num, mem, way, y):
+    """Set the rate state z of a motion that begins in the direction `way`; returns the path [m] to z = 0 on unloading,
+    where the rate has a kink, infinite on loading."""
+    y[0] = mem[0, 0]
+    if way * y[0] >= 0:
+        return inf
+    return num[0, 2] * between(0.0, abs(y[0]), num[0, 3], 1 - 2 * num[0, 4], False)[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def rate(num, mem, turn, dq, v, y, out):
+    """Force [N] at z; writes z' [1/s] at the speed v [m/s] into out. turn: direction, path to the kink [m]."""
+    along = turn[0] * y[0]
+    give = 1.0 if turn[1] == inf else 1 - 2 * num[0, 4]
+    out[0] = v / num[0, 2] * (1 - give * max(along if turn[1] == inf else -along, 0.0)**num[0, 3])
+    return num[0, 1] * y[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def shown(num, mem, turn, dq, q, v, y):
+    """(force mu N z [N], stored energy [J], irreversible part q - eps z of the slide [m])."""
+    return num[0, 1] * y[0], 0.5 * num[0, 1] * num[0, 2] * y[0] * y[0], q - num[0, 2] * y[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def finish(num, mem, turn, dq, v, y):
+    """Keep z, 0 at the kink; nan, as only the work tells what is dissipated."""
+    mem[0, 0] = 0.0 if turn[0] * dq >= turn[1] * (1 - 1e-12) else y[0]
+    return nan

@@ -33,7 +33,7 @@ class LuGre:
         numbers = np.concatenate([[0.0], load * share])
         numbers[4] = self.speed
         return Element("friction.laws.lugre_kernels", numbers, np.zeros(1), self.static * load,
-                       self.static / self.stiffness, False, "flow")
+                       self.static / self.stiffness, False, "flow", (self.static / self.stiffness,))
 
     def limit(self, speed: float) -> float:
         """g/N [1] at a speed [m/s]: the steady friction force per newton of load, at least 1e-9 mu_s, as z divides by

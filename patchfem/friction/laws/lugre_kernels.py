@@ -4,14 +4,14 @@ num: stiffness [N/m], kinetic and static force [N], v_s [m/s], micro-damping and
 constant speed of a step z relaxes towards +-g/stiffness over that length of path.
 """
 
-from math import exp
+from math import exp, inf, nan
 
 from numba import njit
 
 from ..bonds.point_kernels import shape
-from ..flags_kernels import LEAN, closed, middle
+from ..flags_kernels import LEAN, closed, knee, middle
 
-__all__ = ["closed", "commit", "flow", "mean", "middle", "pull", "state"]
+__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
 
 
 TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0
@@ -95,3 +95,30 @@ def flow(num, e, z, dq, dt):
     """(z [m] after a slide dq [m] in dt [s] from the stretch z [m], its slopes over z, dq [1] and dt [m/s])."""
     after, _, by_slide, _, kept, by_time = relaxed(num, e, z, dq, dt)
     return after, kept, by_slide, by_time
+
+
+@njit(error_model="numpy", **LEAN)
+def begin(num, mem, way, y):
+    """Set the rate state z [m] of a motion that begins; the path [m] to the next kink is infinite."""
+    y[0] = mem[0, 0]
+    return inf
+
+
+@njit(error_model="numpy", **LEAN)
+def rate(num, mem, turn, dq, v, y, out):
+    """Force [N] at the speed v [m/s] in the direction turn[0]; writes z' [m/s] into out."""
+    out[0] = v - turn[0] * v * y[0] / reach(num, 0, turn[0] * v)[0]
+    return num[0, 1] * y[0] + num[0, 5] * out[0] + num[0, 6] * v
+
+
+@njit(error_model="numpy", **LEAN)
+def shown(num, mem, turn, dq, q, v, y):
+    """(force at the speed v [m/s] [N], stored energy [J], irreversible part q - z of the slide [m])."""
+    return pull(num, 0, y[0], v)[0], 0.5 * num[0, 1] * y[0] * y[0], q - y[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def finish(num, mem, turn, dq, v, y):
+    """Keep z; nan, as only the work tells what is dissipated."""
+    mem[0, 0] = y[0]
+    return nan

@@ -29,7 +29,9 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
     if pattern is None:
         numbers = np.concatenate([[0.0, 1.0], growth_numbers(law), [weight @ sigma], sigma])
         memory = np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0])
-        return Element("friction.laws.stretch_kernels", numbers, memory, limit, law.length, False, "points")
+        grown = (law.length, 1.0, law.length, law.length**2)
+        rates = None if law.grows and law.breakaway else grown if law.grows else ()
+        return Element("friction.laws.stretch_kernels", numbers, memory, limit, law.length, False, "points", rates)
     x, on_lower = (np.asarray(part, float) for part in pattern)
     numbers = np.concatenate([[0.0, area.size], growth_numbers(law), weight, sigma, [x.size], x, np.zeros(area.size), x,
                               on_lower])

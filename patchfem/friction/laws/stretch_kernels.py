@@ -3,17 +3,18 @@
 Every point moves in proportion to its pressure, so one point under 1 Pa stands for all of them. Twin:
 `friction.bonds.recursion.Recursion`. num: 1, the growth (6,) of eq. 2.10 and of the breakaway share, the sum of
 mu_s area pressure/eps_0 over the points [N/m], the pressures [Pa]; mem: bond length [m], then m, z, s2, local slide and
-play.
+play. The rate form between two reversals has no states of its own at a constant bond length, where the bonds are
+exponentials of the slide, and (eps, m, z, s2) where it grows.
 """
 
-from math import exp
+from math import exp, inf, nan
 
 from numba import njit
 
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
 from ..flags_kernels import LEAN, closed
 
-__all__ = ["closed", "commit", "flow", "mean", "middle", "pull", "state"]
+__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage
@@ -82,3 +83,92 @@ def state(num, mem, e, q, v):
     """
     weight, m, z = num[e, WEIGHT], mem[e, 1], mem[e, 2]
     return weight * z, 0.5 * weight * mem[e, 3], mem[e, 4] - z / m if weight * m > 0 else q
+
+
+@njit(error_model="numpy", **LEAN)
+def knee(num):
+    """Speed [m/s] at which the rates of eq. 2.10 have a kink, the floor v_h; 0 where bonds do not grow."""
+    return num[0, GROWTH + 2] if num[0, GROWTH] >= 0 else 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def begin(num, mem, way, y):
+    """Set the rate states y of a motion that begins in the direction `way`; returns the path [m] to the next kink.
+
+    That is the end of the elastic range of a law with breakaway, infinite where none lies ahead.
+    """
+    for k in range(y.size):
+        y[k] = mem[0, k]
+    if num[0, FREE] <= 0:
+        return inf
+    ahead = num[0, FREE] * mem[0, 0] * (1 - way * mem[0, 5])
+    return ahead if ahead > 0 else inf
+
+
+@njit(error_model="numpy", **LEAN)
+def slid(num, mem, turn, dq):
+    """(m, z [m]) after a slide dq [m] in one direction at a constant bond length, from the memory; turn as in
+    `rate`."""
+    m, z, way, eps = mem[0, 1], mem[0, 2], turn[0], mem[0, 0]
+    if turn[1] < inf:
+        return m, z + m * dq
+    x = way * dq / eps
+    kept = exp(-x)
+    return 1 - (1 - m) * kept, z * kept + way * eps * (1 - kept - (1 - m) * x * kept)
+
+
+@njit(error_model="numpy", **LEAN)
+def rate(num, mem, turn, dq, v, y, out):
+    """Force [N] after a slide dq [m] since `begin`, at the speed v [m/s]; writes the rates of y into out (eq. 2.10).
+
+    turn: direction of the slide, path to the kink [m], 1 above the speed of `knee` and 0 below.
+    """
+    weight = num[0, WEIGHT]
+    if y.size == 0:
+        return weight * slid(num, mem, turn, dq)[1]
+    eps, m, z, s2 = y[0], y[1], y[2], y[3]
+    speed = turn[0] * v
+    floor = num[0, GROWTH + 2]
+    heals = num[0, GROWTH] / (max(speed, 0.5 * floor) if turn[2] > 0 else floor)  # half: a stage may overshoot
+    breaks = speed / eps
+    out[0] = heals * (num[0, GROWTH + 3] - eps) + speed / num[0, GROWTH + 1] * (num[0, GROWTH + 4] - eps)
+    out[1] = breaks * (1 - m)
+    out[2] = m * v - breaks * z
+    out[3] = 2 * z * v - breaks * s2
+    return weight * z
+
+
+@njit(error_model="numpy", **LEAN)
+def shown(num, mem, turn, dq, q, v, y):
+    """(force [N], stored energy [J], irreversible part of the slide q [m]) after a slide dq [m] since `begin`."""
+    weight = num[0, WEIGHT]
+    if y.size > 0:
+        m, z, s2 = y[1], y[2], y[3]
+    elif turn[1] < inf:
+        m, z = slid(num, mem, turn, dq)
+        s2 = mem[0, 3] + dq * (mem[0, 2] + z)
+    else:
+        m, z, s2, _ = bond_step(mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0])
+    return weight * z, 0.5 * weight * s2, q - z / m if weight * m > 0 else q
+
+
+@njit(error_model="numpy", **LEAN)
+def finish(num, mem, turn, dq, v, y):
+    """Move the memory over the slide dq [m] since `begin`; returns the energy dissipated [J], or nan where only the
+    work tells."""
+    mem[0, 4] += dq
+    if y.size > 0:
+        for k in range(y.size):
+            mem[0, k] = y[k]
+        return nan
+    if turn[1] < inf:
+        z, m, half = mem[0, 2], mem[0, 1], num[0, FREE] * mem[0, 0]
+        mem[0, 2] = z + m * dq
+        mem[0, 3] += dq * (2 * z + m * dq)
+        at_end = turn[0] * dq >= turn[1] * (1 - 1e-12)
+        mem[0, 5] = turn[0] if at_end else min(max(mem[0, 5] + dq / half, -1.0), 1.0)
+        return 0.0
+    mem[0, 1], mem[0, 2], mem[0, 3], lost = bond_step(mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0])
+    if num[0, FREE] > 0 and dq != 0:
+        mem[0, 5] = turn[0]
+    return 0.5 * num[0, WEIGHT] * lost

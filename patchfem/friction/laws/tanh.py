@@ -22,7 +22,7 @@ class Rate:
         """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form
         "speed"."""
         return Element("friction.laws.tanh_kernels", np.array([0.0, self.static * load, self.speed]), np.zeros(0),
-                       self.static * load, form="speed")
+                       self.static * load, form="speed", sizes=())
 
     def start(self, sigma):
         """State before any motion: the last traction (m,) [Pa], 0 under a pressure sigma (m,) [Pa]."""

@@ -3,13 +3,13 @@
 num: limit [N], v_0 [m/s]; no memory.
 """
 
-from math import tanh
+from math import inf, nan, tanh
 
 from numba import njit
 
-from ..flags_kernels import LEAN, closed, middle
+from ..flags_kernels import LEAN, closed, knee, middle
 
-__all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]
+__all__ = ["at_end", "begin", "closed", "commit", "finish", "knee", "mean", "middle", "rate", "shown", "state"]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -43,3 +43,27 @@ def at_end(num, e, before, speed, travel):
 def state(num, mem, e, q, v):
     """(force at the speed v [m/s] [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
     return creep(v, num[e, 1], num[e, 2])[0], 0.0, q
+
+
+@njit(error_model="numpy", **LEAN)
+def begin(num, mem, way, y):
+    """Nothing to set; the path [m] to the next kink is infinite."""
+    return inf
+
+
+@njit(error_model="numpy", **LEAN)
+def rate(num, mem, turn, dq, v, y, out):
+    """Force [N] of eq. 2.4 at the speed v [m/s]; there are no states."""
+    return creep(v, num[0, 1], num[0, 2])[0]
+
+
+@njit(error_model="numpy", **LEAN)
+def shown(num, mem, turn, dq, q, v, y):
+    """(force at the speed v [m/s] [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
+    return creep(v, num[0, 1], num[0, 2])[0], 0.0, q
+
+
+@njit(error_model="numpy", **LEAN)
+def finish(num, mem, turn, dq, v, y):
+    """There is no memory; nan, as only the work tells what is dissipated."""
+    return nan

@@ -4,9 +4,11 @@ COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 
 
 def chosen(result) -> dict:
-    """Engine, steps per cycle, cycles and window of a run, shear modes or elements behind the pieces' shear, how bonds
-    are summed, and interface nodes, strips and levels of meshes of its patch; a choice that the run did not make is
-    left out."""
+    """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
+    behind the pieces' shear, how bonds are summed, and interface nodes, strips and levels of meshes of its patch.
+
+    A choice that the run did not make is left out.
+    """
     extra, patch, out = result.extra, result.patch, {}
     if (engine := extra.get("engine")) is not None:
         out["engine"] = engine
@@ -14,6 +16,8 @@ def chosen(result) -> dict:
     if steps is not None:
         out["steps_per_cycle"] = int(steps)
     out |= {name: int(extra[name]) for name in COUNTS if extra.get(name) is not None}
+    if (local := extra.get("step_tolerance")) is not None:
+        out |= {"step_tolerance": float(local), "steps": int(extra["steps_taken"])}
     if (summed := extra.get("quadrature")) is not None:
         out["quadrature"] = summed
     if (window := extra.get("window")) is not None:

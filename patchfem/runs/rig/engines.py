@@ -14,10 +14,11 @@ import numpy as np
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
-from ...response.errors import change, step_error
+from ...response.errors import change, step_error, tolerance_error
 from ...scene.rules import methods
 from ..effort import too_long
 from .pieces.costs import seconds_of_pieces, seconds_of_steps
+from .smooth.choice import not_smooth
 
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
@@ -201,8 +202,21 @@ def stated(model: Model, patch, error: float, values: dict, solution) -> dict:
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the harmonic balance: the residual that it leaves, and the change at half the harmonics."""
-    return [Rung((), lambda fine: solution.errors)]
+    """Rungs of what a run itself leaves open: the residual of a balance and the change at half the harmonics, or what
+    samples do not resolve."""
+    return [Rung((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
+
+
+COARSER = 30.0  # times the error of a step
+
+
+def _smooth_in_time(model: Model, numerics, patch) -> list:
+    """Rung of the smooth engine: a run whose steps may make COARSER times the error.
+
+    The error of a run follows that of its steps, `response.errors.tolerance_error`.
+    """
+    wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
+    return [Rung((wider,), tolerance_error)]
 
 
 EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
@@ -210,14 +224,19 @@ PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rung
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
 HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0)
 COMPARED = ("duhamel", "newmark", "euler")
-ENGINES = {one.name: one for one in (EXACT, PIECES, MARCH, HARMONIC, *(
+SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 1e-11)
+ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
     Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space)
     for name in COMPARED))}
-AUTOMATIC = (EXACT, PIECES, MARCH)  # in the order in which they are tried
+AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
 
 
-def engine_of(model: Model) -> Engine:
-    """The engine that a scene names, or the first of AUTOMATIC that lacks nothing."""
+def engine_of(model: Model, per_point: bool = False) -> Engine:
+    """The engine that a scene names, or the first of AUTOMATIC that lacks nothing.
+
+    per_point: bonds are followed at every node, which the smooth engine does not.
+    """
     if model.accuracy.method == "exact" and no_closed_form(model):
         return PIECES
-    return ENGINES.get(model.accuracy.method) or next(one for one in AUTOMATIC if not one.lacks(model))
+    named = ENGINES.get(model.accuracy.method)
+    return named or next(one for one in AUTOMATIC if not (one.lacks(model) or (per_point and one is SMOOTH)))

@@ -34,10 +34,10 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
                      frames, say, progress, rig.start, rig_levels.ends(rig), numerics.whole)
     seconds = perf_counter() - begin
     done = joined(done, patch) if rig.strips_slide_apart else done
-    return _Read(model, numerics, patch, contact).solution(done, seconds, {"reduce": reduced, "load": loaded})
+    return Read(model, numerics, patch, contact).solution(done, seconds, {"reduce": reduced, "load": loaded})
 
 
-class _Read:
+class Read:
     """The measures, outcome and levels of a finished march."""
 
     def __init__(self, model, numerics, patch, contact):

@@ -1,6 +1,6 @@
 """Numerical choices of a coupled run: engine, steps per cycle, shear modes, quadrature, and what they would cost."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
 import numpy as np
@@ -22,7 +22,8 @@ LEAST_KEPT = 100  # samples of a run that has no cycles
 class Numerics:
     """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
     how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
-    the last cycles, which a run for an error need not."""
+    the last cycles, which a run for an error need not; local: relative error that a step of the smooth engine may
+    make."""
 
     engine: str
     steps: int
@@ -33,6 +34,11 @@ class Numerics:
     pinned: frozenset
     choice: object = None
     whole: bool = True
+    local: float = 0.0
+
+    def finer(self):
+        """The choices with twice the steps, or a hundredth of the error of each."""
+        return replace(self, local=0.01 * self.local) if self.local else replace(self, steps=2 * self.steps)
 
 
 def choose(model: Model, per_point: bool = False) -> Numerics:
@@ -41,7 +47,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     per_point: bonds are followed at every node. PatchfemError for a method that cannot do it.
     """
     accuracy, rig, drive = model.accuracy, model.rig, model.rig.drive
-    engine = engine_of(model).name
+    engine = engine_of(model, per_point).name
     window = int(max(1, min(10, rig.cycles // 10)))
     if rig.levels:
         window = min(window, int(rig.level_cycles))
@@ -56,7 +62,12 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     if engine in COMPARED:
         steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Numerics(engine, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
-                    frozenset(pinned))
+                    frozenset(pinned), local=local_of(accuracy.tolerance) if engine == "smooth" else 0.0)
+
+
+def local_of(tolerance: float) -> float:
+    """Relative error of a step of the smooth engine: the energy balance asks for 1e-9 where the tolerance does not."""
+    return float(np.clip(1e-3 * tolerance, 1e-12, 1e-9))
 
 
 def ending(steps: int, cycles: float) -> int:

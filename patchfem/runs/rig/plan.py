@@ -10,6 +10,7 @@ from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
 from .numerics import choose, list_cost, quadrature_of
 from .pieces.costs import pieces, seconds_of_pieces
+from .smooth.choice import smooth_cost
 
 
 def chain(rig) -> dict:
@@ -24,6 +25,8 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         return "exact", *exact_effort(model)
     if numerics.engine == "piecewise":
         return "piecewise", int(pieces(model) * numerics.cycles), seconds_of_pieces(model)
+    if numerics.engine == "smooth":
+        return "smooth", *smooth_cost(model)
     if numerics.engine == "harmonic":
         points = 1 if rig.waveform == "sine" else 120
         return "harmonic", points, 0.3 + 0.05 * points

@@ -25,6 +25,8 @@ from .levels import with_errors as level_errors
 from .numerics import choose, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
 
+FINEST = 1e-12  # error of a step below which round-off rules
+
 
 def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     """Run a plan of kind rig or linear; arguments as `run.run` has them, patch and coarse of its [contact]."""
@@ -47,7 +49,9 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     raw, numerics, found = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
     extra |= raw.extra
     drive = extra.pop("at", drive)
-    if numerics.engine not in ("exact", "piecewise", "harmonic"):
+    if numerics.engine == "smooth":
+        extra |= {"iterations": raw.book["iterations"]}
+    elif numerics.engine not in ("exact", "piecewise", "harmonic"):
         extra |= {"steps_per_cycle": numerics.steps, "iterations": raw.book["iterations"]}
     if raw.levels:
         found |= levels.measures(rig, raw.levels, raw.probe, model.accuracy.tolerance, f is not None, raw.halved)
@@ -159,7 +163,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
             return found, numerics, measures | curve_measures(found.extra)
         made[Variant(numerics, patch)] = found
         spent += found.seconds
-        numerics = replace(numerics, steps=2 * numerics.steps)
+        numerics = numerics.finer()
         found = go(model, numerics, patch, frames, say, progress)
         seconds["march"] = found.seconds
 
@@ -174,6 +178,8 @@ def _enough(model, numerics, found, measures) -> bool:
     """Whether the error of the displacement is met, or the steps cannot be halved again."""
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
     met = main.error <= model.accuracy.tolerance * abs(main.value) + main.floor
+    if numerics.local:
+        return met or numerics.local < FINEST
     return met or "steps_per_cycle" in numerics.pinned or again > MOST_STEPS or again * numerics.cycles > 1e7 \
         or found.outcome is Outcome.EXCEEDS_TRAVEL
 

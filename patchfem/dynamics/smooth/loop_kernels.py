@@ -1,0 +1,301 @@
+"""Steps whose length the error chooses, from one reversal of the slide to the next.
+
+A step ends where the slide stops, where the law has a kink along its path or at a speed, and where the output passes
+its travel. Such an end is found by Newton's method on the length of the step, which is taken anew each time: it is as
+exact as the step itself and needs no extension.
+"""
+
+from math import sqrt
+
+import numpy as np
+from numba import njit
+
+from ...friction.flags_kernels import INNER, LEAN
+from ...friction.laws import stretch_kernels as law
+from . import step_kernels as steps
+from . import watch_kernels as watching
+
+NOTHING, STOP, KINK, KNEE, TRAVEL = range(5)  # what ends a step
+FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
+SLOWER, FASTER = 0.2, 8.0  # bounds of the change of a step
+FORGET = 3.0  # cycles over which a largest value is forgotten
+
+
+@njit(error_model="numpy", **INNER)
+def left(m, what, y, slopes, travel):
+    """(what is left until an end, > 0 before it; its rate [1/s]; its round-off) in a state with its slopes."""
+    n, way = m.rows.shape[1], m.turn[0]
+    q, v = steps.slide_of(m, y)
+    gain = 0.0
+    for i in range(n):
+        gain += m.rows[steps.SLIDE, i] * slopes[n + i]
+    if what == STOP:
+        return way * v, way * gain, 4e-16 * (m.now[steps.CREST_SPEED] + m.now[steps.PACE] * m.now[steps.CREST])
+    if what == KINK:
+        path = way * (q - m.now[steps.ORIGIN])
+        return m.turn[1] - path, -way * v, 1e-15 * (m.now[steps.CREST] + m.turn[1])
+    if what == KNEE:
+        side = 1.0 if m.turn[2] > 0 else -1.0
+        floor = law.knee(m.num)
+        return side * (way * v - floor), side * way * gain, 1e-12 * floor
+    x, w = watching.output_of(m, y)
+    return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
+
+
+@njit(error_model="numpy", **INNER)
+def possible(m, what, travel):
+    """Whether a motion can meet such an end at all."""
+    if what == KINK:
+        return m.turn[1] < np.inf
+    if what == KNEE:
+        return law.knee(m.num) > 0
+    return what == STOP or travel < np.inf
+
+
+@njit(error_model="numpy", **INNER)
+def first_end(m, h, travel, skip):
+    """(what ends the step of h [s] first, guess of the share of it) by cubics through both ends; NOTHING, 1."""
+    found, where = NOTHING, 1.0
+    for what in range(STOP, TRAVEL + 1):
+        if what == skip or not possible(m, what, travel):
+            continue
+        b, rate_b, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
+        if b >= -noise:
+            continue
+        a, rate_a, _ = left(m, what, m.y, m.work[0], travel)
+        a, low, high = max(a, 0.0), 0.0, 1.0
+        p, r = rate_a * h, rate_b * h
+        for _ in range(40):
+            s = 0.5 * (low + high)
+            rest = 1 - s
+            value = rest * rest * (a * (1 + 2 * s) + p * s) + s * s * (b * (3 - 2 * s) - r * rest)
+            if value > 0:
+                low = s
+            else:
+                high = s
+        if found == NOTHING or high < where:
+            found, where = what, high
+    return found, where
+
+
+@njit(error_model="numpy", **INNER)
+def located(m, h, what, share, travel):
+    """Length [s] of the step that ends there, within a step of h [s]; m.work[steps.TRIAL] is the state at its end."""
+    low, high, at = 0.0, h, max(share, 1e-12) * h
+    for turn in range(60):
+        steps.step(m, at)
+        value, rate, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
+        if value > 0:
+            low = at
+        else:
+            high = at
+        new = at - value / rate if rate < 0 else 0.5 * (low + high)
+        if abs(value) <= noise or abs(new - at) <= 2e-16 * (m.now[steps.TIME] + at) or high - low <= 1e-15 * h:
+            break
+        at = new if low < new < high and turn < 20 else 0.5 * (low + high)
+    return at
+
+
+@njit(error_model="numpy", **INNER)
+def dips(m, h):
+    """Share [1] of the step of h [s] at which the speed, > 0 at both ends, has a least value below zero; 0 for none."""
+    a, p, _ = left(m, STOP, m.y, m.work[0], np.inf)
+    b, r, _ = left(m, STOP, m.work[steps.TRIAL], m.work[12], np.inf)
+    if p >= 0 or r <= 0 or a <= 0 or b <= 0:
+        return 0.0
+    p, r = p * h, r * h
+    big, mid = 2 * (a - b) + p + r, 3 * (b - a) - 2 * p - r  # a + p s + mid s^2 + big s^3
+    root = mid * mid - 3 * big * p
+    if root <= 0:
+        return 0.0
+    s = -p / (mid + sqrt(root)) if mid + sqrt(root) != 0 else 0.0
+    if s <= 0 or s >= 1:
+        return 0.0
+    return s if a + s * (p + s * (mid + s * big)) < 0 else 0.0
+
+
+@njit(error_model="numpy", **INNER)
+def enter(m, way):
+    """Begin a motion in the direction `way` from the state as it stands: the law's states, and the slopes there."""
+    n = m.rows.shape[1]
+    q, v = steps.slide_of(m, m.y)
+    m.now[steps.ORIGIN], m.turn[0] = q, way
+    m.turn[1] = law.begin(m.num, m.mem, way, m.y[2 * n:m.y.size - 3])
+    m.turn[2] = 1.0 if way * v > law.knee(m.num) else 0.0
+    steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
+
+
+@njit(error_model="numpy", **INNER)
+def leave(m, k):
+    """End the motion in one direction: move the memory of the law and book what it dissipated."""
+    n, size = m.rows.shape[1], m.y.size
+    q, v, _, before, _ = watching.state_of(m, m.y)
+    lost = law.finish(m.num, m.mem, m.turn, q - m.now[steps.ORIGIN], v, m.y[2 * n:size - 3])
+    if np.isnan(lost):
+        lost = m.y[size - 1] - m.now[steps.LEFT] - before
+        m.now[steps.LEFT] = m.y[size - 1] - before
+    k.tally[watching.LOST] += lost
+
+
+@njit(error_model="numpy", **INNER)
+def heading(m):
+    """Direction of a motion that starts: that of its speed, of its acceleration at rest, or of what comes next."""
+    n, t = m.rows.shape[1], m.now[steps.TIME]
+    v = steps.slide_of(m, m.y)[1]
+    if v != 0:
+        return 1.0 if v > 0 else -1.0
+    steps.slope(m, t, m.y, m.work[0])
+    for look in range(2):
+        gain = 0.0
+        for i in range(n):
+            gain += m.rows[steps.SLIDE, i] * m.work[look, n + i]
+        if gain != 0:
+            return 1.0 if gain > 0 else -1.0
+        if look == 0:
+            steps.slope(m, t + m.now[steps.STEP], m.y, m.work[1])
+    return 1.0
+
+
+@njit(error_model="numpy", **INNER)
+def accept(m, h, k):
+    """Move on by the step of h [s] that stands in m.work[steps.TRIAL]."""
+    n = m.rows.shape[1]
+    fade = 1 - min(h / (FORGET * k.tally[watching.PERIOD]), 1.0)
+    m.now[steps.CREST] *= fade
+    m.now[steps.CREST_SPEED] *= fade
+    for c in range(m.y.size):
+        m.y[c] = m.work[steps.TRIAL, c]
+        m.work[0, c] = m.work[12, c]
+    for i in range(n):
+        m.now[steps.CREST] = max(m.now[steps.CREST], abs(m.y[i]))
+        m.now[steps.CREST_SPEED] = max(m.now[steps.CREST_SPEED], abs(m.y[n + i]))
+    m.now[steps.TIME] += h
+
+
+@njit(error_model="numpy", **INNER)
+def try_step(m, h, tolerance, k):
+    """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
+    for _ in range(60):
+        steps.step(m, h)
+        error = steps.missed(m, h, tolerance)
+        if error <= 1:
+            dip = dips(m, h)
+            if dip == 0:
+                grow = FASTER if error == 0 else min(max(0.9 * error**-0.125, SLOWER), FASTER)
+                return h, h * grow
+            h *= dip
+        else:
+            h *= max(0.9 * error**-0.125, SLOWER) if np.isfinite(error) else SLOWER
+        k.tally[watching.REFUSED] += 1
+    return 0.0, 0.0
+
+
+@njit(error_model="numpy", **INNER)
+def pass_end(m, k, what):
+    """Go on beyond the end of a step: turn around, or into the next part of the law."""
+    n = m.rows.shape[1]
+    if what == STOP:
+        if n == 1:
+            m.y[1] = 0.0  # to the last digit
+        leave(m, k)
+        rows = int(k.tally[watching.TURNS])
+        way = -m.turn[0]
+        enter(m, way)
+        watching.write(m, m.now[steps.TIME], m.y, k.turns[rows])
+        k.tally[watching.TURNS] += 1
+    elif what == KINK:
+        leave(m, k)
+        enter(m, m.turn[0])
+    elif what == KNEE:
+        m.turn[2] = 1 - m.turn[2]
+        steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
+
+
+@njit(error_model="numpy", **INNER)
+def begin(m, k):
+    """Begin a motion from the state as it stands."""
+    n = m.rows.shape[1]
+    for i in range(n):
+        m.now[steps.CREST] = max(m.now[steps.CREST], abs(m.y[i]))
+        m.now[steps.CREST_SPEED] = max(m.now[steps.CREST_SPEED], abs(m.y[n + i]))
+    enter(m, heading(m))
+    k.tally[watching.STORED] = watching.stored(m, m.y)
+    m.now[steps.LEFT] = m.y[m.y.size - 1] - watching.state_of(m, m.y)[3]
+    m.now[steps.BEGUN] = 1.0
+
+
+@njit(error_model="numpy", **INNER)
+def sampled(m, k):
+    """Take the samples that are asked for at the time as it stands."""
+    at = int(k.tally[watching.SAMPLE])
+    while at < k.samples.shape[0] and k.samples[at, 0] <= m.now[steps.TIME]:
+        watching.write(m, m.now[steps.TIME], m.y, k.samples[at])
+        at += 1
+    k.tally[watching.SAMPLE] = at
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def advance(m, k, until, edge, tolerance, travel):
+    """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
+
+    tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals is used up.
+    """
+    end, fresh = min(until, edge), False
+    if m.now[steps.BEGUN] == 0:
+        begin(m, k)
+    if m.now[steps.STOOD] != m.now[steps.PIECE]:  # the drive has changed
+        steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
+        m.now[steps.STOOD] = m.now[steps.PIECE]
+    sampled(m, k)
+    limit = k.tally[watching.DONE] + 1e9
+    while m.now[steps.TIME] < end:
+        if k.tally[watching.TURNS] >= k.turns.shape[0]:
+            return FULL
+        room = end - m.now[steps.TIME]
+        whole = m.now[steps.STEP] >= room * (1 - 1e-9)
+        h, wanted = try_step(m, room if whole else m.now[steps.STEP], tolerance, k)
+        if h <= 1e-16 * end or k.tally[watching.DONE] > limit:
+            return ENDLESS
+        taken = h
+        what, share = first_end(m, h, travel, NOTHING)
+        if what == STOP and fresh and share * h < 1e-13 * k.tally[watching.PERIOD]:
+            m.turn[0] = -m.turn[0]  # it started the other way
+            enter(m, m.turn[0])
+            fresh = False
+            continue
+        while what != NOTHING:
+            taken = located(m, taken, what, share, travel)
+            other, share = first_end(m, taken, travel, what)
+            if other == NOTHING:
+                break
+            what = other
+        steps.extended(m, taken)
+        watching.watch(m, taken, k)
+        accept(m, taken, k)
+        if whole and taken == room:
+            m.now[steps.TIME] = end
+        m.now[steps.STEP] = max(wanted, m.now[steps.STEP]) if whole and h == room else wanted
+        if fresh:
+            m.now[steps.TURNED] = wanted
+            fresh = False
+        if not np.isfinite(m.y[0]):
+            return WILD
+        if what == TRAVEL:
+            return TRAVELLED
+        if what != NOTHING:
+            pass_end(m, k, what)
+            fresh = what == STOP
+            if fresh:
+                m.now[steps.STEP] = min(m.now[steps.TURNED], m.now[steps.STEP])
+    sampled(m, k)
+    return FINISHED
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
+def settled(m, k, row):
+    """Energy of modes and interface [J] as the motion stands; writes its sample into row, and moves the memory of the
+    law to there: for a copy of the motion."""
+    out = watching.stored(m, m.y)
+    watching.write(m, m.now[steps.TIME], m.y, row)
+    leave(m, k)
+    return out

@@ -1,0 +1,177 @@
+"""One Runge-Kutta step of order 8 of the modes, the states of a law and the energies that pass, and its extension.
+
+The state y (n + n + l + 3,) holds coordinates and rates of the modes, the states of the law, and work of the drive,
+viscous loss and friction work [J]. The energies feed nothing and take no part in the choice of the step. The text runs
+with any law that offers its rates (`friction.protocol`).
+"""
+
+from math import sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ...friction.flags_kernels import FAST, INNER
+from ...friction.laws import stretch_kernels as law
+from .tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
+
+TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, KIND, PIECE, MOVES = range(14)  # of now
+OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
+EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
+LEAST = 1e-30  # of a size: at rest everything is as large as this
+SINES, SWEEP, ROWS = range(3)  # of now[KIND]: sines one after the other, a sweep, straight between rows
+
+
+class Moving(NamedTuple):
+    """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
+
+    rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p, 6):
+    of the drive, `waves.Wave`. num, mem of the law, turn (3,) as the law takes it. y (N,): state; work (26, N): slopes
+    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (14,): time [s],
+    length of the next step and of the first after a reversal [s], slide at the start of the motion in this direction
+    [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late, rate of the fastest mode
+    [1/s], 1 once it has begun, piece of the drive for which the first slopes stand, mass [kg], kind of the drive, its
+    piece now, 1 where it moves the base.
+    """
+
+    rows: np.ndarray
+    damping: np.ndarray
+    pieces: np.ndarray
+    num: np.ndarray
+    mem: np.ndarray
+    turn: np.ndarray
+    y: np.ndarray
+    work: np.ndarray
+    now: np.ndarray
+
+
+@njit(error_model="numpy", **INNER)
+def push(m, t):
+    """Drive [m s-2] at the time t [s], by the numbers of its piece as it stands, continued beyond its ends."""
+    row = m.pieces[int(m.now[PIECE])]
+    if m.now[KIND] == SINES:
+        return row[1] + row[2] * sin(row[3] * (t - row[0]) + row[4]) if row[2] != 0 else row[1]
+    if m.now[KIND] == ROWS:
+        return row[1] + row[2] * (t - row[0])
+    # turns and frequency after the time t of a sweep: f = low + rate t, or low exp(rate t) of a logarithmic one
+    low, rate, past = row[1], row[2], t - row[0]
+    if row[5] > 0:
+        growth = np.expm1(rate * past)
+        frequency, turns = low * (1 + growth), low * growth / rate if rate != 0 else low * past
+    else:
+        frequency, turns = low + rate * past, past * (low + 0.5 * rate * past)
+    size = row[3] if row[3] >= 0 else -row[3] * (2 * np.pi * frequency)**2
+    return size * sin(2 * np.pi * turns + row[4])
+
+
+@njit(error_model="numpy", fastmath=FAST, **INNER)
+def slide_of(m, y):
+    """(slide [m], its speed [m/s]) of a state."""
+    q, v, n = 0.0, 0.0, m.rows.shape[1]
+    for i in range(n):
+        q += m.rows[SLIDE, i] * y[i]
+        v += m.rows[SLIDE, i] * y[n + i]
+    return q, v
+
+
+@njit(error_model="numpy", **INNER)
+def slope(m, t, y, out):
+    """Write the slopes of the state y at the time t [s] into out: eq. 3.4 and the rates of the law."""
+    n, energies = m.rows.shape[1], y.size - 3
+    drive, mass = push(m, t), m.now[MASS]
+    q, v = slide_of(m, y)
+    force = law.rate(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, y[2 * n:energies], out[2 * n:energies])
+    work, lost, coupled = 0.0, 0.0, m.damping.size > 0
+    for i in range(n):
+        rate = y[n + i]
+        damped = m.rows[DAMP, i] * rate
+        if coupled:
+            damped = 0.0
+            for j in range(n):
+                damped += m.damping[i, j] * y[n + j]
+        out[i] = rate
+        held = m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[SLIDE, i] * force / mass
+        out[n + i] = -damped - held - m.rows[BASE, i] * drive
+        work -= m.rows[BASE, i] * rate
+        lost += damped * rate
+    out[energies], out[energies + 1], out[energies + 2] = mass * drive * work, mass * lost, force * v
+
+
+@njit(error_model="numpy", fastmath=FAST, **INNER)
+def gathered(m, stage, h, size):
+    """Write the state at a stage of a step of h [s] into m.work[TRIAL], its first `size` entries."""
+    first, share = SHARES[stage, 0], SHARES[stage]
+    for c in range(size):
+        part = first * m.work[0, c]
+        for j in range(BEFORE[stage], stage):
+            part += share[j] * m.work[j, c]
+        m.work[TRIAL, c] = m.y[c] + h * part
+
+
+@njit(error_model="numpy", **INNER)
+def step(m, h):
+    """Write the state after a step of h [s] into m.work[TRIAL], with the slopes on the way; m.work[0] is that at the
+    start."""
+    t, size, last = m.now[TIME], m.y.size, m.work.shape[0] - 14
+    for stage in range(1, last):
+        gathered(m, stage, h, size - 3)
+        slope(m, t + PLACES[stage] * h, m.work[TRIAL], m.work[stage])
+    gathered(m, last, h, size)
+    slope(m, t + h, m.work[TRIAL], m.work[last])
+
+
+@njit(error_model="numpy", **INNER)
+def missed(m, h, tolerance):
+    """Estimate of the error of a step of h [s] over what the tolerance allows, by its estimates of order 5 and 3.
+
+    Coordinates count relative to the largest of late, rates to the fastest, states of the law to their sizes.
+    """
+    n, size = m.rows.shape[1], m.y.size - 3
+    fifth, third = 0.0, 0.0
+    for c in range(size):
+        scale = m.now[CREST] if c < n else m.now[CREST_SPEED] if c < 2 * n else m.work[SIZES, c]
+        high, low = 0.0, 0.0
+        for j in range(12):
+            high += FIFTH[j] * m.work[j, c]
+            low += THIRD[j] * m.work[j, c]
+        top = max(abs(m.y[c]), abs(m.work[TRIAL, c])) if c < 2 * n else 0.0
+        scale = max(scale, top, LEAST)
+        fifth += (high / scale)**2
+        third += (low / scale)**2
+    if not np.isfinite(fifth):
+        return np.inf
+    if fifth == 0 and third == 0:
+        return 0.0
+    return abs(h) * fifth / sqrt((fifth + 0.01 * third) * size) / tolerance
+
+
+@njit(error_model="numpy", fastmath=FAST, **INNER)
+def extended(m, h):
+    """Write the extension of a step of h [s], taken by `step`, beside the slopes; the state at its end stays."""
+    t, size = m.now[TIME], m.y.size
+    for c in range(size):  # the stages overwrite it
+        m.work[EXTENSION + 7, c] = m.work[TRIAL, c]
+    for stage in range(13, STAGES):
+        gathered(m, stage, h, size - 3)
+        slope(m, t + PLACES[stage] * h, m.work[TRIAL], m.work[stage])
+    for c in range(size):
+        m.work[TRIAL, c] = m.work[EXTENSION + 7, c]
+        rise = m.work[TRIAL, c] - m.y[c]
+        m.work[EXTENSION, c] = rise
+        m.work[EXTENSION + 1, c] = h * m.work[0, c] - rise
+        m.work[EXTENSION + 2, c] = 2 * rise - h * (m.work[12, c] + m.work[0, c])
+        for k in range(4):
+            part = INSIDE[k, 0] * m.work[0, c]
+            for j in range(5, STAGES):
+                part += INSIDE[k, j] * m.work[j, c]
+            m.work[EXTENSION + 3 + k, c] = h * part
+
+
+@njit(error_model="numpy", fastmath=FAST, **INNER)
+def between(m, share, out):
+    """Write the state at a share [1] of the step into out, by its extension."""
+    for c in range(m.y.size):
+        value = m.work[EXTENSION + 6, c] * share
+        for k in range(5, -1, -1):
+            value = (value + m.work[EXTENSION + k, c]) * (share if k % 2 == 0 else 1 - share)
+        out[c] = m.y[c] + value

@@ -1,0 +1,215 @@
+"""What is read off a step by its extension: samples, extremes and harmonics of the cycles, peaks of the last ones."""
+
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ...friction.flags_kernels import INNER
+from ...friction.laws import stretch_kernels as law
+from . import step_kernels as steps
+
+GRID = 64  # places of a cycle at which its phasor is summed
+PARTS = 8  # of a step, among which its peaks are looked for
+NEAR = 0.05  # of what a number changes by in a step, by which its peak may lie above the places looked at
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST, SLOTS = range(7)  # of the peaks
+# of Kept.tally
+PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PLACE, WANTED, PERIOD = 0, 6, *range(10, 20)
+
+
+class Kept(NamedTuple):
+    """What a motion leaves behind.
+
+    cycles (4, c): smallest and largest output in every cycle [m], its part at the frequency of the cycle [m]; samples
+    (s, 2 n + 7): time that is asked for, z, z', slide, its speed, force, irreversible slip, energy in the interface,
+    friction work [J]; turns (r, 2 n + 7): the same at reversals. tally (20,): largest |acceleration|, |force|, slip,
+    -slip, output, -output of the last cycles; integrals over them of slide and force times cos and -sin; |work| of the
+    drive, largest stored energy and energy lost to friction [J], steps taken and refused, rows of turns; sample and
+    place of a phasor that come next, 1 where peaks are wanted; period [s]. room (2, N); table (10, 6).
+    """
+
+    cycles: np.ndarray
+    samples: np.ndarray
+    turns: np.ndarray
+    tally: np.ndarray
+    room: np.ndarray
+    table: np.ndarray
+
+
+@njit(error_model="numpy", **INNER)
+def state_of(m, y):
+    """(slide [m], speed [m/s], force [N], stored energy [J], irreversible slip [m]) of a state."""
+    n = m.rows.shape[1]
+    q, v = steps.slide_of(m, y)
+    force, energy, slip = law.shown(m.num, m.mem, m.turn, q - m.now[steps.ORIGIN], q, v, y[2 * n:y.size - 3])
+    return q, v, force, energy, slip
+
+
+@njit(error_model="numpy", **INNER)
+def write(m, t, y, row):
+    """Write the sample of a state at the time t [s] into a row of `Kept.samples`."""
+    n = m.rows.shape[1]
+    row[0] = t
+    for i in range(2 * n):
+        row[1 + i] = y[i]
+    row[2 * n + 1], row[2 * n + 2], row[2 * n + 3], row[2 * n + 5], row[2 * n + 4] = state_of(m, y)
+    row[2 * n + 6] = y[y.size - 1]
+
+
+@njit(error_model="numpy", **INNER)
+def output_of(m, y):
+    """(output [m], its rate [m/s]) of a state."""
+    x, w, n = 0.0, 0.0, m.rows.shape[1]
+    for i in range(n):
+        x += m.rows[steps.OUTPUT, i] * y[i]
+        w += m.rows[steps.OUTPUT, i] * y[n + i]
+    return x, w
+
+
+@njit(error_model="numpy", **INNER)
+def turning(m, k, a, b, rate):
+    """Output [m] where its rate, `rate` at the share a of the step, passes zero before the share b."""
+    out = 0.0
+    for _ in range(60):
+        middle = 0.5 * (a + b)
+        steps.between(m, middle, k.room[0])
+        out, here = output_of(m, k.room[0])
+        if here * rate > 0:
+            a = middle
+        else:
+            b = middle
+        if b - a < 1e-8:  # the output is flat here: its error is the square
+            break
+    return out
+
+
+@njit(error_model="numpy", **INNER)
+def bounds(m, h, k):
+    """Take the step of h [s] into the extremes of its cycles."""
+    t, period = m.now[steps.TIME], k.tally[PERIOD]
+    cycle = min(max(int((t + 0.5 * h) / period), 0), k.cycles.shape[1] - 1)
+    parts = 1 if m.rows.shape[1] == 1 else 4
+    x, w = output_of(m, m.y)
+    low, high = x, x
+    for part in range(1, parts + 1):
+        if part < parts:
+            steps.between(m, part / parts, k.room[0])
+            x1, w1 = output_of(m, k.room[0])
+        else:
+            x1, w1 = output_of(m, m.work[steps.TRIAL])
+        low, high = min(low, x1), max(high, x1)
+        if w * w1 < 0:
+            top = turning(m, k, (part - 1) / parts, part / parts, w)
+            low, high = min(low, top), max(high, top)
+        w = w1
+    k.cycles[0, cycle] = min(k.cycles[0, cycle], low)
+    k.cycles[1, cycle] = max(k.cycles[1, cycle], high)
+
+
+@njit(error_model="numpy", **INNER)
+def marks(m, h, k):
+    """Samples and places of the phasors inside the step of h [s], its end included."""
+    t, period = m.now[steps.TIME], k.tally[PERIOD]
+    end = t + h
+    while k.tally[SAMPLE] < k.samples.shape[0] and k.samples[int(k.tally[SAMPLE]), 0] <= end:
+        j = int(k.tally[SAMPLE])
+        steps.between(m, (k.samples[j, 0] - t) / h, k.room[0])
+        write(m, k.samples[j, 0], k.room[0], k.samples[j])
+        k.tally[SAMPLE] += 1
+    while k.tally[PLACE] * period / GRID <= end:
+        number = int(k.tally[PLACE])
+        steps.between(m, min(max((number * period / GRID - t) / h, 0.0), 1.0), k.room[0])
+        x = output_of(m, k.room[0])[0]
+        turn, cycle = 2 * pi * (number % GRID) / GRID, number // GRID
+        if cycle < k.cycles.shape[1]:
+            k.cycles[2, cycle] += x * cos(turn) * 2 / GRID
+            k.cycles[3, cycle] -= x * sin(turn) * 2 / GRID
+        k.tally[PLACE] += 1
+
+
+@njit(error_model="numpy", **INNER)
+def sizes(m, t, y, k, out):
+    """Write the six numbers whose largest values are `Kept.peaks` into out."""
+    n = m.rows.shape[1]
+    _, _, force, _, slip = state_of(m, y)
+    x = output_of(m, y)[0]
+    steps.slope(m, t, y, k.room[1])
+    gain = m.now[steps.MOVES] * steps.push(m, t)
+    for i in range(n):
+        gain += m.rows[steps.OUTPUT, i] * k.room[1][n + i]
+    out[ACCELERATION], out[FORCE], out[SLIP], out[SLIP_LEAST] = abs(gain), abs(force), slip, -slip
+    out[OUTPUT], out[OUTPUT_LEAST] = x, -x
+
+
+@njit(error_model="numpy", **INNER)
+def sharpened(m, h, k, which, at, near):
+    """Largest value of one of the six numbers near the share `at` of the step, by parabolas through places `near`
+    apart."""
+    t, best, out = m.now[steps.TIME], -np.inf, k.table[PARTS + 1]
+    for _ in range(4):
+        a, b, c = 0.0, 0.0, 0.0
+        at = min(max(at, near), 1 - near)
+        for side in range(-1, 2):
+            share = at + side * near
+            steps.between(m, share, k.room[0])
+            sizes(m, t + share * h, k.room[0], k, out)
+            a, b, c = b, c, out[which]
+            best = max(best, c)
+        bend = a - 2 * b + c
+        shift = 0.5 * (a - c) / bend if bend < 0 else 0.0
+        at += min(max(shift, -1.0), 1.0) * near
+        near /= 6
+    return best
+
+
+@njit(error_model="numpy", **INNER)
+def peaks(m, h, k):
+    """Take the step of h [s] into the peaks and the harmonics of the last cycles."""
+    t = m.now[steps.TIME]
+    for part in range(PARTS + 1):
+        steps.between(m, part / PARTS, k.room[0])
+        sizes(m, t + part / PARTS * h, k.room[0], k, k.table[part])
+        for which in range(6):
+            k.tally[PEAKS + which] = max(k.tally[PEAKS + which], k.table[part, which])
+    for which in range(SLOTS):
+        top, at, least = -np.inf, 0, np.inf
+        for part in range(PARTS + 1):
+            least = min(least, k.table[part, which])
+            if k.table[part, which] > top:
+                top, at = k.table[part, which], part
+        if top + NEAR * (top - least) >= k.tally[PEAKS + which]:
+            k.tally[PEAKS + which] = max(k.tally[PEAKS + which], sharpened(m, h, k, which, at / PARTS, 1 / PARTS))
+    omega = 2 * pi / k.tally[PERIOD]
+    for j in range(NODES.size):
+        share, weight = 0.5 * (1 + NODES[j]), 0.5 * h * WEIGHTS[j]
+        steps.between(m, share, k.room[0])
+        q, _, force, _, _ = state_of(m, k.room[0])
+        turn = omega * (t + share * h)
+        k.tally[WAVES + 0] += weight * q * cos(turn)
+        k.tally[WAVES + 1] -= weight * q * sin(turn)
+        k.tally[WAVES + 2] += weight * force * cos(turn)
+        k.tally[WAVES + 3] -= weight * force * sin(turn)
+
+
+@njit(error_model="numpy", **INNER)
+def stored(m, y):
+    """Energy of the modes and of the interface [J]."""
+    n, out = m.rows.shape[1], 0.0
+    for i in range(n):
+        out += y[n + i] * y[n + i] + m.rows[steps.OMEGA, i] * m.rows[steps.OMEGA, i] * y[i] * y[i]
+    return 0.5 * m.now[steps.MASS] * out + state_of(m, y)[3]
+
+
+@njit(error_model="numpy", **INNER)
+def watch(m, h, k):
+    """Take in a step of h [s] whose extension is there, before the state moves on."""
+    work = m.y.size - 3
+    k.tally[POWER] += abs(m.work[steps.TRIAL, work] - m.y[work])
+    k.tally[STORED] = max(k.tally[STORED], stored(m, m.work[steps.TRIAL]))
+    k.tally[DONE] += 1
+    marks(m, h, k)
+    bounds(m, h, k)
+    if k.tally[WANTED] > 0:
+        peaks(m, h, k)

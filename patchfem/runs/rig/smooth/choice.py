@@ -1,0 +1,73 @@
+"""Whether the smooth engine takes a rig, and what it costs."""
+
+import numpy as np
+
+from ....effects import has
+from ....friction.bonds.engines import impossible
+from ....friction.laws.stretch import points_element
+from ....friction.protocol import Element
+from ....friction.record import law_from
+from ....model.model import Model
+from ....structure.drive_sizes import fastest, omega_of
+from ...effort import steps_per_cycle
+
+PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
+STEP = 2e-6  # seconds
+MORE = 1.5  # times the steps of a march, of which more are not worth their digits
+STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
+
+
+def not_smooth(model: Model) -> str:
+    """Why a rig is marched rather than integrated at high order; empty where it is not."""
+    rig, accuracy = model.rig, model.accuracy
+    pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
+    if pinned or accuracy.quadrature not in ("auto", "recursion"):
+        return f"with {pinned or 'accuracy.quadrature'}"
+    if model.friction is None or len(rig.modes.interfaces) > 1 or rig.bends:
+        return "beside other forces"
+    if rig.levels:
+        return "level by level"
+    if rig.load_varies or rig.strips_slide_apart or model.soft:
+        return "of points that slide by themselves"
+    if model.side == "lower" and has(model.friction.law, "bonds"):
+        return "under a pressure that stays"
+    element = _element(model)
+    if element is None or element.sizes is None:
+        return f"for law '{model.friction.law}'"
+    return "in so many steps" if steps_of(model, element) > MORE * max(steps_per_cycle(model), 400) else ""
+
+
+def _element(model: Model) -> Element | None:
+    """The law of the interface as compiled code takes it, None where its bonds have no state."""
+    f = model.friction
+    load = model.nominal_load
+    if not has(f.law, "bonds"):
+        return law_from(f, load).element(load)
+    if impossible("recursion", f.reading, 1.0 if f.order is None else f.order):
+        return None
+    return points_element(model.bonds, [1.0], [load])
+
+
+def steps_of(model: Model, element: Element) -> float:
+    """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
+    state of the law which relaxes over a short path or time stable."""
+    rig, modes = model.rig, model.rig.modes
+    omega, period = omega_of(rig.drive), rig.drive.period
+    damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
+    pace = max(float(modes.omega.max()), float(np.abs(damper).sum(axis=1).max()), omega * fastest(rig.drive))
+    ease = float((modes.slide**2).sum()) / modes.mass
+    rigid = 0.0 if element.length else element.limit / model.friction.reference_speed * ease  # a law of the speed
+    path = 4 * model.speed / omega
+    states = path / element.length if element.sizes and element.length else 0.0
+    grown = model.friction.slip_growth if has(model.friction.law, "bonds") else None
+    if grown:
+        states = max(states, path / grown)
+    return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
+
+
+def smooth_cost(model: Model) -> tuple:
+    """Steps of all runs, and their seconds."""
+    steps = 2 * model.rig.cycles * steps_of(model, _element(model))
+    return int(steps), 0.02 + STEP * steps
+
+

@@ -1,0 +1,199 @@
+"""The integrator of high order between reversals: its coefficients, laws in rate form against SciPy, energies, ends."""
+
+import numpy as np
+import pytest
+import smooth_reference as ref
+from march_paths import OMEGA, one_mode
+
+from patchfem.core import BaseSine, ModalBasis, Outcome, Start
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import points_model
+from patchfem.dynamics.smooth import tableau_kernels as tableau
+from patchfem.dynamics.smooth.run import Run, simulate
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws.bouc_wen import BoucWen
+from patchfem.friction.laws.lugre import LuGre
+from patchfem.friction.laws.stretch import points_element
+from patchfem.friction.laws.tanh import Rate
+from patchfem.structure import drives
+
+LOAD, MASS = 115.65, 0.884
+ONE = one_mode(OMEGA, 0.003, MASS)
+SINE = BaseSine(49.0, OMEGA)
+THREE = ModalBasis(("a", "b", "c"), OMEGA * np.array([1, 3.3, 8.0]), np.array([0.003, 0.01, 0.02]),
+                   np.array([1, 0.6, -0.4]), np.array([1, 0.1, 0.0]), np.array([1, 0.2, 0.1]), MASS)
+SHORT, LONG = Bonds(0.3, 5e-6), Bonds(0.3, 1e-4, initial=0.4)
+GROWING = Bonds(0.3, 5e-6, ratio=0.6, rest_growth=10.0, slip_growth=1e-6, rest_speed=1e-4)
+LUGRE = LuGre(0.3, 0.25, 1e7 / LOAD, 1e-2, 20 / LOAD, 3 / LOAD)
+
+
+def element(law):
+    return points_element(law, [1.0], [LOAD]) if isinstance(law, Bonds) else law.element(LOAD)
+
+
+def compared(modes, law, form, cycles=3, drive=SINE, kink=None, start=None, tolerance=1e-11):
+    """(largest error of the coordinates, of the force) over their sizes, against SciPy's integrator."""
+    run, end = Run(modes, drive, element(law), cycles, tolerance, start=start), cycles * drive.period
+    times, n = np.linspace(0, end, 50 * cycles + 1), modes.omega.size
+    rows = run.until(end, times)
+    z, force = ref.integrate(modes, drive, form(law, LOAD), end, times, start, kink)
+    return (abs(rows[:, 1:1 + n].T - z).max() / abs(z).max(),
+            abs(rows[:, 2 * n + 3] - force).max() / abs(force).max())
+
+
+def test_exact_coefficients_meet_the_conditions_of_order():
+    places, shares = tableau.PLACES, tableau.SHARES
+    weights = shares[12, :12]
+    assert shares.sum(axis=1) == pytest.approx(places, abs=2e-14)
+    for k in range(8):  # quadrature, and the tall trees
+        assert weights @ places[:12]**k == pytest.approx(1 / (k + 1), abs=2e-14)
+    tall, inner = np.ones(12), shares[:12, :12]
+    for k in range(1, 8):
+        tall = inner @ tall
+        assert weights @ tall == pytest.approx(1 / np.prod(np.arange(2, k + 2)), abs=2e-13)
+    for estimate in (tableau.FIFTH, tableau.THIRD):
+        assert estimate.sum() == pytest.approx(0.0, abs=1e-14)
+
+
+def numpy_step(slope, t, y, h):
+    """One step of the method in NumPy: the twin of `step_kernels.step`."""
+    slopes = [slope(t, y)]
+    for stage in range(1, 12):
+        slopes.append(slope(t + tableau.PLACES[stage] * h, y + h * tableau.SHARES[stage, :stage] @ slopes))
+    return y + h * tableau.SHARES[12, :12] @ slopes
+
+
+def test_exact_compiled_steps_are_the_method_in_numpy():
+    """A sample at the end of a first step of given length, against the same step of eq. 3.4 and the law in NumPy."""
+    run = Run(ONE, SINE, element(SHORT), 1, 1e-3)
+    run.until(1e-3 * SINE.period)
+    t, y, h = run.time, run.moving.y[:2].copy(), 2e-2 * SINE.period
+    origin, weight = run.moving.now[3], 0.3 * LOAD / SHORT.length
+    way = run.moving.turn[0]
+
+    def slope(t, y):
+        z = way * SHORT.length * -np.expm1(-way * (y[0] - origin) / SHORT.length)
+        return np.array([y[1], -2 * 0.003 * OMEGA * y[1] - OMEGA**2 * y[0] - float(SINE.values(t)) - weight * z / MASS])
+
+    run.moving.now[1] = h
+    run.until(t + h)
+    assert run.kept.tally[13] <= 3  # the last of them the step of this length
+    assert run.moving.y[:2] == pytest.approx(numpy_step(slope, t, y, h), rel=1e-12)
+
+
+@pytest.mark.parametrize("law, modes", [(SHORT, ONE), (LONG, ONE), (SHORT, THREE)])
+def test_exact_bonds_at_a_constant_length_are_their_rate_equations(law, modes):
+    motion, force = compared(modes, law, ref.bonds)
+    assert motion < 1e-9 and force < 1e-8
+
+
+def test_exact_growing_bonds_are_their_rate_equations():
+    motion, force = compared(ONE, GROWING, ref.bonds, kink=lambda y, v: abs(v) - GROWING.rest_speed)
+    assert motion < 1e-9 and force < 1e-6
+
+
+def test_exact_lugre_is_its_rate_equation():
+    motion, force = compared(ONE, LUGRE, ref.lugre)
+    assert motion < 1e-9 and force < 1e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law, form, kink", [
+    (BoucWen(0.3, 5e-6), ref.bouc_wen, lambda y, v: y[0]), (BoucWen(0.3, 5e-6, 1.5, 0.8), ref.bouc_wen,
+                                                            lambda y, v: y[0]), (Rate(0.3, 1e-2), ref.tanh, None)])
+def test_exact_other_laws_are_their_rate_equations(law, form, kink):
+    motion, force = compared(ONE, law, form, kink=kink)
+    assert motion < 1e-9 and force < 1e-7
+
+
+@pytest.mark.parametrize("drive", [
+    drives.Sweep(100.0, 160.0, 0.02, 49.0), drives.Sweep(160.0, 100.0, 0.02, displacement=6e-5, logarithmic=True),
+    drives.levels([30.0, 60.0], OMEGA, 1.0),
+    drives.Recorded(np.array([0, 0.004, 0.009, 0.02]), np.array([0, 60.0, -50.0, 20.0]), 1 / 143, False)])
+def test_exact_every_waveform_drives_by_its_own_values(drive):
+    motion, force = compared(ONE, SHORT, ref.bonds, 3, drive)
+    assert motion < 1e-9 and force < 1e-8
+
+
+def test_exact_breakaway_is_the_march_at_many_steps():
+    law = Bonds(0.3, 5e-6, breakaway=0.4)
+    fine = simulate(ONE, SINE, element(law), 4, 1e-10, 1)
+    errors = []
+    for steps in (1600, 6400):
+        done = march(ONE, SINE, points_model(law, [1.0], [LOAD]), 4, steps, 1)
+        errors.append(abs(np.ptp(done.window.output) / 2 - fine.fine.swing) / fine.fine.swing)
+    assert errors[1] < 2e-5 and errors[1] < 0.2 * errors[0]
+
+
+def test_order_of_the_error_follows_the_tolerance():
+    found = [simulate(ONE, SINE, element(SHORT), 6, tolerance, 1).fine.swing for tolerance in (1e-6, 1e-9, 1e-13)]
+    coarse, fine = (abs(value - found[-1]) / found[-1] for value in found[:2])
+    assert fine < 1e-8 and coarse < 1e-4 and fine < 0.02 * coarse
+
+
+@pytest.mark.parametrize("law", [SHORT, GROWING, LUGRE])
+def test_exact_energy_goes_into_motion_heat_and_stretch(law):
+    book = simulate(ONE, SINE, element(law), 8, 1e-9, 2).ledger
+    miss = book["work_in"] - book["stored"] - book["friction"] - book["viscous"]
+    assert abs(miss) < 1e-8 * (book["power"] + book["peak_stored"])
+    assert book["friction"] > 0.1 * book["work_in"] > 0
+
+
+def test_exact_a_release_ends_at_rest_and_its_energy_is_lost():
+    start = Start(np.array([2e-4]), np.zeros(1))
+    done = simulate(ONE, drives.release(SINE.period), element(SHORT), 30, 1e-10, 2, start=start)
+    book = done.ledger
+    assert book["work_in"] == pytest.approx(MASS * OMEGA**2 * 2e-4**2 / 2, rel=1e-12)
+    assert book["work_in"] == pytest.approx(book["stored"] + book["friction"] + book["viscous"], rel=1e-8)
+    assert np.ptp(done.window.slide) < 2e-7
+
+
+def test_exact_nothing_moves_without_a_push():
+    done = simulate(ONE, drives.release(SINE.period), element(SHORT), 3, 1e-9, 1)
+    assert not done.response.modal.any() and not done.response.force.any() and done.outcome is None
+
+
+def test_exact_a_stuck_contact_is_a_spring():
+    """Far below the bond length the motion is that of the linear oscillator with mu N/eps beside its spring."""
+    small = BaseSine(1e-4, OMEGA)
+    done = simulate(ONE, small, element(SHORT), 40, 1e-10, 1)
+    stiff = OMEGA**2 + 0.3 * LOAD / SHORT.length / MASS
+    ratio = done.fine.slide / done.fine.pull
+    assert ratio == pytest.approx(SHORT.length / (0.3 * LOAD), rel=1e-4)
+    assert abs(done.phasors[-1]) == pytest.approx(1e-4 / abs(stiff - OMEGA**2), rel=0.5)
+
+
+def test_exact_reversals_stand_at_rest_to_the_last_digit():
+    done = simulate(THREE, SINE, element(SHORT), 20, 1e-9, 2)
+    turns = done.response.time < 17 * SINE.period
+    speeds = abs(done.response.slide_rate[turns][1:])
+    assert turns.sum() > 30 and speeds.max() < 1e-13 * abs(done.window.slide_rate).max()
+
+
+def test_exact_travel_ends_a_run_where_the_output_passes_it():
+    done = simulate(ONE, SINE, element(SHORT), 20, 1e-9, 2, travel=2e-5)
+    assert done.outcome is Outcome.EXCEEDS_TRAVEL
+    assert abs(done.window.output[-1]) <= 2e-5 and done.cycles_done < 20
+    row = Run(ONE, SINE, element(SHORT), 20, 1e-9, 2e-5)
+    row.until(1.0)
+    assert abs(row.moving.y[0]) == pytest.approx(2e-5, rel=1e-11)
+
+
+def test_exact_a_fork_goes_on_as_the_run_would():
+    run = Run(ONE, SINE, element(SHORT), 4, 1e-10)
+    run.until(1.3 * SINE.period)
+    twin = run.fork(SINE)
+    run.until(3 * SINE.period)
+    twin.until(3 * SINE.period)
+    assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.tally[13] == run.kept.tally[13]
+
+
+def test_always_snapshots_of_the_interface_are_those_of_the_march():
+    fine = simulate(ONE, SINE, element(SHORT), 3, 1e-10, 1, frames=4)
+    done = march(ONE, SINE, points_model(SHORT, [1.0], [LOAD]), 3, 3200, 1, frames=4)
+    assert len(fine.snapshots) == len(done.snapshots) == 4
+    for one, other in zip(fine.snapshots, done.snapshots):
+        assert one.keys() == other.keys() and one["time"] == pytest.approx(other["time"], rel=1e-12)
+        assert one["bonds"].shape == other["bonds"].shape
+        assert one["bonds"][1] == pytest.approx(other["bonds"][1], abs=1e-3 * LOAD * SHORT.length)
+        assert one["slide"] == pytest.approx(other["slide"], abs=1e-4 * 5e-5)

@@ -1,0 +1,83 @@
+"""Rigs under smooth laws: which of them the integrator of high order takes, and its measures against the march."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.runs.rig.numerics import choose
+
+SCENE = """
+[normal]
+load = "26 lbf"
+[friction]
+law = "nonlocal"
+static = 0.3
+bond_length = "5 um"
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+waveform = "sine"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 30
+"""
+GROWTH = 'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
+LENGTH = 'bond_length = "5 um"'
+SLIP = ("slip_start_phase", "stick_fraction")
+
+
+def engine(text, **keys):
+    return choose(pf.build(text, **keys)).engine
+
+
+@pytest.mark.parametrize("old, new", [
+    ("", ""), (LENGTH, GROWTH), (LENGTH, LENGTH + "\nbreakaway = 0.3"),
+    ('law = "nonlocal"', 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
+    ('law = "nonlocal"', 'law = "bouc-wen"\nstiffness = "1e7 N/m"')])
+def test_exact_smooth_laws_are_integrated_at_high_order(old, new):
+    text = SCENE.replace(old, new) if old else SCENE
+    text = text.replace(LENGTH, "") if "stiffness" in new else text
+    assert engine(text) == "smooth"
+
+
+@pytest.mark.parametrize("old, new", [
+    (LENGTH, 'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"'),
+    (LENGTH, GROWTH + "\nbreakaway = 0.3"), (LENGTH, LENGTH + "\norder = 0.5"),
+    (LENGTH, LENGTH + '\nreading = "report"'), ("cycles = 30", "cycles = 30\n[accuracy]\nsteps_per_cycle = 400"),
+    ("cycles = 30", 'cycles = 30\n[accuracy]\nmethod = "march"'),
+    ('waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
+    ("slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"')])
+def test_exact_what_the_integrator_lacks_is_marched(old, new):
+    text = SCENE.replace(old, new)
+    text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
+    assert engine(text) == "march"
+
+
+@pytest.mark.parametrize("law", [LENGTH, GROWTH])
+def test_always_the_integrator_and_the_march_agree_within_their_bars(law):
+    text = SCENE.replace(LENGTH, law)
+    fine, march = pf.run(text), pf.run(text, **{"accuracy.steps_per_cycle": 1600})
+    assert (fine.extra["engine"], march.extra["engine"]) == ("smooth", "march") and fine.outcome == march.outcome
+    assert fine.measures.keys() == march.measures.keys()
+    for name, one in fine.measures.items():
+        other = march.measures[name]
+        if one.value is not None and name not in ("work_check", "energy_balance"):
+            assert abs(one.value - other.value) <= one.error + 2 * other.error + other.floor, name
+    main = fine.measures["relative_displacement_amplitude"]
+    assert main.error < 1e-6 * main.value and fine.measures["energy_balance"].value < 1e-8
+    times = fine.window.time
+    assert np.allclose(np.diff(times), times[1] - times[0], rtol=1e-6) and times.size > 400
+
+
+def test_exact_a_tolerance_that_is_tighter_moves_a_value_by_no_more_than_its_bar():
+    loose, tight = (pf.run(SCENE, **{"accuracy.tolerance": size}) for size in (1e-3, 1e-9))
+    assert loose.extra["step_tolerance"] > 100 * tight.extra["step_tolerance"]
+    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak"):
+        one, two = loose.measures[name], tight.measures[name]
+        assert abs(one.value - two.value) <= one.error + two.error and two.error < one.error
