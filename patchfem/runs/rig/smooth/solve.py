@@ -9,7 +9,7 @@ from ....dynamics.second_book import gap
 from ....dynamics.smooth import run as hub
 from ....response.errors import change
 from ....response.measures import slip_measures
-from ....response.rows import measures_of, row_of
+from ....response.rows import measures_of
 from ....structure.drive_sizes import sinusoidal, whole
 from ..interface import model_of
 from ..march import Read
@@ -17,6 +17,7 @@ from ..solution import Solution, seen
 
 # of the change at half the samples, the error: of what is of second order in them, the others are of fourth
 SAFE = {"stick_fraction": 2.5, "slip_start_phase": 2.5}
+GRAIN = {"stick_fraction": 0.5, "slip_start_phase": 1.0}  # and the samples that one of them may be off by besides
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -68,7 +69,7 @@ class _Smooth(Read):
         fewer = _picked(turned, np.isin(turned.time, half.time) | ~np.isin(turned.time, even.time))
         every, second = (self._measured(done, *pair, done.amplitudes, None) for pair in (
             (turned, even), (fewer, half)))
-        return {name: SAFE.get(name, 0.2) * gap + row_of(name).grain / hub.SAMPLES * (name in SAFE)
+        return {name: SAFE.get(name, 0.2) * gap + GRAIN.get(name, 0.0) / hub.SAMPLES
                 for name, gap in change(every, second).items()}
 
 
