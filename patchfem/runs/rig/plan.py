@@ -8,8 +8,9 @@ from ...model.model import Model
 from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
+from .engines import no_pieces
 from .numerics import choose, list_cost, quadrature_of
-from .pieces.costs import pieces, seconds_of_pieces
+from .pieces.costs import pieces, seconds_of_pieces, words
 from .smooth.choice import smooth_cost
 
 
@@ -81,10 +82,12 @@ def first_words(rig, found: dict) -> list:
 
 
 def sum_words(model: Model) -> list:
-    """Sentences on how the bonds of law 'nonlocal' are summed."""
-    if model.friction is None or not has(model.friction.law, "bonds"):
+    """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
+    if model.friction is None:
         return []
     numerics = choose(model)
+    if not has(model.friction.law, "bonds"):
+        return words(model, numerics.engine) if not no_pieces(model) else []
     found = quadrature_of(model, numerics)
     seconds = 0.0 if found.engine == "recursion" else list_cost(model, numerics)[1]
     out = ["sum over bonds by " + found.said()]

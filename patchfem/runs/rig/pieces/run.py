@@ -18,10 +18,12 @@ from .. import levels as rig_levels
 from ..exact import joined_runs, whole_cycles
 from ..interface import contact_model
 from ..solution import Solution, seen
+from .costs import refuse_endless
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
+    refuse_endless(model)
     rig, drive, begin = model.rig, model.rig.drive, perf_counter()
     found = Interfaces(model, numerics, patch)
     reduced = perf_counter() - begin
