@@ -9,6 +9,8 @@ from motion_bars import compared, held, score
 from motion_laws import LAWS
 from motion_scenes import spec, text
 
+from patchfem.dynamics.events.event_list import EventLog
+from patchfem.dynamics.piecewise.histories import _starts
 from patchfem.scene.scene import loads
 
 FEW = (11, 21, 30, 111)  # exact, in pieces, exact, a march
@@ -55,3 +57,12 @@ def test_exact_the_sliders_of_the_independent_iwan_law():
         law.turned(0, slide, 0.0, -law.mode)
     assert force[3] == pytest.approx(force[1], rel=1e-12)
     assert force[4] == pytest.approx(law.loading(0.9 * law.top), rel=1e-12)
+
+
+def test_exact_a_slip_that_turns_at_its_limit_starts_no_slip():
+    """Two slips a cycle start at one phase modulo pi. Stop, release and stop again at one time are no start: they moved
+    the phase of seed 5021 by 0.035."""
+    time = np.array([1.0, 1.4, 1.5, 1.9, 1.9, 1.9, 2.0])
+    what, phase = np.array([1, 0, -1, 0, 1, 0, 1]), 2 * np.pi * time
+    log = EventLog(time, phase, np.zeros(7, int), what, time, 7)
+    assert _starts(log, 0.5, 1.0) == pytest.approx(np.array([0.0, 0.0, 0.0]), abs=1e-12)

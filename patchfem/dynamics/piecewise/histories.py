@@ -208,7 +208,7 @@ class _Run:
         now = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
         book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[5]), self.begun)}
         log = self.log()
-        starts = log.phase[(log.interface == 0) & (np.abs(log.what) == RELEASE) & (log.time > begun)] % np.pi
+        starts = _starts(log, begun, self.period)
         high = self.dense.peak(late, self.plant, self.clock, float(self.drive.moving), self.room)
         phasors = self.books.phasors[done] @ [1, 1j]
         loops, *moved = self._loops(late)
@@ -306,6 +306,17 @@ _COLUMNS = ("time", "modal", "modal_rate", "slide", "slide_rate", "output", "out
 def _part(response: Response, which) -> Response:
     extra = {name: part[:, which] if name == "ledger" else part[which] for name, part in response.extra.items()}
     return Response(*(getattr(response, name)[which] for name in _COLUMNS), extra)
+
+
+def _starts(log: EventLog, begun: float, period: float) -> np.ndarray:
+    """Phases modulo pi of the releases of the first interface after `begun` [s].
+
+    Where a slip turns at the limit a release stands between two stops at one time: nothing sticks or slips there.
+    """
+    mine = log.interface == 0
+    time, phase = log.time[mine], log.phase[mine]
+    lasts = np.append(np.diff(time), np.inf) > 1e-9 * period
+    return phase[(np.abs(log.what[mine]) == RELEASE) & lasts & (time > begun)] % np.pi
 
 
 def _chain(parts) -> Response:
