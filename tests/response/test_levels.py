@@ -49,8 +49,8 @@ def test_exact_bracket_jump_and_hysteresis_of_a_table():
     assert hysteresis(table[:4]) is None and jump(table[:2]) is None
 
 
-def measured(law, levels, method=""):
-    result = run(plan(loads(RIG.format(law=law, levels=levels, method=method))))
+def measured(law, levels, method="", cycles=30):
+    result = run(plan(loads(RIG.format(law=law, levels=levels, method=method), sets=[f"drive.cycles={cycles}"])))
     return result, {name: m for name, m in result.measures.items()}
 
 
@@ -137,8 +137,8 @@ def test_exact_nothing_jumps_in_a_response_that_is_all_but_linear():
 def test_exact_levels_by_the_march_are_those_of_the_event_engine():
     """Coulomb: each level's amplitude within its error, onset by forks of the march."""
     levels = '["3.5 g", "4.4 g", "4.8 g", "4.4 g"]'
-    exact, _ = measured('law = "coulomb"', levels)
-    march, found = measured('law = "coulomb"', levels, 'method = "march"')
+    exact, _ = measured('law = "coulomb"', levels, cycles=12)
+    march, found = measured('law = "coulomb"', levels, 'method = "march"\nsteps_per_cycle = 800', 12)
     for a, b in zip(exact.extra["levels"], march.extra["levels"]):
         assert a.stuck == b.stuck and a.drive == b.drive
         assert b.values[NAME] == pytest.approx(a.values[NAME], abs=2 * b.errors[NAME] + 1e-3 * a.values[NAME] + 1e-15)
