@@ -23,7 +23,7 @@ def compiled_copy(module, inner, outer, known=None):
         source = vars(module)[name]
         copy = FunctionType(source.__code__, scope, name, source.__defaults__)
         copy.__module__ = module.__name__
-        options = {"cache": True} if name in outer else LEAN
+        options = {"cache": True, **LEAN} if name in outer else LEAN
         scope[name] = njit(error_model="numpy", **options)(copy)
     return scope
 

@@ -15,7 +15,7 @@ from . import sdof_kernels
 from .sdof_keep import keep
 from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, response, starts, states, stretches
 
-COMPILED_FROM = 5000  # cycles: loading the compiled code takes 0.5 to 1 s, plain Python 0.1 to 0.2 ms more a cycle
+COMPILED_FROM = 2000  # cycles: loading the compiled code takes 0.07 s, plain Python 0.12 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
 CORNERS = 400_000  # corners kept from before the window
 
