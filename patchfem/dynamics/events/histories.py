@@ -9,6 +9,7 @@ from ...core import ModalBasis, Outcome, PatchfemError, Response, Start
 from . import batches
 from .engine import Engine
 from .event_list import RELEASE, EventLog
+from .signals import ORDER
 
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # of a run that has no cycles
@@ -23,7 +24,9 @@ class EventRun:
     over all interfaces; events: how many stretches between events; loop: quadrature arrays (time, weight, slide, rate,
     force) over the window; stick: time stuck in the window [s]; starts: phases of release, mod pi; acceleration:
     largest |absolute acceleration| at the output in the window, both sides of every jump; log: the events;
-    force_peaks (i,): largest friction force [N] of each interface in the window. loop, stick and starts are the first
+    force_peaks (i,): largest friction force [N] of each interface in the window; waves (2,): first and third harmonic
+    of the absolute acceleration at the output over the window; means (2,): time means [m] of the first slide in the
+    window's first and last cycle, None where it holds none or ends inside one. loop, stick and starts are the first
     interface's; those of all are in Response.extra.
     """
 
@@ -41,6 +44,8 @@ class EventRun:
     cycles_done: float
     log: EventLog | None = None
     force_peaks: np.ndarray | None = None
+    waves: np.ndarray | None = None
+    means: tuple | None = None
 
 
 def simulate(modes: ModalBasis, drive, static, kinetic, cycles: float, window: int = 10, travel: float = np.inf,
@@ -175,7 +180,7 @@ class _Kept:
         done = slice(0, max(1, ceil(self.end / period - 1e-9)))
         return EventRun(full, wide, np.stack([self.low, self.high], axis=1)[done], self.phasors[done], book,
                         self.outcome, self.events, loop, stick, starts, self._peak_acceleration(held),
-                        self.end / period, log, self._peak_forces(held))
+                        self.end / period, log, self._peak_forces(held), self._waves(held), self._means(held, first))
 
     def _wide(self, recent, first: float, end: float) -> Response:
         """Uniform samples from `first` to `end` and both sides of every event."""
@@ -194,6 +199,31 @@ class _Kept:
 
     def _peak_acceleration(self, held) -> float:
         return _largest(batches.absolute(held, self.modes, self.drive.moving), held.share)
+
+    def _waves(self, held) -> np.ndarray:
+        """First and third harmonic (2,) of the absolute acceleration over the pieces, by Gauss points."""
+        series, turn, out = batches.absolute(held, self.modes, self.drive.moving), 2 * np.pi / self.drive.period, 0.0
+        for k in range(0, len(held), batches.TOGETHER):
+            part = slice(k, k + batches.TOGETHER)
+            u = held.share[part, None] * batches.NODES
+            a = np.einsum("kjp,kp->kj", batches.powers(u), series[part]) * held.span[part, None] * batches.WEIGHTS
+            angle = turn * (held.time[part, None] + held.unit[part, None] * u)
+            out = out + np.array([np.sum(a * np.exp(-1j * n * angle)) for n in (1, 3)])
+        return out * (2 / held.span.sum())
+
+    def _means(self, held, first: float) -> tuple | None:
+        """Means of the first slide over the first and the last cycle of the pieces, which end with the cycles."""
+        period = self.drive.period
+        turns = self.end / period
+        if abs(turns - round(turns)) > 1e-9 or self.end - first < period * (1 - 1e-9):
+            return None
+        slide = held.coefs @ np.asarray(self.modes.interfaces, float)[0]
+        if len(self.live) and self.live[0] == 0:
+            slide[held.signs[:, 0] == 0] *= ORDER == 0
+            slide[held.signs[:, 0] == 0, 0] = held.held[held.signs[:, 0] == 0, 0]
+        area = held.span * np.einsum("kp,kp->k", batches.powers(held.share), slide / (ORDER + 1))
+        middle = held.time + held.span / 2
+        return tuple(float(area[part].sum() / period) for part in (middle < first + period, middle > self.end - period))
 
     def _peak_forces(self, held) -> np.ndarray:
         peaks = np.zeros(len(self.modes.interfaces))

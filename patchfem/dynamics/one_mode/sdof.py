@@ -13,7 +13,19 @@ from ..events.event_list import ROOM, EventLog
 from ..events.histories import LEAST, SAMPLES, EventRun
 from . import sdof_kernels
 from .sdof_keep import keep
-from .sdof_samples import OneMode, force, panels, peak_acceleration, peak_force, response, starts, states, stretches
+from .sdof_samples import (
+    OneMode,
+    base_part,
+    force,
+    panels,
+    peak_acceleration,
+    peak_force,
+    position,
+    response,
+    starts,
+    states,
+    stretches,
+)
 
 COMPILED_FROM = 2000  # cycles: loading the compiled code takes 0.07 s, plain Python 0.12 ms more a cycle
 CHUNK = 4096  # events held at once beside those of the window
@@ -167,7 +179,7 @@ class _Run:
         part, *ends = stretches(low, high, rows, block)
         owner, tau, weight = panels(*ends)
         owner = part[owner]
-        z, v, _ = states(tau, rows, owner, block)
+        z, v, gain = states(tau, rows, owner, block)
         loop = (rows[owner, 0] + tau, weight, block.slide * z, block.slide * v, force(tau, rows, owner, block))
         stored = 0.5 * mass * (self.state[4]**2 + block.w**2 * self.state[3]**2)
         book = dict(zip(("work_in", "viscous", "power", "friction"), (mass * self.book[:4]).tolist()))
@@ -179,7 +191,28 @@ class _Run:
         phasors = block.output * (self.parts[:, 0] + 1j * self.parts[:, 1])
         return EventRun(full, wide, amplitudes, phasors[:len(amplitudes)], book, self.outcome, count, loop, stuck,
                         self._starts(first), peak_acceleration(low, high, rows, block), end / self.period, self.log(),
-                        force_peaks=np.array([peak_force(low, high, rows, block)]))
+                        force_peaks=np.array([peak_force(low, high, rows, block)]),
+                        waves=self._waves(loop[0], weight, block.output * gain + base_part(tau, rows, owner, block)),
+                        means=self._means(first, end))
+
+    def _means(self, first: float, end: float) -> tuple | None:
+        """Means of the slide over the first and the last cycle of the window, None where it holds none."""
+        if end - first < self.period * (1 - 1e-9):
+            return None
+        return tuple(self._mean(begin) for begin in (first, end - self.period))
+
+    def _mean(self, begin: float) -> float:
+        end, block = begin + self.period, self.block
+        rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > begin)]
+        part, *ends = stretches(np.maximum(rows[:, 0], begin) - rows[:, 0],
+                                np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0], rows, block)
+        owner, tau, weight = panels(*ends)
+        return block.slide * float(weight @ position(tau, rows, part[owner], block)) / self.period
+
+    def _waves(self, time, weight, acceleration) -> np.ndarray:
+        """First and third harmonic (2,) of the absolute acceleration, by the quadrature of the loop."""
+        angle = 2 * pi / self.period * time
+        return np.array([np.sum(weight * acceleration * np.exp(-1j * n * angle)) for n in (1, 3)]) * (2 / weight.sum())
 
     def _starts(self, first: float):
         rows = self.recent

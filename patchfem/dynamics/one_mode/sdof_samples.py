@@ -179,6 +179,15 @@ def pull(u, rows, owner, block: OneMode, parts: int = 3) -> tuple:
     return (push + wave,) if parts == 1 else (push + wave, b * om * np.cos(angle), -om * om * wave)
 
 
+def base_part(u, rows, owner, block: OneMode):
+    """Acceleration (k,) [m s-2] of a moving base at times u (k,) [s] in the phases `owner`; 0 where none moves."""
+    if not getattr(block.drive, "moving", True):
+        return np.zeros(u.size)
+    if block.modes.base[0] == 0:
+        return block.drive.values(rows[owner, 0] + u)
+    return pull(u, rows, owner, block, 1)[0] / -block.modes.base[0]
+
+
 def force(u, rows, owner, block: OneMode):
     """Friction force (k,) [N] at times u (k,) [s] in the phases `owner`: kinetic in slip, what holds in stick."""
     if block.slide == 0 or block.friction[0] == 0:

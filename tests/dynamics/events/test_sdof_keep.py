@@ -112,6 +112,32 @@ def test_exact_general_engine_has_the_same_phasors():
     np.testing.assert_allclose(one.phasors, two.phasors, rtol=0, atol=1e-12)
 
 
+def test_exact_harmonics_of_the_acceleration():
+    """Both engines, and of one that never slips: the base alone."""
+    modes, drive = modes_of(1.3, 0.01), BaseSine(1.0, 0.9)
+    one, two = (run(modes, drive, 0.5, 0.4, 9) for run in (simulate, histories.simulate))
+    np.testing.assert_allclose(one.waves, two.waves, rtol=0, atol=1e-12)
+    assert abs(one.waves[1]) > 0.01
+    w = one.window
+    gaps, smooth = np.diff(w.time), (w.acceleration[1:] + w.acceleration[:-1]) / 2  # trapezoids between the samples
+    for n, wave in zip((1, 3), one.waves):
+        turn = np.exp(-1j * n * 0.9 * (w.time[1:] + w.time[:-1]) / 2)
+        assert abs(np.sum(gaps * smooth * turn) * 2 / gaps.sum() - wave) < 1e-4
+    stuck = simulate(modes, drive, 2.0, 2.0, 9)
+    np.testing.assert_allclose(stuck.waves, [-1j, 0], rtol=0, atol=1e-13)
+
+
+def test_exact_means_of_the_slide():
+    modes, drive = modes_of(1.3, 0.01, -2.0), Piecewise((Segment(0.0, 0.1, 1.0, 0.9, 0.2),), 2 * pi / 0.9)
+    one, two = (run(modes, drive, 0.2, 0.15, 12, 4) for run in (simulate, histories.simulate))
+    np.testing.assert_allclose(one.means, two.means, rtol=0, atol=1e-12)
+    for mean, begin in zip(one.means, (8, 11)):
+        t = np.linspace(begin, begin + 1, 200_001) * drive.period
+        mine = np.interp(t, one.response.time, one.response.slide)
+        assert mine[:-1].mean() == pytest.approx(mean, abs=1e-4)
+    assert histories.simulate(modes, drive, 0.2, 0.15, 12.5, 4).means is None
+
+
 @pytest.mark.slow
 def test_always_the_memory_of_a_run_does_not_grow_with_its_cycles():
     import tracemalloc
