@@ -34,7 +34,7 @@ def knobs_of(model: Model) -> list:
     jumps over cycles of wear."""
     out = ["element_size"] if model.patch is not None else []
     if model.kind in ("bench", "rig") or (model.kind == "linear" and model.accuracy.method == "march"):
-        if plan(model).engine in ("march", "bench"):
+        if plan(model).engine in ("march", "bench", "smooth"):  # a count of steps asks for the march
             out.append("steps_per_cycle")
             if model.soft and has(model.friction.law, "bonds"):
                 out.append("shear_modes")

@@ -7,7 +7,7 @@ play. The rate form between two reversals has no states of its own at a constant
 exponentials of the slide, and (eps, m, z, s2) where it grows.
 """
 
-from math import exp, inf, nan
+from math import exp, expm1, inf, nan
 
 from numba import njit
 
@@ -113,8 +113,9 @@ def slid(num, mem, turn, dq):
     if turn[1] < inf:
         return m, z + m * dq
     x = way * dq / eps
-    kept = exp(-x)
-    return 1 - (1 - m) * kept, z * kept + way * eps * (1 - kept - (1 - m) * x * kept)
+    gone = -expm1(-x)  # exact for slides far below the bond length, too
+    kept = 1 - gone
+    return m + (1 - m) * gone, z * kept + way * eps * (gone - (1 - m) * x * kept)
 
 
 @njit(error_model="numpy", **LEAN)

@@ -197,3 +197,27 @@ def test_always_snapshots_of_the_interface_are_those_of_the_march():
         assert one["bonds"].shape == other["bonds"].shape
         assert one["bonds"][1] == pytest.approx(other["bonds"][1], abs=1e-3 * LOAD * SHORT.length)
         assert one["slide"] == pytest.approx(other["slide"], abs=1e-4 * 5e-5)
+
+
+@pytest.mark.parametrize("drive", [BaseSine(1e-6, OMEGA), drives.release(1 / 143)])
+def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
+    """Round-off of a bond length of 5 um is 1e-8 of such a slide: no step met its tolerance for it."""
+    start = Start(np.array([1e-14]), np.zeros(1)) if not drive.segments[0].amplitude else None
+    run, end = Run(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
+    times = np.linspace(0, end, 201)
+    rows, stiff = run.until(end, times), 0.3 * LOAD / SHORT.length / MASS
+    free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA)**2)
+    if start is not None:
+        decay, rest = 0.003 * OMEGA, 1e-14 * stiff / (stiff + OMEGA**2)  # the bonds are unstretched at the start
+        sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
+        want = rest + (1e-14 - rest) * sway
+        assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)
+    assert run.kept.tally[13] < 1500
+
+
+@pytest.mark.parametrize("share", [0.33, 0.348, 0.385])
+def test_exact_a_speed_that_grazes_zero_turns_or_passes(share):
+    modes = ModalBasis(("a", "b"), OMEGA * np.array([1, 3.0]), np.array([0.01, 0.003]), np.array([1.0, share]),
+                       np.array([1, 0.1]), np.array([1, 0.0]), MASS)
+    motion, force = compared(modes, SHORT, ref.bonds, 3, BaseSine(60.0, OMEGA))
+    assert motion < 1e-9 and force < 1e-8
