@@ -77,7 +77,7 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
         raise PatchfemError(f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, counted from 1")
     faces = masses.rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
-        faces = np.asarray(faces)
+        faces = matrices.without_phase(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output", faces[0] if faces is not None and len(faces) else None)
     if output is None:
@@ -137,7 +137,7 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
 
 def _numbers(data, key, where, *shapes) -> np.ndarray:
     """Array data[key] as finite real numbers of one of the shapes (None in a shape: any length); (n,) without one."""
-    value = np.asarray(data[key])
+    value = matrices.without_phase(data[key], key)
     if value.dtype.kind not in "iufb":
         raise PatchfemError(f"{where}: {key} holds no real numbers")
     value = value.astype(float)

@@ -112,11 +112,31 @@ def _root(M):
     return root
 
 
+def without_phase(values, name):
+    """An array stored as complex numbers whose imaginary parts are all 0, by its real parts; any other as it stands.
+
+    PatchfemError for one with imaginary parts, which motion in time does not have: hysteretic damping K (1 + i eta) is
+    a law of one frequency. C = eta K/omega has the same loss at omega, a damping ratio of eta/2 in a mode there.
+    """
+    values = np.asarray(values)
+    if not np.iscomplexobj(values):
+        return values
+    share = float(np.abs(values.imag).max(initial=0.0)) / max(float(np.abs(values.real).max(initial=0.0)), 1e-300)
+    if share == 0.0:
+        return values.real
+    remedy = ""
+    if name == "K":
+        remedy = f"; for a loss factor eta (here about {share:.3g}) give K without it, and C = eta K/omega [N s/m] " \
+            "at the frequency of the drive"
+    raise PatchfemError(f"structure: {name} is complex, imaginary parts up to {share:.2g} of the real ones; motion in "
+                        f"time takes real matrices{remedy}")
+
+
 def _symmetric(matrix, name, shape=None) -> np.ndarray:
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
     try:
-        matrix = np.asarray(matrix, float)
+        matrix = np.asarray(without_phase(matrix, name), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} is no matrix of real numbers") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
@@ -159,7 +179,7 @@ def _unmixed(phi, omega, D) -> tuple:
 
 def _row(row, n, name) -> np.ndarray:
     try:
-        row = np.asarray(row, float)
+        row = np.asarray(without_phase(row, name), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} holds no real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":

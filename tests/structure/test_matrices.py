@@ -163,6 +163,10 @@ M2, K2 = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
     (M2, np.ones((2, 3)), None, "K must be square"),
     (M2 * np.nan, K2, None, "M holds values that are not finite"),
     (M2, [["a", "b"], ["c", "d"]], None, "K is no matrix of real numbers"),
+    (M2, K2 * (1 + 0.2j), None, "K is complex, imaginary parts up to 0.2 of the real ones; motion in time takes real "
+     "matrices; for a loss factor eta (here about 0.2) give K without it, and C = eta K/omega [N s/m]"),
+    (M2 * (1 + 1e-9j), K2, None, "M is complex, imaginary parts up to 1e-09 of the real ones"),
+    (M2, K2, 1j * K2, "C is complex"), (M2, [[1.0, 2.0], [3.0]], None, "K is no matrix of real numbers"),
     (1e-300 * np.eye(2), 1e20 * np.eye(2), None, "K over M is too large for a number; are both in SI units"),
 ])  # fmt: skip
 def test_refuses_matrices_without_modes(M, K, C, says):
@@ -171,10 +175,16 @@ def test_refuses_matrices_without_modes(M, K, C, says):
     assert says in str(caught.value)
 
 
+def test_exact_matrices_stored_as_complex_numbers_are_their_real_parts():
+    real, stored = (matrices.basis(M2 * one, K2 * one, 0.1 * K2 * one, faces=np.ones(2) * one) for one in (1.0, 1 + 0j))
+    assert np.array_equal(real.omega, stored.omega) and np.array_equal(real.slide, stored.slide)
+    assert np.array_equal(real.zeta, stored.zeta)
+
+
 @pytest.mark.parametrize("rows, says", [
     ({"faces": np.ones(3)}, "slide has shape (3,), but M has 2"), ({"base": [1.0]}, "base has shape (1,)"),
     ({"output": [1.0, np.inf]}, "output holds values that are not finite"),
-    ({"normal": ["x", "y"]}, "normal holds no real numbers"),
+    ({"normal": ["x", "y"]}, "normal holds no real numbers"), ({"faces": np.full(2, 1j)}, "slide is complex"),
 ])  # fmt: skip
 def test_refuses_rows_of_another_size(rows, says):
     with pytest.raises(PatchfemError) as caught:
