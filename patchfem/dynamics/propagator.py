@@ -3,16 +3,19 @@
 Everything comes from the exponentials of the modes, of all of them at once where damping couples them. So resonance
 without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where 3.7 and
 3.9 print i w). What the drive adds in a step and the energies of the step are sums over Gauss points of the step, exact
-to round-off for a drive that is smooth inside it.
+to round-off for a drive that is smooth inside it; those of modes that are stiff beside the step, by `doubling`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core import ModalBasis
+from . import doubling
 
 LEAST, MOST = 8, 48  # Gauss points of a step
+STIFF = 20.0  # radians or decays of the fastest motion in a step, beyond which that many points do not see it
+SHORT = 4.0  # of them in the short step that is doubled then
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,32 +62,73 @@ class Propagator:
 def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
     """Coefficients of `steps_per_cycle` equal steps of the drive's period, exact for the modes.
 
-    rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points.
+    rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points;
+    where that is not enough, a step is made of short ones.
     """
     dt = drive.period / steps_per_cycle
     rows = np.array(modes.interfaces if rows is None else rows, float)
-    fastest = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
-    # two points more for each radian of the fastest motion
-    count = int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST))
-    x, w = np.polynomial.legendre.leggauss(count)
-    nodes, weight = dt * (1 + x) / 2, dt * w / 2
+    fastest = max(fastest_rate(modes), 2 * np.pi / drive.period)
     n, coupled = modes.omega.size, modes.damping is not None
-    at_end, inside = _flow(modes, np.array([dt])), _flow(modes, nodes)
-    push = _push(modes, dt, nodes, weight)
-    parts, quadratic = _parts(modes, dt, nodes, weight, inside)
-    one = [part[0] for part in at_end]
+    if fastest * dt > STIFF:
+        (at_end, push, parts, quadratic), nodes = _stiff(modes, dt, fastest, 2 * np.pi / drive.period)
+    else:
+        # two points more for each radian of the fastest motion
+        nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))
+        at_end, inside = [part[0] for part in _flow(modes, np.array([dt]))], _flow(modes, nodes)
+        push = _push(modes, dt, nodes, weight)
+        parts, quadratic = _parts(modes, dt, nodes, weight, inside)
     if coupled:
-        block = np.block([[one[0], one[1]], [one[2], one[3]]])
+        block = np.block([[at_end[0], at_end[1]], [at_end[2], at_end[3]]])
         dense = np.concatenate([block, np.concatenate(push)], axis=1)
         reach = rows @ (block - np.eye(2 * n))[:n]
         beta, free, loss = rows @ push[0] @ rows.T / modes.mass, np.zeros((4, n)), np.zeros((6, n))
         short = np.zeros((2, n))
     else:
-        dense, short, free, loss = np.zeros((0, 0)), np.array(push), np.array(one), quadratic
-        reach = np.concatenate([rows * (one[0] - 1), rows * one[1]], axis=1)
+        dense, short, free, loss = np.zeros((0, 0)), np.array(push), np.array(at_end), quadratic
+        reach = np.concatenate([rows * (at_end[0] - 1), rows * at_end[1]], axis=1)
         beta = (rows * push[0]) @ rows.T / modes.mass
     return Propagator(dt, steps_per_cycle, rows, free, short, np.ascontiguousarray(dense), np.ascontiguousarray(reach),
                       np.ascontiguousarray(beta), loss, quadratic if coupled else np.zeros((0, 0)), nodes, parts)
+
+
+def fastest_rate(modes: ModalBasis) -> float:
+    """Largest rate [1/s] at which a mode turns or dies out."""
+    if modes.damping is None:
+        return float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0))
+    return max(float(modes.omega.max(initial=0.0)), float(np.linalg.norm(modes.damping, 2)))
+
+
+def _gauss(dt: float, count: int) -> tuple:
+    """Gauss points and weights of [0, dt]."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return dt * (1 + x) / 2, dt * w / 2
+
+
+def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
+    """((blocks at the end, push, parts, quadratic form of the loss), nodes) of a step that is long beside its modes.
+
+    fastest, slowest [1/s]: rates of the modes and of the drive.
+    """
+    times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT))))
+    count = int(np.clip(LEAST + 2 * np.ceil(max(SHORT, slowest * dt)), LEAST, MOST))
+    whole = replace(modes, damping=modes.dampers)
+    n, (nodes, weight) = modes.omega.size, _gauss(dt, count)
+    h, shrink = dt / 2**times, 1 / 2**times
+    near, light = nodes * shrink, weight * shrink
+    step = doubling.short_step(np.diag(modes.omega**2), modes.dampers, _push(whole, h, near, light),
+                               *_parts(whole, h, near, light, _flow(whole, near)))
+    halves = _lagrange(nodes, nodes / 2), _lagrange(nodes, (dt + nodes) / 2)
+    for _ in range(times):
+        step = doubling.doubled(step, halves)
+    parts, quadratic = doubling.as_parts(step)
+    flow = step.change + np.eye(2 * n)
+    blocks, push = [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]], (step.push[:n], step.push[n:])
+    if modes.damping is None:
+        blocks, push = [np.diag(part) for part in blocks], tuple(np.diag(part) for part in push)
+        pairs = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+        quadratic = np.stack([(1 + (i != k)) * np.diag(quadratic[i * n:(i + 1) * n, k * n:(k + 1) * n])
+                              for i, k in pairs])
+    return (blocks, push, parts, quadratic), nodes
 
 
 def _flow(modes: ModalBasis, times) -> tuple:

@@ -129,3 +129,63 @@ def test_exact_recorded_line_and_levels():
     own = prop.tables(sine, 0, 20)
     np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
     np.testing.assert_allclose(prop.tables(two, 60, 20)[:, :6], 1.5 * own[:, :6], rtol=0, atol=1e-13)
+
+
+def as_dense(prop):
+    """(z, z') after a step and the loss in it, as matrices on (z, z', acceleration), coupled or not."""
+    if prop.dense.size:
+        return prop.dense, prop.dense_loss
+    zz, zv, vz, vv = (np.diag(part) for part in prop.free)
+    a, b, c, d, e, f = (np.diag(part) for part in prop.loss)
+    return np.block([[zz, zv, np.diag(prop.push[0])], [vz, vv, np.diag(prop.push[1])]]), \
+        np.block([[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]])
+
+
+@pytest.mark.parametrize("modes", [
+    *(basis(W, zeta) for zeta in (30.0, 1e3, 1e6, 1e9)), basis([1.0, 3e4 * W], [0.1, 0.2], (1, 1), (1, 1)),
+    *(basis([0.0, 3.0], [0, 0], (1, 1), (1, 1), damping=size * np.array([[1.0, -0.6], [-0.6, 1.2]]))
+      for size in (1e4, 1e8, 1e12)),
+])
+def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
+    """Energy at the end = at the start + work of a constant force - viscous loss, for every state: a quadratic form."""
+    step, loss = as_dense(propagator(modes, BaseSine(1.0, W), 100))
+    n = modes.omega.size
+    energy = 0.5 * modes.mass * np.diag([*modes.omega**2, *np.ones(n)])
+    begun, work = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 3 * n))
+    begun[:2 * n, :2 * n] = energy
+    work[2 * n:] = modes.mass * (step[:n] - np.eye(2 * n, 3 * n)[:n])
+    miss = step.T @ energy @ step - begun + (loss + loss.T) / 2 - (work + work.T) / 2
+    assert np.abs(miss).max() < 1e-13 * max(np.abs(begun).max(), np.abs(work).max())
+
+
+def test_exact_stiff_mode_is_led_by_its_drive_and_its_force():
+    """omega^2 z + 2 zeta omega z' = -a sin(W t) - F/m once the inertia has died out, to 1/(2 zeta)^2: closed form."""
+    zeta, force = 1e5, 3.0
+    modes, drive = basis(W, zeta, mass=2.0), BaseSine(5.0, W)
+    prop, damper = propagator(modes, drive, 100), 2 * zeta * W
+    state, lost, given = np.zeros(2), 0.0, 0.0
+    for k in range(100):
+        state, work, loss, _ = by_step(modes, prop, drive, k, state, force)
+        given, lost = given + work, lost + loss
+    t = drive.period
+    z = -5.0 * (1 - np.cos(W * t)) / (damper * W) - force / 2.0 / damper * t
+    rate = -5.0 * np.sin(W * t) / damper - force / 2.0 / damper
+    assert state[1] == pytest.approx(rate, rel=1e-4) and state[0] == pytest.approx(z, rel=1e-4)
+    heat = 2.0 / damper * (25.0 / 2 + (force / 2)**2) * t  # mean of m (2 zeta omega) z'^2, without the slow return
+    assert lost == pytest.approx(heat, rel=1e-4)
+    assert given - force * state[0] == pytest.approx(lost + 0.5 * 2.0 * (state[1]**2 + (W * state[0])**2), rel=1e-12)
+
+
+def test_exact_doubled_step_is_the_step_itself(monkeypatch):
+    """The same step by Gauss points and by doubling a short one, where both can: coupled modes or not."""
+    for modes in (basis([W, 5 * W], [0.003, 0.4], (1, 1), (1, 0.5)), coupled()):
+        drive = Sweep(120.0, 180.0, 0.05, 5 * G_N)
+        direct = propagator(modes, drive, 300)
+        monkeypatch.setattr("patchfem.dynamics.propagator.STIFF", 0.0)
+        made = propagator(modes, drive, 300)
+        monkeypatch.undo()
+        for name in ("free", "push", "dense", "reach", "beta", "loss", "dense_loss"):
+            one, other = getattr(direct, name), getattr(made, name)
+            assert np.abs(one - other).max(initial=0.0) <= 1e-12 * np.abs(one).max(initial=0.0) + 1e-15, name
+        one, other = direct.tables(drive, 3, 5), made.tables(drive, 3, 5)
+        assert np.all(np.abs(one - other).max(axis=0) <= 1e-10 * np.abs(one).max(axis=0))
