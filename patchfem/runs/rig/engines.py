@@ -7,6 +7,7 @@ the scene have refused, `scene.rules.methods`.
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -32,12 +33,17 @@ class Variant(NamedTuple):
     patch: object
 
 
+CLOSED = 1e-8  # gap of an energy balance that is kept to round-off: a billion steps leave less
+
+
 class Engine(NamedTuple):
     """One engine of a rig.
 
     lacks(model) -> why it has no answer to a model that names no engine, "" where it has; solve: "module function" of
     this folder, function(model, numerics, patch, frames, say, progress) -> Solution; in_time(model, numerics, patch)
-    and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays.
+    and in_space(model, numerics, patch, coarse, solution) -> Rungs of its error; least: relative error that stays;
+    closes: gap of the energy balance beyond which a run has not converged, None where the engine's own error of the
+    balance says it, infinite of methods that are shown with what they lose.
     """
 
     name: str
@@ -46,6 +52,7 @@ class Engine(NamedTuple):
     in_time: Callable
     in_space: Callable
     least: float = 1e-9
+    closes: float | None = CLOSED
 
     @property
     def run(self) -> Callable:
@@ -222,13 +229,29 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
 EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
 PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rungs, _pieces_in_space)
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
-HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0)
+HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0, None)
 COMPARED = ("duhamel", "newmark", "euler")
-SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 1e-11)
+SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 1e-11, None)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
-    Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space)
+    Engine(name, _nothing, "comparison run_comparison", _march_in_time, _march_in_space, closes=inf)
     for name in COMPARED))}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
+
+
+def unbalanced(engine: Engine, measures: dict) -> str:
+    """The sentence on an energy balance that does not close as this engine closes it; "" where it does.
+
+    measures: by name, with their errors, of a run of the engine.
+    """
+    found = measures.get("energy_balance")
+    if found is None or found.value is None:
+        return ""
+    bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
+    if not found.value > bar:  # a motion that is not finite has been seen before
+        return ""
+    remedy = {"march": "raise accuracy.steps_per_cycle", "harmonic": "raise accuracy.harmonics"}.get(engine.name)
+    return f"the energy balance of engine {engine.name} misses {found.value:.2g} of the energy that passed, beyond " \
+        f"{bar:.2g}, so a step made or lost energy{'; ' + remedy if remedy else ''}"
 
 
 def engine_of(model: Model, per_point: bool = False) -> Engine:

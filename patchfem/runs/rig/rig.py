@@ -20,7 +20,7 @@ from ..results.notes import creeping, of_growth, two_books, unbounded, unripe, w
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import ended, travelled
 from . import levels
-from .engines import ENGINES, Variant
+from .engines import ENGINES, Variant, unbalanced
 from .levels import with_errors as level_errors
 from .numerics import choose, quadrature_of, refuse_costly
 from .solution import borne, curve_measures
@@ -48,6 +48,9 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         refuse_endless(model)
     raw, numerics, found = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
     extra |= raw.extra
+    wrong = unbalanced(ENGINES[numerics.engine], found)
+    if wrong:
+        raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
     drive = extra.pop("at", drive)
     if numerics.engine == "smooth":
         extra |= {"iterations": raw.book["iterations"]}

@@ -1,0 +1,72 @@
+"""A run whose energy balance does not close has not converged, whatever its amplitudes look like; stiff damping."""
+
+import pytest
+
+import patchfem as pf
+from patchfem.core import Measure, Outcome
+from patchfem.dynamics.march.march import Run
+from patchfem.runs.rig.engines import ENGINES, unbalanced
+
+SCENE = """
+[normal]
+load = "26 lbf"
+[friction]
+law = "tanh"
+static = 0.3
+reference_speed = "1 mm/s"
+[structure]
+moving_mass = "884.0 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = {damping}
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = {cycles}
+[accuracy]
+tolerance = 1e-2
+method = "march"
+"""
+
+
+def run(folder, damping, cycles):
+    path = folder / "scene.toml"
+    path.write_text(SCENE.format(damping=damping, cycles=cycles), "utf-8")
+    return pf.run(path)
+
+
+def test_exact_acceleration_of_a_mode_that_its_damping_locks(tmp_path):
+    """Damping 1e6: the mass moves with the base, 5 g; a march said 9e-6 ± 8e-6 m s-2 and an energy balance of .27."""
+    found = run(tmp_path, 1e6, 12)
+    peak = found.measures["absolute_acceleration_peak"]
+    assert abs(peak.value - 5 * 9.80665) <= max(peak.error, 1e-6)
+    assert found.measures["energy_balance"].value < 1e-12 and found.outcome is Outcome.STEADY
+
+
+def test_refuses_steady_where_energy_is_lost(tmp_path, monkeypatch):
+    """A ledger that misses a millionth of the viscous loss ends not_converged, with the gap, the bar and a remedy."""
+    honest = run(tmp_path, 0.3, 4)
+    assert honest.outcome is not Outcome.NOT_CONVERGED and honest.measures["energy_balance"].value < 1e-10
+    kept = Run.book
+    monkeypatch.setattr(Run, "book", lambda self: kept(self) | {"viscous": kept(self)["viscous"] * (1 + 1e-6)})
+    found = run(tmp_path, 0.3, 4)
+    assert found.outcome is Outcome.NOT_CONVERGED
+    assert any("energy balance of engine march misses" in line and "beyond 1e-08" in line
+               and "accuracy.steps_per_cycle" in line for line in found.warnings)
+    assert all(measure.error is None for measure in found.measures.values())
+
+
+@pytest.mark.parametrize("engine, value, error, closes", [
+    ("march", 2e-8, 1e-6, False), ("march", 9e-9, 0.0, True), ("exact", 2e-8, None, False),
+    ("harmonic", 6e-8, 1e-7, True), ("harmonic", 6e-8, 1e-9, False), ("newmark", 0.3, 0.1, True),
+    ("march", float("nan"), None, True), ("march", None, None, True)])
+def test_always_an_engine_closes_its_balance_as_it_says(engine, value, error, closes):
+    said = unbalanced(ENGINES[engine], {"energy_balance": Measure(value, "1", error, 1e-8)})
+    assert (said == "") is closes
+
+
+def test_always_linear_runs_without_a_balance_pass():
+    assert unbalanced(ENGINES["exact"], {}) == ""
