@@ -21,6 +21,46 @@ def free_slide(state, reach, port, table, at):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
+def free_rate(state, row, free, dense, table, at):
+    """Rate of the slide `row` (n,) at the end of a step without interface forces [m/s]."""
+    n, out = row.size, 0.0
+    for i in range(n):
+        end = table[at, n + i]
+        if dense.size == 0:
+            end += free[2, i] * state[0, i] + free[3, i] * state[1, i]
+        else:
+            for k in range(n):
+                end += dense[n + i, k] * state[0, k] + dense[n + i, n + k] * state[1, k]
+        out += row[i] * end
+    return out
+
+
+@njit(error_model="numpy", **LEAN)
+def rate_given(row, other, push, dense, mass):
+    """Rate [m/(s N)] that a constant force along `other` (n,) gives the slide `row` (n,) by the end of a step."""
+    n, out = row.size, 0.0
+    for i in range(n):
+        if dense.size == 0:
+            out += row[i] * push[1, i] * other[i]
+        else:
+            for k in range(n):
+                out += row[i] * dense[n + i, 2 * n + k] * other[k]
+    return out / mass
+
+
+@njit(error_model="numpy", **LEAN)
+def struck(state, row, speed, now, mass):
+    """Change the rate of the slide `row` (n,) from `now` to `speed` [m/s] by a blow along it, in place; energy that it
+    takes [J]."""
+    share = 0.0
+    for i in range(row.size):
+        share += row[i] * row[i]
+    for i in range(row.size):
+        state[1, i] -= row[i] * (now - speed) / share
+    return 0.5 * mass * (now * now - speed * speed) / share
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def push_back(force, row, mass, accel):
     """Modal accelerations (n,) of one interface force [N] that resists the slide row (n,)."""
     for i in range(accel.size):

@@ -54,6 +54,29 @@ def sheared(weight, length: float, growth, psi, kappa) -> dict:
             "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
 
 
+class Stops(NamedTuple):
+    """The m elements of set-valued friction among joints, `march.joints_stops_kernels`.
+
+    element, names (m,): their numbers, room for numbers; limit (2, m): static and kinetic friction [N]; gives (3, m,
+    m): what their forces take from their slides [m/N] and rates [m/(s N)] over a step, and from their accelerations
+    [1/kg]; rows (m, n): their slides per coordinate; system (m, m), field (18, m) as `march.joints_shares_kernels` has
+    it.
+    """
+
+    element: np.ndarray
+    names: np.ndarray
+    limit: np.ndarray
+    gives: np.ndarray
+    rows: np.ndarray
+    system: np.ndarray
+    field: np.ndarray
+
+
+def copied(parts):
+    """A tuple of arrays, or of such tuples, with arrays of its own."""
+    return type(parts)(*(copied(part) if isinstance(part, tuple) else part.copy() for part in parts))
+
+
 class Joints(NamedTuple):
     """Elements (e,) on ports (p,) beside a patch on port 0 where `there` (1,) is 1.
 
@@ -61,7 +84,8 @@ class Joints(NamedTuple):
     springs; num, mem (e, ...) as the laws have them, num[e, 0] which law; bound (e,) [N], infinite where nothing
     bounds it; goal (1 + e,) [N] of the patch and the elements; give (n,) [m/N] of the coordinates. State: last (e, 2)
     slide increments, forces (e,), own (2,): force of the patch and its last increment. Scratch: free (p,); q, v, eps,
-    dq, miss (e,); system (e, e); room (3, n); hess (n, n).
+    dq, miss (e,); system (e, e); room (3, n); hess (n, n). Of the set-valued elements: gamma (p, p) [m/(s N)], what
+    port forces take from the rates of ports by the end of a step; rate (p,) [m/s] of the free motion there; stops.
     """
 
     there: np.ndarray
@@ -86,6 +110,9 @@ class Joints(NamedTuple):
     system: np.ndarray
     room: np.ndarray
     hess: np.ndarray
+    gamma: np.ndarray
+    rate: np.ndarray
+    stops: Stops
 
 
 class BondList(NamedTuple):

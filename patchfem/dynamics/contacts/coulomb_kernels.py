@@ -1,25 +1,39 @@
 """A contact, `arrays.Element`, of set-valued Coulomb friction: it holds or slides, without a slope.
 
-The functions are those that `march.loop_kernels` asks of every contact.
+The functions are those that `march.loop_kernels` asks of every contact. eps[0] is 1 while it holds, last[0] the force
+at the end of a step that slides there [N].
 """
 
 from numba import njit
 
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import coulomb_kernels as law
+from .stop_kernels import through
 
 SET_VALUED = True
 
 
 @njit(error_model="numpy", **LEAN)
 def solve(free, beta, q, v, dt, c, goal):
-    """(dq [m], path-mean force [N], iterations) of a step of Coulomb's law, with dq = free - beta force.
+    """(dq [m], path-mean force [N], iterations) of a step of Coulomb's law by the mean force alone.
 
     free [m]: slide without friction; beta [m/N]: slide that a newton takes away; the other arguments are those of
-    `element_kernels.solve`.
+    `element_kernels.solve`. The loops ask `passed` instead, which knows the speed.
     """
     dq, force = law.stick(free, beta, c.num[0, 1], c.num[0, 2])
     return dq, force, 1
+
+
+@njit(error_model="numpy", **LEAN)
+def passed(free, rate, beta, gamma, share, v, dt, c, top):
+    """(slide dq [m], speed at the end [m/s]) of a step, with what stops and lets go inside it: `stop_kernels.through`,
+    whose arguments these are."""
+    static, kinetic = c.num[0, 1], c.num[0, 2]
+    dq, speed, rests = through(free, rate, beta, gamma, share, v, dt, static, static, kinetic, kinetic,
+                               v == 0.0 or c.eps[0] == 1.0, top)
+    c.eps[0] = 1.0 if rests else 0.0
+    c.last[0] = kinetic if speed > 0 else -kinetic
+    return dq, speed
 
 
 @njit(error_model="numpy", **LEAN)
@@ -42,5 +56,5 @@ def state(c, q, v):
 
 @njit(error_model="numpy", **LEAN)
 def hold(c, force):
-    """Tell the contact that holds which force [N] it needs at an instant; it keeps no more than its static force."""
-    c.mem[0, 0] = min(max(force, -c.num[0, 1]), c.num[0, 1])
+    """Set the force at the end of a step: of a contact that holds the one it needs [N], no more than its static one."""
+    c.mem[0, 0] = min(max(force, -c.num[0, 1]), c.num[0, 1]) if c.eps[0] == 1.0 else c.last[0]

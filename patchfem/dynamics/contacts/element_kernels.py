@@ -50,7 +50,11 @@ def state(c, q, v):
 
 
 @njit(error_model="numpy", **LEAN)
+def passed(free, rate, beta, gamma, share, v, dt, c, top):
+    """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
+    return 0.0, 0.0
+
+
+@njit(error_model="numpy", **LEAN)
 def hold(c, force):
     """Nothing to do: what holds an element is in its law."""
-
-

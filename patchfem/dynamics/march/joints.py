@@ -53,7 +53,8 @@ def _spring(port: int, numbers, potential) -> Joint:
 def loop_of(laws: tuple, patch: tuple):
     """The compiled loop of joints with these laws (modules) and the patch's contact of this kind."""
     law = law_of(laws)
-    parts = {"law": law, "patch": contact_of(patch),
+    stops = "joints_stops_kernels" if COULOMB in laws else "joints_no_stops_kernels"
+    parts = {"law": law, "stops": f"{HERE}.{stops}", "patch": contact_of(patch),
              "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
              "together": compiled.instance(f"{HERE}.joints_solve_kernels", {"law": law})}
     return compiled.instance(f"{HERE}.joints_kernels", parts)
@@ -63,6 +64,7 @@ def loop_of(laws: tuple, patch: tuple):
 class JointsModel:
     """A patch (ContactModel on port 0, or None) and joints; rows (p, n): slide of every port per coordinate.
 
+    A patch of set-valued friction becomes the first of the joints, since all that hold are solved together.
     scale [N]: force against which residuals of springs count; also: modules of compiled laws that the loop knows
     besides those of the joints, so that models of several sets of laws share one loop.
     """
@@ -72,6 +74,11 @@ class JointsModel:
     rows: np.ndarray
     scale: float
     also: tuple = ()
+
+    def __post_init__(self):
+        if self.patch is not None and self.patch.set_valued:
+            object.__setattr__(self, "joints", (Joint(0, self.patch.element), *self.joints))
+            object.__setattr__(self, "patch", None)
 
     @property
     def limit(self) -> float:
@@ -116,12 +123,8 @@ class JointsModel:
         """(contact, None) of the patch with arrays of their own; an idle point where there is none."""
         return (self.patch or coulomb_model(0.0, 0.0)).build()
 
-    def arrays(self, beta, give) -> arrays.Joints:
-        """Fresh `arrays.Joints` of a march.
-
-        beta: (p, p) [m/N], slide of port p taken by a force on another; give: (n,) [m/N], motion of a coordinate per
-        force.
-        """
+    def arrays(self, prop, plant, mass: float) -> arrays.Joints:
+        """Fresh `arrays.Joints` of a march, from the Propagator and the Plant of its modes [kg]."""
         e, (p, n), numbers = len(self.joints), self.rows.shape, number_of(self.laws)
         elements = [one.element for one in self.joints]
         num, mem = (np.zeros((e, max(1, *(len(part) for part in parts)))) for parts in (
@@ -133,12 +136,18 @@ class JointsModel:
                 *(one.limit or max(self.scale, 1e-300) for one in elements)]
         ports, rubs = (np.array(part, np.int64) for part in zip(*(
             (one.port, one.potential is None) for one in self.joints)))
+        holds = np.array([k for k, one in enumerate(elements) if not one.kernels], np.int64)
+        quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n:]
+        gamma, m, at = quick @ prop.rows.T / mass, holds.size, ports[holds]
+        gives = [give[np.ix_(at, at)] for give in (prop.beta, gamma, prop.rows @ prop.rows.T / mass)]
+        stops = arrays.Stops(holds, np.zeros(m, np.int64), np.array(num[holds, 1:3].T, order="C"), np.array(gives),
+                             np.ascontiguousarray(prop.rows[at]), np.zeros((m, m)), np.zeros((18, m)))
         return arrays.Joints(
-            np.array([self.patch is not None], np.int64), np.array(beta, float), np.ascontiguousarray(self.rows, float),
-            ports, rubs, num, mem, np.array([one.limit if one.bounded else np.inf for one in elements]),
-            GOAL * np.array(goal), give,
-            np.zeros((e, 2)), np.zeros(e), np.zeros(2), np.zeros(p), *np.zeros((5, e)), np.zeros((e, e)),
-            np.zeros((3, n)), np.zeros((n, n)))
+            np.array([self.patch is not None], np.int64), np.array(prop.beta, float),
+            np.ascontiguousarray(self.rows, float), ports, rubs, num, mem,
+            np.array([one.limit if one.bounded else np.inf for one in elements]), GOAL * np.array(goal),
+            plant.push[0] / mass, np.zeros((e, 2)), np.zeros(e), np.zeros(2), np.zeros(p), *np.zeros((5, e)),
+            np.zeros((e, e)), np.zeros((3, n)), np.zeros((n, n)), gamma, np.zeros(p), stops)
 
 
 class JointsRun(Run):
@@ -147,7 +156,7 @@ class JointsRun(Run):
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
         self.loop = loop_of(model.laws, model.kind)
-        self.joints = model.arrays(self.prop.beta, self.plant.push[0] / modes.mass)
+        self.joints = model.arrays(self.prop, self.plant, modes.mass)
         self.rubs = self.joints.rubs == 1
         self.width = 2 * modes.omega.size + 7 + 4 * len(model.joints)
         self.ledger[0] += self.strained()
@@ -155,28 +164,29 @@ class JointsRun(Run):
     def fork(self, drive):
         """A copy of the march as it stands, its joints too, that goes on under another drive."""
         twin = super().fork(drive)
-        twin.joints = type(self.joints)(*(array.copy() for array in self.joints))
+        twin.joints = arrays.copied(self.joints)
         return twin
 
     def _moving(self) -> tuple:
-        return *super()._moving(), *self.joints
+        return *super()._moving(), *self.joints[:-1], *self.joints.stops
 
     def _steps(self, count: int, rows) -> tuple:
         table, row = self.table(count)
         return self.loop.march(row, count, self.state, self.plant, table, self.contact, self.joints, float(self.travel),
                                self.ledger, rows)
 
-    def _works(self, rows) -> np.ndarray:
-        return rows[:-1, 2 * self.modes.omega.size + 6]
-
     def _sampled(self, rows) -> np.ndarray:
         n, out = 2 * self.modes.omega.size, np.zeros(len(rows) - 1)
+        blows = rows[:-1, n + 6].copy()  # what is left of the work where all that rubs holds: as of a Run
         if self.model.patch is not None:
-            out += sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4] if self.model.patch.set_valued else None)
+            out += sampled_work(rows[:, n], rows[:, n + 2])
+            blows[:] = 0.0
         for k in np.flatnonzero(self.rubs):
             slide, _, force, _ = rows[:, n + 7 + 4 * k:n + 11 + 4 * k].T
-            out += sampled_work(slide, force, None if self.model.joints[k].element.kernels else force[:-1])
-        return out
+            smooth = bool(self.model.joints[k].element.kernels)
+            out += sampled_work(slide, force, None if smooth else force[:-1])
+            blows = 0.0 * blows if smooth else blows - force[:-1] * np.diff(slide)
+        return out + blows
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, e) [m/s] and slips (k, e) [m] of the patch and of all elements in booked rows."""

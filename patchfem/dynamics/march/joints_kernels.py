@@ -2,8 +2,9 @@
 
 Port p is a row of slides; the patch, where there is one, and the elements each act on one port. Within a step the path-
 mean forces F satisfy d = free - beta F together with every law. Turn by turn each law is solved with the others held
-(block descent on a convex problem for laws that dissipate); the rest of the forces moves d of the others by beta. The
-text runs with any patch and any laws: `joints` makes an instance per set of them.
+(block descent on a convex problem for laws that dissipate); the rest of the forces moves d of the others by beta. All
+set-valued elements are one block, followed from stop to release inside the step (`joints_stops_kernels`). The text runs
+with any patch and any laws: `joints` makes an instance per set of them.
 """
 
 import numpy as np
@@ -14,12 +15,13 @@ from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws.coulomb_kernels import stick
 from ..contacts import coulomb_kernels as patch
 from ..contacts import element_solve_kernels as solver
-from ..modal_kernels import free_slide, move, note, sample, stored, tell
+from ..modal_kernels import free_rate, free_slide, move, note, sample, stored, tell
 from . import joints_solve_kernels as together
+from . import joints_stops_kernels as stops
+from .joints_shares_kernels import DQ, FREE, HOLDS, MEAN, RATE, START
 
-TURNS = 1000  # of all elements in a step before it counts as failed
+TURNS, FEW = 1000, 60  # of all elements in a step before it counts as failed; with stops and releases inside it
 ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
-HOLDS = 0  # of num: the law that holds without a stretch
 
 
 @njit(error_model="numpy", **LEAN)
@@ -79,21 +81,26 @@ def turned(e, turn, j, dt):
 
 
 @njit(error_model="numpy", **LEAN)
+def patched(q, v, dt, c, j):
+    """Solve the patch with all elements held: (its slide, change of its force over its goal, iterations)."""
+    free = j.free[0] - elsewhere(-1, 0, j)
+    dq, _, tries = patch.solve(free, j.beta[0, 0], q, v, dt, c, j.goal[0])
+    used = (free - dq) / j.beta[0, 0]
+    change = abs(used - j.own[0]) / (j.goal[0] + ROUND * (abs(j.free[0]) / j.beta[0, 0] + abs(used)))
+    j.own[0] = used
+    return dq, change if tries >= 0 else np.inf, abs(tries)
+
+
+@njit(error_model="numpy", **LEAN)
 def agreed(there, smooth, q, v, dt, c, j):
     """Forces of patch and elements over a step, in j.own, j.forces and j.dq: (slide of the patch, iterations), < 0
-    where they do not agree."""
+    where they do not agree. Every element takes its turn, a set-valued one by the mean force alone."""
     count, iterations, last_worst, worst, dq = j.ports.size, 0, np.inf, 0.0, 0.0
     for turn in range(TURNS):
         worst = 0.0
         if there:
-            free = j.free[0] - elsewhere(-1, 0, j)
-            dq, _, tries = patch.solve(free, j.beta[0, 0], q, v, dt, c, j.goal[0])
-            used = (free - dq) / j.beta[0, 0]
-            worst = abs(used - j.own[0]) / (j.goal[0] + ROUND * (abs(j.free[0]) / j.beta[0, 0] + abs(used)))
-            j.own[0] = used
-            iterations += abs(tries)
-            if tries < 0:
-                worst = np.inf
+            dq, worst, tries = patched(q, v, dt, c, j)
+            iterations += tries
         for e in range(count):
             change, tries = turned(e, turn, j, dt)
             worst = max(worst, change)
@@ -103,13 +110,86 @@ def agreed(there, smooth, q, v, dt, c, j):
         if smooth and turn > 1:
             iterations += abs(together.solve_smooth(j, dt))
         elif turn > 4 and not there and worst > 0.2 * last_worst:
-            together.newton_turn(j, dt)
+            together.newton_turn(j, dt, False)
         last_worst = worst
     return dq, -iterations
 
 
 @njit(error_model="numpy", **LEAN)
-def held(i, there, dq, force, j, rows):
+def beside(j):
+    """Free slides and speeds of the set-valued elements under the forces of all others, into j.stops.field."""
+    s = j.stops
+    for i in range(s.names.size):
+        p = j.ports[s.element[i]]
+        slide, speed = j.free[p] - j.beta[p, 0] * j.own[0], j.rate[p] - j.gamma[p, 0] * j.own[0]
+        for e in range(j.ports.size):
+            if j.num[e, 0] != HOLDS:
+                slide -= j.beta[p, j.ports[e]] * j.forces[e]
+                speed -= j.gamma[p, j.ports[e]] * j.forces[e]
+        s.field[FREE, i], s.field[RATE, i] = slide, speed
+
+
+@njit(error_model="numpy", **LEAN)
+def taken(j):
+    """Forces and slides of the set-valued elements into j.forces and j.dq; the largest change of a force over its
+    goal."""
+    s, worst = j.stops, 0.0
+    for i in range(s.names.size):
+        e, force = s.element[i], s.field[MEAN, i]
+        worst = max(worst, abs(force - j.forces[e]) / (j.goal[1 + e] + ROUND * abs(force)))
+        j.forces[e], j.dq[e] = force, s.field[DQ, i]
+    return worst
+
+
+@njit(error_model="numpy", **LEAN)
+def passed(there, q, v, dt, c, j):
+    """As `agreed`, with the stops and releases of the set-valued elements inside the step, and their blows.
+
+    (slide of the patch, iterations, True), False where no such step is found or it would give energy. Which of them
+    stop and go is settled in the first turns; then the slides that follow from it are kept.
+    """
+    s, iterations, last_worst, dq = j.stops, 0, np.inf, 0.0
+    for i in range(s.names.size):
+        s.field[START, i] = j.v[s.element[i]]
+    for turn in range(FEW):
+        worst = 0.0
+        if there:
+            dq, worst, tries = patched(q, v, dt, c, j)
+            iterations += tries
+        for e in range(j.ports.size):
+            if j.num[e, 0] != HOLDS:
+                change, tries = turned(e, turn, j, dt)
+                worst = max(worst, change)
+                iterations += tries
+        beside(j)
+        if (turn < FEW // 2 and not stops.watched(dt, s)) or not stops.met(s):
+            return dq, iterations, False
+        worst = max(worst, taken(j))
+        iterations += 1
+        if worst <= 1.0 or (s.names.size == j.ports.size and not there):
+            return dq, iterations, stops.blows(s) >= 0.0
+        if turn > 4 and not there and worst > 0.2 * last_worst:
+            together.newton_turn(j, dt, True)
+        last_worst = worst
+    return dq, iterations, False
+
+
+@njit(error_model="numpy", **LEAN)
+def blown(found, motion, mass, j):
+    """Strike the modes by the blows of the set-valued elements, in place; the energy that they take [J].
+
+    found: whether they are known, else they bring to rest what did not slide.
+    """
+    s = j.stops
+    if not found:
+        for i in range(s.names.size):
+            s.field[DQ, i] = j.dq[s.element[i]]
+        stops.brought(motion, s)
+    return stops.struck(motion, mass, s)
+
+
+@njit(error_model="numpy", **LEAN)
+def held(i, there, j, rows):
     """Write the forces at sample i of what is set-valued.
 
     Between steps of stick it is the mean of both steps, else that of the step that follows.
@@ -117,12 +197,10 @@ def held(i, there, dq, force, j, rows):
     n, m = j.room.shape[1], 2 * j.room.shape[1] + 7
     for e in range(j.ports.size):
         if j.num[e, 0] == HOLDS:
-            rests = j.dq[e] == 0.0 and j.last[e, 0] == 0.0
+            rests = j.dq[e] == 0.0 and j.last[e, 0] == 0.0  # of two steps; j.last is still that of the step before
             rows[i, m + 4 * e + 2] = 0.5 * (rows[i, m + 4 * e + 2] + j.forces[e]) if rests else j.forces[e]
             if e == 0 and not there:
                 rows[i, 2 * n + 2] = rows[i, m + 2]
-    if there and patch.SET_VALUED:
-        rows[i, 2 * n + 2] = 0.5 * (force + j.own[0]) if dq == 0.0 and j.own[1] == 0.0 else j.own[0]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -168,9 +246,8 @@ def march(first, steps, motion, plant, table, c, j, travel, ledger, rows):
     every element; the energy in them is that of the friction alone. Returns (steps done, status).
     """
     n, around, dt, mass, there = plant.slide.size, table.shape[0], plant.dt, plant.mass, j.there[0] == 1
-    accel, spare, smooth = plant.room[0], plant.room[1:], not there and plant.dense.size == 0
-    for e in range(j.ports.size):
-        smooth = smooth and j.num[e, 0] != HOLDS
+    accel, spare, some = plant.room[0], plant.room[1:], j.stops.names.size > 0
+    smooth = not some and not there and plant.dense.size == 0
     for i in range(steps + 1):
         q, v, out = sample(rows[i], motion, plant.slide, plant.output)
         force, slip, energy, springs = sampled(i, motion, j, rows)
@@ -188,14 +265,26 @@ def march(first, steps, motion, plant, table, c, j, travel, ledger, rows):
         at = (first + i) % around
         for p in range(j.free.size):
             j.free[p] = free_slide(motion, plant.reach, p, table, at)
+            if some:
+                j.rate[p] = free_rate(motion, j.rows[p], plant.free, plant.dense, table, at)
         for e in range(j.ports.size):
             j.eps[e] = law.middle(j.num, j.mem, e, j.v[e], dt)
-        dq, iterations = agreed(there, smooth, q, v, dt, c, j)
-        held(i, there, dq, force, j, rows)
+        found, tried, iterations = False, 0, 0
+        if some:
+            dq, tried, found = passed(there, q, v, dt, c, j)
+        if not found:
+            dq, iterations = agreed(there, smooth, q, v, dt, c, j)
+        iterations = tried if found else (iterations + tried if iterations >= 0 else iterations - tried)
+        held(i, there, j, rows)
         work = pushed(there, dq, plant, j, accel)
         tell(iterations, work, ledger)
         move(motion, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
         rows[i, 2 * n + 4] = j.own[0] if there else (j.forces[0] if j.rubs[0] else 0.0)
+        if some:
+            blow = blown(found, motion, mass, j)
+            work += blow
+            ledger[3] += blow
+            ledger[8] += blow
         rows[i, 2 * n + 6] = work
         lost, ok = committed(there, q, v, dq, motion, plant, c, j)
         ledger[3] += lost

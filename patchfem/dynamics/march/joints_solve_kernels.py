@@ -12,8 +12,7 @@ from numba import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from ..dense_kernels import eliminate, factor, solve
-
-HOLDS = 0  # of num: the law that holds without a stretch
+from .joints_shares_kernels import HOLDS, SLIDE, SLIDES
 
 
 @njit(error_model="numpy", **LEAN)
@@ -99,22 +98,26 @@ def solve_smooth(j, dt):
 
 
 @njit(error_model="numpy", **LEAN)
-def equations(j, dt):
+def equations(j, dt, known):
     """Newton's equations j.system (e, e), j.miss (e,) on the forces of all elements, residual forces - law(free - beta
     forces).
 
     An element that holds asks for no slide, with a trace of give where elements that depend on each other share their
-    force in more ways than one; one that slips keeps its force.
+    force in more ways than one; one that slips keeps its force. known: the slides of those that do not slip all the way
+    stand in j.stops instead (`joints_stops_kernels`).
     """
-    count, beta = j.forces.size, j.beta
+    count, beta, face = j.forces.size, j.beta, 0
     for e in range(count):
         p = j.ports[e]
         dq, own = j.free[p], beta[p, p]
         for k in range(count):
             dq -= beta[p, j.ports[k]] * j.forces[k]
         if j.num[e, 0] == HOLDS:
-            holds = abs(j.forces[e]) < j.num[e, 1] * (1 - 1e-12) and abs(j.forces[e]) != j.num[e, 2]
-            j.miss[e] = dq / own if holds else 0.0
+            holds, goal = abs(j.forces[e]) < j.num[e, 1] * (1 - 1e-12) and abs(j.forces[e]) != j.num[e, 2], 0.0
+            if known:
+                holds, goal = j.stops.field[SLIDES, face] == 0.0, j.stops.field[SLIDE, face]
+            face += 1
+            j.miss[e] = (dq - goal) / own if holds else 0.0
             for k in range(count):
                 j.system[e, k] = beta[p, j.ports[k]] / own if holds else 0.0
             j.system[e, e] += 1e-9 if holds else 1.0
@@ -127,10 +130,11 @@ def equations(j, dt):
 
 
 @njit(error_model="numpy", **LEAN)
-def newton_turn(j, dt):
-    """One Newton step on the forces of all elements at once, without a patch; False where it fails."""
+def newton_turn(j, dt, known):
+    """One Newton step on the forces of all elements at once, without a patch; False where it fails. known: as of
+    `equations`."""
     count, miss = j.forces.size, j.miss
-    equations(j, dt)
+    equations(j, dt, known)
     if not eliminate(j.system, miss):  # pivots in place: 1 + slope beta leads its row for laws that resist
         return False
     for e in range(count):

@@ -159,7 +159,7 @@ class Run:
         if start is not None:
             self.state[:] = start.z, start.v
         self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
-        self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 6
+        self.totals, self.width = np.zeros(3), 2 * modes.omega.size + 7
         self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
         self.plant = plant_of(modes, self.prop)
@@ -240,14 +240,18 @@ class Run:
 
     def _works(self, rows) -> np.ndarray:
         """Friction work [J] of the steps between the rows."""
-        n = 2 * self.modes.omega.size
-        return rows[:-1, n + 4] * np.diff(rows[:, n])
+        return rows[:-1, 2 * self.modes.omega.size + 6]
 
     def _sampled(self, rows) -> np.ndarray:
-        """Friction work [J] of the steps between the rows, off their slides and forces alone."""
+        """Friction work [J] of the steps between the rows, off their slides and forces alone.
+
+        What blows take at the end of a step, from a slide that stops or holds, has no slide to be read off: it counts.
+        """
         n = 2 * self.modes.omega.size
-        jumps = getattr(self.model, "set_valued", False)
-        return sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4] if jumps else None)
+        if not getattr(self.model, "set_valued", False):
+            return sampled_work(rows[:, n], rows[:, n + 2])
+        blows = rows[:-1, n + 6] - rows[:-1, n + 4] * np.diff(rows[:, n])
+        return sampled_work(rows[:, n], rows[:, n + 2], rows[:-1, n + 4]) + blows
 
     def _moving(self) -> tuple:
         """The arrays that a step changes besides those of the contact."""
@@ -283,10 +287,11 @@ class Run:
 
     def strained(self) -> float:
         """Energy stored in the interface [J]."""
-        rows = np.empty((1, 2 * self.modes.omega.size + 6))
+        n = 2 * self.modes.omega.size
+        rows = np.empty((1, n + 7))
         self.hub.march(self.model.kind, 0, 0, self.state, self.plant, np.zeros((1, 1)), self.contact, 1.0, np.inf,
                        np.zeros(9), rows)
-        return float(rows[0, -1])
+        return float(rows[0, n + 5])
 
     def book(self) -> dict:
         """The energy ledger [J]."""

@@ -200,7 +200,7 @@ class VaryingLoadRun(Run):
         self.rub = compiled("dynamics.march.varying_friction_kernels").Rub(
             np.array(law.force, float), memory, now.copy(), now, np.array(psi.T, order="C"), np.arange(x.size),
             **sheared(weight, law.length, law.growth, psi, kappa))
-        self.held = np.zeros(2)
+        self.held = np.zeros(3)
         self.width += 5
         self.ledger[0] += self.strained()
 

@@ -4,7 +4,8 @@ Heave h (> 0 away) and pitch t (> 0 opens +x) move the upper holder, so d = -h c
 exactly under constant forces. Those of the normal contact are the path mean of its slopes along the straight increment,
 through every contact set on the way, so they do exactly the work E(end) - E(start) (a discrete gradient; McLachlan,
 Quispel, Robidoux, Phil. Trans. R. Soc. A 357, 1999). Friction acts with the path mean of its law under the mean load of
-the step. So the sum of all energies never rises by itself.
+the step; Coulomb's stops and goes inside it, under a load that changes linearly (`contacts.stop_kernels`). So the sum
+of all energies never rises by itself.
 """
 
 from typing import NamedTuple
@@ -15,7 +16,18 @@ from numba import njit
 from ...contact.press_kernels import locate, press_state, pull
 from ...contact.press_path_kernels import path_mean
 from ...friction.flags_kernels import LEAN
-from ..modal_kernels import accelerations, free_slide, move, note, sample, stored
+from ..contacts.stop_kernels import through
+from ..modal_kernels import (
+    accelerations,
+    free_rate,
+    free_slide,
+    move,
+    note,
+    rate_given,
+    sample,
+    stored,
+    struck,
+)
 from .varying_friction_kernels import COULOMB, RATE, press_all, rub_commit, rub_solve, rub_state, spring_back
 
 
@@ -96,13 +108,28 @@ def pressed(begin, k, load, pointed, sets, rub):
 
 
 @njit(error_model="numpy", **LEAN)
-def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub, sets, goal, force, turn, out):
+def slid_on(free, force, load, mean, v, dt, beta, rub, ends):
+    """(slide dq [m], mean friction force [N]) of a step of Coulomb's law under a load that goes from `load` to 2 mean -
+    load [N]; its speed at the end and whether it rests there into `ends`, as of `agreed`."""
+    after = max(2 * mean - load, 0.0)
+    rate = ends[0] - ends[2] * force[1] - ends[3] * force[2]
+    dq, ends[5], rests = through(free, rate, beta, ends[1], ends[4], v, dt, rub.force[0] * load, rub.force[0] * after,
+                                 rub.force[1] * load, rub.force[1] * after, v == 0.0 or ends[6] == 1.0, np.inf)
+    ends[7] = 1.0 if rests else 0.0
+    return dq, (free - dq) / beta
+
+
+@njit(error_model="numpy", **LEAN)
+def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub, sets, goal, force, turn, out,
+           ends):
     """Friction and normal contact over a step, each under the mean force of the other: (dq [m], mean friction force
     [N], set at its end, iterations, True where they disagree); set < 0 where no contact set fits.
 
     after [N]: load at the end, NaN where the contact says it; coupling: 0 where the load does not follow the motion, 1
     where it follows heave and pitch alone, 2 where friction moves them too. Then the secant, kept inside its bracket,
-    finds the friction force that both agree on.
+    finds the friction force that both agree on. ends (8,): slide speed at the end without forces; what forces on slide,
+    heave and pitch take from it [m/(s N)]; acceleration per friction [1/kg]; of Coulomb's law the speed at the end,
+    whether it rests at the start and at the end of the step.
     """
     beta, pointed = ports.beta, not (kind == COULOMB or kind == RATE)
     guess, count, wrong, end, bad = held[1], 0, 0.0, k, False
@@ -125,7 +152,10 @@ def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub,
                 press_state(sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], rub.now)
         slides = free[0] - beta[0, 1] * force[1] - beta[0, 2] * force[2]
         press_all(kind, rub)
-        dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
+        if kind == COULOMB and beta[0, 0] > 0.0:
+            (dq, used), its = slid_on(slides, force, load, mean, v, dt, beta[0, 0], rub, ends), 1
+        else:
+            dq, used, its = rub_solve(slides, beta[0, 0], v, dt, kind, rub, mean, goal, held[1])
         count += abs(its)
         bad = its < 0 or wrong > goal
         miss = used - guess
@@ -135,6 +165,7 @@ def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub,
             if kind == COULOMB and beta[0, 0] > 0 and rub.force[1] * mean <= abs(guess) <= rub.force[0] * mean:
                 used = guess  # between kinetic and static friction the step starts to slip
                 dq = slides - beta[0, 0] * used
+                ends[5], ends[7] = ends[0] - ends[2] * force[1] - ends[3] * force[2] - ends[1] * used, 0.0
             else:
                 bad = bad or abs(miss) > goal
             break
@@ -153,14 +184,14 @@ def agreed(free, k, load, after, v, held, begin, coupling, dt, kind, ports, rub,
 
 
 @njit(error_model="numpy", **LEAN)
-def last_force(used, dq, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare):
-    """Friction force [N] at the end of a step: of the speed, of the slip, or what keeps a stuck contact at rest."""
+def last_force(used, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare, rests):
+    """Friction force [N] at the end of a step: of the speed, of the slip, or what keeps a contact at rest there."""
     if kind == RATE:
         return rub.force[0] * load * np.tanh(v1 / rub.force[1])
     if kind != COULOMB:
         return used
-    if dq != 0.0:
-        return rub.force[1] * load * (1.0 if dq > 0 else -1.0)
+    if not rests:
+        return rub.force[1] * load * (1.0 if v1 > 0 else -1.0)
     force[0] = 0.0
     pushed(ports.rows, force, plant.mass, accel)
     base = table[at, 8 * accel.size + 2]
@@ -177,17 +208,21 @@ def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, set
           rows):
     """March `steps` steps from row `first` of the table of the drive.
 
-    held (2,): last friction force, mean force of the step before; at_set (1,): slot of the present set; rub:
-    `dynamics.march.varying_friction_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the steps,
-    empty where the contact says it;
-    ledger as in `dynamics.march.loop_kernels.march`; rows (steps + 1, 2 n + 11) as there, then load, moment,
-    energy of the
-    preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
+    held (3,): last friction force, mean force of the step before, 1 while Coulomb friction holds; at_set (1,): slot of
+    the present set; rub: `dynamics.march.varying_friction_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the
+    steps, empty where the contact says it;
+    ledger as in `dynamics.march.loop_kernels.march`; rows (steps + 1, 2 n + 12) as there, then load, moment, energy of
+    the preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
     contact set fits.
     """
     slide, mass, n, around, beta = plant.slide, plant.mass, plant.omega.size, table.shape[0], ports.beta
     free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
-    accel, spare = np.empty(n), np.empty((2, n))
+    accel, spare, ends = np.empty(n), np.empty((2, n)), np.zeros(8)
+    for r in range(3):
+        ends[1 + r] = rate_given(ports.rows[0], ports.rows[r], plant.push, plant.dense, mass)
+    for j in range(n):
+        ends[4] += slide[j] * slide[j] / mass
+    ends[6] = held[2]
     given, pointed = loads.size > 0, not (kind == COULOMB or kind == RATE)
     apart = given or (beta[1, 1] == 0 and beta[2, 2] == 0)
     coupling = 0 if apart else (2 if beta[0, 1] != 0 or beta[0, 2] != 0 else 1)
@@ -204,8 +239,8 @@ def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, set
             if k < 0:
                 return i, 4
         at_set[0] = k
-        rows[i, 2 * n + 6], rows[i, 2 * n + 7], rows[i, 2 * n + 8] = load, moment, begin[2]
-        rows[i, 2 * n + 9], rows[i, 2 * n + 10] = begin[0], begin[1]
+        rows[i, 2 * n + 7], rows[i, 2 * n + 8], rows[i, 2 * n + 9] = load, moment, begin[2]
+        rows[i, 2 * n + 10], rows[i, 2 * n + 11] = begin[0], begin[1]
         bound = load * (np.inf if pointed else rub.force[0]) if load > 0 else 0.0
         held[0] = min(max(held[0], -bound), bound)
         now, energy, slip = rub_state(kind, rub, q, held[0])
@@ -218,23 +253,31 @@ def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, set
         at = (first + i) % around
         for r in range(3):
             free[r] = free_slide(state, plant.reach, r, table, at)
+        ends[0] = free_rate(state, slide, plant.free, plant.dense, table, at) if kind == COULOMB else 0.0
         for j in range(rub.now.size if pointed else 0):
             rub.before[j] = rub.now[j]
         dq, used, end, count, bad = agreed(free, k, load, loads[i + 1] if given else np.nan, v, held, begin, coupling,
-                                           plant.dt, kind, ports, rub, sets, goal, force, turn, out)
+                                           plant.dt, kind, ports, rub, sets, goal, force, turn, out, ends)
         if end < 0:
             return i, 4
         force[0] = used
         ledger[5] += count
         ledger[6] = max(ledger[6], count)
         ledger[7] += 1.0 if bad else 0.0
-        ledger[8] += used * dq
         pushed(ports.rows, force, mass, accel)
         move(state, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
-        rows[i, 2 * n + 4] = used
+        rows[i, 2 * n + 4], work = used, used * dq
         held[1], k, v1 = used, end, 0.0
         for j in range(n):
             v1 += slide[j] * state[1, j]
+        if kind == COULOMB and beta[0, 0] > 0.0 and ends[5] != v1:
+            blow = struck(state, slide, ends[5], v1, mass)
+            work, v1 = work + blow, ends[5]
+            ledger[3] += blow
+        rows[i, 2 * n + 6] = work
+        ledger[8] += work
+        ends[6] = ends[7]
+        held[2] = ends[6]
         ledger[3] += rub_commit(dq, used, v, v1, plant.dt, kind, rub)
         if rub.b.size:
             lost, its = spring_back(kind, rub, goal)
@@ -246,5 +289,6 @@ def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, set
         elif not apart:
             load = max(sets.base[0] - out[3], 0.0)
             force[1], force[2] = out[3], out[4]
-        held[0] = last_force(used, dq, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare)
+        held[0] = last_force(used, v1, load, state, kind, plant, rub, ports, force, at, table, accel, spare,
+                             ends[7] == 1.0)
     return steps, 0

@@ -42,7 +42,9 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
                       shape[0], mass, None, rows, shapes=shape)
 
 
-ALL = tuple(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh"))
+# of all tests but one, so that they share one compiled loop
+ALL = (*(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
+       "dynamics.march.spring_kernels")
 
 
 def coulomb(port, static, kinetic):
@@ -79,9 +81,9 @@ PAIRS = {
 def test_exact_one_element_is_the_contact_of_its_own_loop(law):
     model, element = PAIRS[law]
     alone = march(one(), DRIVE, model, 6, 100, window=6)
-    turns = march(one(), DRIVE, JointsModel(None, (element(),), np.ones((1, 1)), 49.0), 6, 100, window=6)
-    as_patch = march(one(), DRIVE, JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0), 6, 100,
-                     window=6)
+    turns = march(one(), DRIVE, JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL), 6, 100, window=6)
+    beside = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
+    as_patch = march(one(), DRIVE, beside, 6, 100, window=6)
     scale = np.abs(alone.response.slide).max()
     for other in (turns, as_patch):
         assert other.outcome is None
@@ -101,7 +103,7 @@ def test_exact_potential_springs_keep_their_energy_and_find_their_period(element
     """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
     start, errors = Start(np.array([1.0]), np.zeros(1)), []
     for steps in (20, 100, 500):
-        model = JointsModel(None, (element,), np.ones((1, 1)), 1.0)
+        model = JointsModel(None, (element,), np.ones((1, 1)), 1.0, ALL)
         got = march(one(0.0, 0.0), release(2 * np.pi), model, 30, steps, window=30, start=start)
         assert got.outcome is None
         assert got.ledger["work_in"] == pytest.approx(got.ledger["stored"], rel=1e-9)
@@ -138,7 +140,8 @@ def test_order_three_masses_with_three_unlike_interfaces():
     laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
     truth = by_dop853(modes, drive, [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)], 4 * drive.period,
                       np.linspace(0, 4 * drive.period, 101))
-    model = JointsModel(None, tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)), modes.interfaces, 1.0)
+    model = JointsModel(None, tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)), modes.interfaces, 1.0,
+                        ALL)
     errors = []
     for steps in (100, 200, 400, 800):
         got = march(modes, drive, model, 4, steps, window=4)
@@ -157,7 +160,7 @@ def test_exact_two_alike_interfaces_stop_together():
     modes = chain([1.0, 0.0])
     both = ModalBasis(("1", "2"), np.ones(2), np.full(2, 0.003), np.array([1.0, 0]), np.ones(2), np.array([1.0, 0]),
                       1.0, None, np.eye(2))
-    model = JointsModel(None, (coulomb(0, 0.8, 0.8), coulomb(1, 0.8, 0.8)), np.eye(2), 1.0)
+    model = JointsModel(None, (coulomb(0, 0.8, 0.8), coulomb(1, 0.8, 0.8)), np.eye(2), 1.0, ALL)
     got = march(both, BaseSine(1.0, 1.0), model, 30, 200)
     alone = march(one(1.0), BaseSine(1.0, 1.0), coulomb_model(0.8, 0.8), 30, 200)
     assert np.array_equal(*got.response.extra["slides"].T)
@@ -175,7 +178,8 @@ def test_always_energy_closes_and_friction_only_takes(seed):
     modes = chain(rng.uniform(0.0, 5.0, n) * (rng.random(n) > 0.2), zeta=rng.uniform(0, 0.1), faces=faces)
     limit, length = rng.uniform(0.05, 2.0, n), 10 ** rng.uniform(-3, 0, n)
     kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
-    makers = {"coulomb": lambda p: coulomb(p, limit[p], limit[p]), "ep": lambda p: elastic_plastic(p, limit[p],
+    kinetic = limit * rng.choice([0.3, 1.0], n)
+    makers = {"coulomb": lambda p: coulomb(p, limit[p], kinetic[p]), "ep": lambda p: elastic_plastic(p, limit[p],
                                                                                                  length[p]),
               "bonds": lambda p: bonds(p, Bonds(0.5, length[p]), 2 * limit[p]),
               "tanh": lambda p: rate(p, limit[p], length[p])}
@@ -192,6 +196,28 @@ def test_always_energy_closes_and_friction_only_takes(seed):
     assert np.all(forces <= limit * (1 + 1e-9))
 
 
+@pytest.mark.parametrize("seed, faces, modes, coupled", [(3, 2, 3, False), (1, 3, 2, True)],
+                         ids=["two faces", "three faces of two modes"])
+def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces, modes, coupled):
+    """Stops and releases of faces that feel each other, one of them held by the others, against the exact engine."""
+    rng = np.random.default_rng(seed)
+    rows, root = rng.uniform(-1, 1, (faces, modes)), rng.normal(size=(modes, modes))
+    limit = rng.uniform(0.1, 0.5, faces)
+    basis = ModalBasis(tuple("abc"[:modes]), np.sort(rng.uniform(0.5, 4.0, modes)), np.full(modes, 0.02), rows[0],
+                       rng.uniform(-1, 1, modes), rows[0], 1.0, 0.05 * root @ root.T if coupled else None, rows)
+    drive, errors = BaseSine(1.0, 0.8), []
+    truth = simulate(basis, drive, limit, 0.4 * limit, 5, 5)
+    model = JointsModel(None, tuple(coulomb(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL)
+    for steps in (400, 1600, 6400):
+        got = march(basis, drive, model, 5, steps, window=5)
+        book = got.ledger
+        miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
+        assert got.outcome is None and abs(miss) <= 1e-11 * (book["power"] + book["peak_stored"])
+        assert got.response.extra["ledger"][3, -1] == 0.0
+        errors.append(np.abs(got.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max())
+    assert errors[0] < 1e-3 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4
+
+
 def test_exact_strips_that_yaw_are_those_of_the_event_engine():
     """Eight Coulomb strips of unlike loads on two modes: their friction depends on each other, the motion does not."""
     offsets = (np.arange(8) - 3.5) * 1.6e-3
@@ -200,7 +226,7 @@ def test_exact_strips_that_yaw_are_those_of_the_event_engine():
     modes = ModalBasis(("axial", "yaw"), omega, np.full(2, 0.003), faces[0], unit, unit, 0.884, None, faces)
     limit = 34.7 * np.linspace(0.2, 1.8, 8) / 8
     elements = tuple(coulomb(k, f, f) for k, f in enumerate(limit))
-    got = march(modes, DRIVE, JointsModel(None, elements, faces, 43.0), 30, 800, window=5)
+    got = march(modes, DRIVE, JointsModel(None, elements, faces, 43.0, ALL), 30, 800, window=5)
     truth = simulate(modes, DRIVE, limit, limit, 30, 5)
     assert got.outcome is None
     assert got.amplitudes[-5:] == pytest.approx(truth.amplitudes[-5:], rel=2e-3)
@@ -230,7 +256,7 @@ def test_exact_an_elastic_rod_on_a_friction_bed():
                         modes.interfaces[0], 1.0, None, modes.interfaces)
     limit = np.full(n, h)
     limit[0] = h / 2
-    model = JointsModel(None, tuple(coulomb(k, f, f) for k, f in enumerate(limit)), modes.interfaces, 1.0)
+    model = JointsModel(None, tuple(coulomb(k, f, f) for k, f in enumerate(limit)), modes.interfaces, 1.0, ALL)
     got = march(pulled, drive, model, 2, 1500, window=1)
     assert got.outcome is None
     swing = np.ptp(got.window.slide) / 2
