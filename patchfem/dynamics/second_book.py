@@ -6,7 +6,7 @@ trapezoidal rule on slide and force as they are sampled knows nothing of it.
 
 import numpy as np
 
-ROUND = 1e-12  # of the energy that passes through a run, below which friction work is round-off
+ROUND = 1e-10  # of the energy that passes through a run, below which friction work is round-off
 
 
 def sampled_work(slide, force, after=None) -> np.ndarray:

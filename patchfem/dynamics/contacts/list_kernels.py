@@ -7,11 +7,12 @@ import numpy as np
 from numba import njit
 
 from ...friction.bonds.list_kernels import list_mean, list_slope, list_step
-from ...friction.bonds.list_sum_kernels import MOMENTS
+from ...friction.bonds.list_sum_kernels import MOMENTS, POWER
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import narrowed
 
 SET_VALUED = False
+OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stretched bonds may owe
 
 
 @njit(error_model="numpy", **LEAN)
@@ -54,13 +55,19 @@ def given(dq, q, v, dt, c, goal):
 def commit(dq, force, q, v0, v1, dt, c):
     """Move the list by the solved step. Returns (work that is not stored [J], whether the list had room).
 
-    That work is dissipated where positive; the printed law also creates energy, and both are summed apart.
+    That work is dissipated where positive; the printed law also creates energy, and both are summed apart. The stretch
+    reading creates none. What its sums gain in a short step beyond the work, as strips change from one rule of
+    integration to another, was in store before: it is owed, up to OWED, and the next dissipation repays it.
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
     before = c.tally[4]
     ok = list_step(dq, c, v0, v1, dt)
     net = force * dq - c.force[0] * (c.tally[4] - before)
+    if c.law[1] <= POWER and c.force[0] > 0:
+        owed = c.tally[11] - net / c.force[0]
+        c.tally[11] = min(max(owed, 0.0), OWED * c.law[2])
+        net = c.force[0] * (c.tally[11] - owed)
     if net < 0:
         c.tally[6] -= net
     else:
@@ -72,7 +79,7 @@ def commit(dq, force, q, v0, v1, dt, c):
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
     force = c.force[0] * c.tally[5]
-    return force, c.force[0] * c.tally[4], q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
+    return force, c.force[0] * (c.tally[4] - c.tally[11]), q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q
 
 
 @njit(error_model="numpy", **LEAN)

@@ -8,7 +8,7 @@ c: a named tuple with the arrays of a list, such as `dynamics.contacts.arrays.Bo
 rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
 `list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (12,): first strip, end,
 spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
-per step, strips merged although their places differ, largest length.
+per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.contacts`).
 """
 
 from math import ceil, exp, expm1
@@ -175,7 +175,8 @@ def list_mean(dq, c, v0, dt):
     low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
     short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
-    if law[1] == POWER and size > LEAST_BALANCED:
+    kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1  # the force of the first bonds turns within the increment
+    if law[1] == POWER and (size > LEAST_BALANCED or kinked):
         gain = list_energy(dq, c, v0, dt) - tally[4]
         middle = _after(dq, now, c.growth, v0, v0, dt)[5]
         spent = _path_mean(True, short, gain + tally[4], dq, c, v0, dt)

@@ -1,0 +1,80 @@
+"""Rigs whose bonds are a list, orders other than 1 and the report's reading, on random scenes: both books close."""
+
+import numpy as np
+import pytest
+
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+RIG = """[normal]
+load = "{load:.6g} N"
+[friction]
+law = "nonlocal"
+static = 0.3
+bond_length = "{length:.6g} um"
+{law}[structure]
+moving_mass = "0.9 kg"
+[[structure.mode]]
+name = "one"
+frequency = "{first:.6g} Hz"
+damping = {damping:.4g}
+slide = 1.0
+base = 0.9
+output = 1.0
+[[structure.mode]]
+name = "two"
+frequency = "{second:.6g} Hz"
+damping = 0.02
+slide = 0.4
+base = 0.2
+[drive]
+kind = "base"
+frequency = "{drive:.6g} Hz"
+acceleration = "{level:.6g} g"
+cycles = 3
+[accuracy]
+steps_per_cycle = {steps}
+"""
+
+
+def drawn(rng) -> str:
+    """A scene by chance."""
+    reading = str(rng.choice(["stretch", "report"]))
+    order = float(rng.choice([0, 0.5, 2, 3.3] if reading == "stretch" else [-0.5, 0, 0.5, 1, 2]))
+    law = f'reading = "{reading}"\norder = {order}\n'
+    law += "initial_bonds = 0\n" if order < 0 or rng.random() < 0.5 else ""
+    if rng.random() < 0.5:
+        law += f'kinetic = {rng.uniform(0.18, 0.3):.3f}\nrest_growth = "{10 ** rng.uniform(-1, 1.5):.4g} m/s^2"\n' \
+               f'slip_growth = "{10 ** rng.uniform(-1, 1):.4g} um"\n'
+    first = rng.uniform(80, 200)
+    return RIG.format(load=rng.uniform(20, 120), length=10 ** rng.uniform(0, 1.5), law=law, first=first,
+                      damping=rng.uniform(0.003, 0.05), second=first * rng.uniform(1.5, 4), steps=300,
+                      drive=first * rng.uniform(0.6, 1.4), level=rng.uniform(1, 6))
+
+
+def books(seed, count) -> list:
+    """(energy_balance, work_check, of stretch what is created over what passes, scene) of random rigs."""
+    rng, out = np.random.default_rng(seed), []
+    for _ in range(count):
+        text = drawn(rng)
+        found = run(loads(text), estimate=False)
+        value = {name: one.value for name, one in found.measures.items()}
+        passed = value["energy_dissipated"] + found.extra["book"]["power"]
+        created = value["energy_created"] / passed if '"stretch"' in text else 0.0
+        out.append((value["energy_balance"], value["work_check"], created, text))
+    return out
+
+
+def close(found) -> None:
+    for balance, check, created, text in found:
+        assert balance <= 1e-8 and created <= 1e-12, text
+        assert check <= 5e-3, text
+
+
+def test_always_both_books_of_6_random_rigs_close():
+    close(books(1, 6))
+
+
+@pytest.mark.slow
+def test_always_both_books_of_100_random_rigs_close():
+    close(books(2, 100))
