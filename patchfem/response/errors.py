@@ -73,7 +73,8 @@ def tolerance_error(fine: dict, coarse: dict) -> dict:
 
     A thirtieth of the change on the mean. One change can be small by chance, and one run can err by three times as
     much as its tolerance says; so a fraction of the typical relative change of the main measures counts besides. The
-    factors held for 97 % of 1100 values of 76 random scenes, at a median of five to nine times the error.
+    factors held for 98.4 % of the values of 40 random scenes of four laws that were not used to choose them, all of a
+    scene in 82 %, at a median of four to twelve times the error of most measures.
     """
     gaps = change(fine, coarse)
     typical = median([gaps[name] / abs(fine[name]) for name in MAIN if gaps.get(name) and fine[name]] or [0.0])
