@@ -47,6 +47,8 @@ def both(scene, steps: int) -> list:
 
 
 @pytest.mark.parametrize("law, omega, more", [
+    ('law = "coulomb"', 1.0, ""), ('law = "coulomb"\nkinetic = 0.5', 0.3, ""),
+    ('law = "coulomb"\nkinetic = 0.2', 0.3, ""), ('law = "coulomb"\nkinetic = 0.7', 0.5, SECOND),
     ('law = "elastic-plastic"\nbond_length = "0.2 m"', 0.7, ""),
     ('law = "elastic-plastic"\nbond_length = "0.05 m"', 0.5, SECOND)])
 def test_order_stick_by_samples_comes_to_stick_by_events(law, omega, more):
