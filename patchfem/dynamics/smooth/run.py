@@ -12,6 +12,7 @@ from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ..march.march import MarchResult
 from ..second_book import sampled_work
+from .arrays import Kept, Moving
 from .waves import wave_of
 
 HERE = "dynamics.smooth"
@@ -86,11 +87,11 @@ class Run:
         rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
         own = (rows, damping, self.wave.pieces, element.numbers[None], element.memory[None], [1.0, np.inf, 1.0], state,
                work, now)
-        self.moving = self.loops.steps.Moving(*(np.array(part, float, order="C") for part in own))
+        self.moving = Moving(*(np.array(part, float, order="C") for part in own))
         cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
         cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
-        self.kept = self.loops.watching.Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), tally,
-                                             np.zeros((2, size)), np.zeros((10, 6)))
+        self.kept = Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), tally,
+                         np.zeros((2, size)), np.zeros((10, 6)))
         self.turns, self.begun, self.outcome, self.message = [], 0.0, None, ""
         self.until(0.0)
         self.first, self.begun = self.settled()[0], float(self.kept.tally[STORED])

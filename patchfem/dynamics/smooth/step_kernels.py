@@ -6,7 +6,6 @@ with any law that offers its rates (`friction.protocol`).
 """
 
 from math import sin, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,29 +19,6 @@ OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
 LEAST = 1e-30  # of a size: at rest everything is as large as this
 SINES, SWEEP, ROWS = range(3)  # of now[KIND]: sines one after the other, a sweep, straight between rows
-
-
-class Moving(NamedTuple):
-    """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
-
-    rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p, 6):
-    of the drive, `waves.Wave`. num, mem of the law, turn (3,) as the law takes it. y (N,): state; work (26, N): slopes
-    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (14,): time [s],
-    length of the next step and of the first after a reversal [s], slide at the start of the motion in this direction
-    [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late, rate of the fastest mode
-    [1/s], 1 once it has begun, piece of the drive for which the first slopes stand, mass [kg], kind of the drive, its
-    piece now, 1 where it moves the base.
-    """
-
-    rows: np.ndarray
-    damping: np.ndarray
-    pieces: np.ndarray
-    num: np.ndarray
-    mem: np.ndarray
-    turn: np.ndarray
-    y: np.ndarray
-    work: np.ndarray
-    now: np.ndarray
 
 
 @njit(error_model="numpy", **INNER)

@@ -1,7 +1,6 @@
 """What is read off a step by its extension: samples, extremes and harmonics of the cycles, peaks of the last ones."""
 
 from math import cos, pi, sin
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,25 +16,6 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST, SLOTS = range(7)  # of the peaks
 # of Kept.tally
 PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PLACE, WANTED, PERIOD = 0, 6, *range(10, 20)
-
-
-class Kept(NamedTuple):
-    """What a motion leaves behind.
-
-    cycles (4, c): smallest and largest output in every cycle [m], its part at the frequency of the cycle [m]; samples
-    (s, 2 n + 7): time that is asked for, z, z', slide, its speed, force, irreversible slip, energy in the interface,
-    friction work [J]; turns (r, 2 n + 7): the same at reversals. tally (20,): largest |acceleration|, |force|, slip,
-    -slip, output, -output of the last cycles; integrals over them of slide and force times cos and -sin; |work| of the
-    drive, largest stored energy and energy lost to friction [J], steps taken and refused, rows of turns; sample and
-    place of a phasor that come next, 1 where peaks are wanted; period [s]. room (2, N); table (10, 6).
-    """
-
-    cycles: np.ndarray
-    samples: np.ndarray
-    turns: np.ndarray
-    tally: np.ndarray
-    room: np.ndarray
-    table: np.ndarray
 
 
 @njit(error_model="numpy", **INNER)

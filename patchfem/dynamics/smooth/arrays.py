@@ -1,0 +1,47 @@
+"""Arrays of the compiled steps: what moves, and what is kept of the motion."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Moving(NamedTuple):
+    """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
+
+    rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p, 6):
+    of the drive, `waves.Wave`. num, mem of the law, turn (3,) as the law takes it. y (N,): state; work (26, N): slopes
+    of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (14,): time [s],
+    length of the next step and of the first after a reversal [s], slide at the start of the motion in this direction
+    [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late, rate of the fastest mode
+    [1/s], 1 once it has begun, piece of the drive for which the first slopes stand, mass [kg], kind of the drive, its
+    piece now, 1 where it moves the base.
+    """
+
+    rows: np.ndarray
+    damping: np.ndarray
+    pieces: np.ndarray
+    num: np.ndarray
+    mem: np.ndarray
+    turn: np.ndarray
+    y: np.ndarray
+    work: np.ndarray
+    now: np.ndarray
+
+
+class Kept(NamedTuple):
+    """What a motion leaves behind.
+
+    cycles (4, c): smallest and largest output in every cycle [m], its part at the frequency of the cycle [m]; samples
+    (s, 2 n + 7): time that is asked for, z, z', slide, its speed, force, irreversible slip, energy in the interface,
+    friction work [J]; turns (r, 2 n + 7): the same at reversals. tally (20,): largest |acceleration|, |force|, slip,
+    -slip, output, -output of the last cycles; integrals over them of slide and force times cos and -sin; |work| of the
+    drive, largest stored energy and energy lost to friction [J], steps taken and refused, rows of turns; sample and
+    place of a phasor that come next, 1 where peaks are wanted; period [s]. room (2, N); table (10, 6).
+    """
+
+    cycles: np.ndarray
+    samples: np.ndarray
+    turns: np.ndarray
+    tally: np.ndarray
+    room: np.ndarray
+    table: np.ndarray
