@@ -27,6 +27,8 @@ LOOSER = {"slip_amplitude": 1.4, "stick_fraction": 1.5, "slip_start_phase": 1.4,
 SHARE, LEAST = 0.4, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.15, 0.1  # of runs that a tolerance tells apart
 ROUND = 1e-12  # of a value, the last digits of a long sum
+GAPS = ("energy_balance", "work_check")
+LAST = 1e-13  # of the amplitude, the last digits of a mean over it
 APART = ("friction_force_peak", "friction_work", "energy_stored", "energy_dissipated")  # not of the last cycles
 MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area", "friction_work")
 
@@ -94,5 +96,9 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
         error = float(sum(known) + abs(value) * least)
         if name == "slip_start_phase":
             error = min(error, np.pi / 2)  # a phase modulo pi cannot be farther off
+        elif name in GAPS:  # 0 but for what is missing, which is an error itself
+            error = max(error, abs(value))
+        elif name == "drift_per_cycle":  # a difference of means
+            error += LAST * abs(values.get("relative_displacement_amplitude", 0.0))
         out[name] = Measure(float(value), row_of(name).unit, error, row_of(name).floor)
     return out

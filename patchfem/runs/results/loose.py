@@ -16,8 +16,9 @@ def loose(result) -> list:
     wide = {name: min(m.error / max(tolerance * abs(m.value) + m.floor, 1e-300), MOST)
             for name, m in result.measures.items()
             if m.value is not None and m.error is not None and m.error > tolerance * abs(m.value) + m.floor}
-    static = {name: times for name, times in wide.items() if name in TABLE}
-    moving = {name: times for name, times in wide.items() if name not in TABLE}
+    pressed = TABLE if result.patch is not None else ()
+    static = {name: times for name, times in wide.items() if name in pressed}
+    moving = {name: times for name, times in wide.items() if name not in pressed}
     worst = max(static, key=static.get, default="")
     out = [_said(result, static, _finer_mesh(result, worst, static[worst]))] if static else []
     return [*out, _said(result, moving, _finer_motion(result, max(moving.values())))] if moving else out

@@ -128,7 +128,8 @@ def _exact(m: Motion, method: str) -> str:
     laws = [one.law for one in m.laws]
     meets = m.soft, m.varies, m.apart, waveform, m.spring
     why = no_closed_form(laws, *meets)
-    if why and laws and all("pieces" in LAWS[law].carries.split() for law in laws):
+    yields = laws and all("pieces" in LAWS[law].carries.split() for law in laws)
+    if why and yields and (m.soft or not all("exact" in LAWS[law].carries.split() for law in laws)):
         why = no_pieces(laws, *meets)
     return f"no exact solution exists {why}; use 'march' or leave method out" if why else ""
 
