@@ -9,7 +9,7 @@ from scene_texts import PIECE
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from patchfem.core import PatchfemError
+from patchfem.core import Missing, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -431,3 +431,13 @@ def test_refuses_a_start_beyond_the_travel():
     for method in ("exact", "march", "newmark"):
         with pytest.raises(PatchfemError, match=r"structure\.travel: the start lies beyond"):
             result_of(text, f"accuracy.method={method}")
+
+
+def test_refuses_a_block_too_light_for_its_steps():
+    """A block of milligrams rings on its printed bonds far above any step: it ran without end."""
+    text = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "nonlocal"\nreading = "report"\nstatic = 0.3\n' \
+        'bond_length = "1 um"\n[structure]\nmoving_mass = "6.5 mg"\n[[structure.mode]]\nname = "axial"\n' \
+        'frequency = "143 Hz"\ndamping = 0.0015\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\n' \
+        'acceleration = "2.9 g"\ncycles = 12\n[accuracy]\ntolerance = 1e-5\n'
+    with pytest.raises(Missing, match=r"does not resolve the block on its bonds, which swings at 3\.68e\+05 Hz"):
+        run(plan(loads(text)))

@@ -1,7 +1,7 @@
 """Numerical choices of a coupled run: engine, steps per cycle, shear modes, quadrature, and what they would cost."""
 
 from dataclasses import dataclass, replace
-from math import ceil, sqrt
+from math import ceil, pi, sqrt
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from .engines import COMPARED, engine_of
 
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
+MOST_SWING = 2.0  # radians of the block on its bonds in a step
 LEAST_KEPT = 100  # samples of a run that has no cycles
 
 
@@ -121,11 +122,28 @@ def list_cost(model: Model, numerics: Numerics) -> tuple:
     return strips, steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
 
+def refuse_unresolved(model: Model, numerics: Numerics) -> None:
+    """Raise Missing when a step is longer than the block's own swing on its bonds, sqrt(k_t/m) dt > MOST_SWING.
+
+    The motion has nothing to do with the block's then, and every step makes bonds that outlast it: the list grows, and
+    the run with its square.
+    """
+    f, modes, drive = model.friction, model.rig.modes, model.rig.drive
+    stiff = f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass
+    swing = sqrt(stiff) * drive.period / numerics.steps
+    if swing > MOST_SWING:
+        wanted = ceil(sqrt(stiff) * drive.period)
+        raise Missing(f"a step of {drive.period / numerics.steps:.2g} s does not resolve the block on its bonds, which "
+                      f"swings at {sqrt(stiff) / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
+                      "structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with order = 1", "")
+
+
 def refuse_costly(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
     """Raise Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
     f = model.friction
     if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
         return
+    refuse_unresolved(model, numerics)
     entries, seconds = list_cost(model, numerics)
     if seconds > limit:
         raise Missing(f"the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
