@@ -23,11 +23,11 @@ def test_exact_the_march_ends_in_the_steady_motion(march, contact, frequency, ne
 
 
 def test_order_of_a_march_that_reverses_between_its_steps(march):
-    """No stop at 129 Hz: two hundredths off at 400 steps, the exact run is not."""
-    coarse, fine = (march.row("Coulomb", 129.0, steps, 300, 400) for steps in (400, 6400))
+    """No stop at 129 Hz: reversals are found inside the steps, so the error falls with their square at least."""
+    coarse, fine = (march.row("Coulomb", 129.0, steps, 300, 400) for steps in (400, 1600))
     name = march.MEASURES[0]
     assert coarse.regime == "sliding" and coarse.miss(name, "run") < 1e-12
-    assert coarse.miss(name) == pytest.approx(0.021, abs=2e-3) and fine.miss(name) == pytest.approx(2.1e-3, abs=3e-4)
+    assert coarse.miss(name) < 2e-5 and fine.miss(name) < coarse.miss(name) / 16
 
 
 @pytest.mark.slow

@@ -98,7 +98,8 @@ class Read:
         w, rig = part.window, self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        if len(self.model.rig.names) > 1 or self.contact.set_valued:  # of this interface, without the blows of stops
+        together = self.contact.set_valued and not rig.strips_slide_apart  # the yaw of strips works besides
+        if len(rig.names) > 1 or together:  # of this interface, without the blows of stops
             work = float(part.step_force @ np.diff(w.slide))
         span = w.time[-1] - w.time[0]
         work *= drive.period / span if span > 0 else 0.0
