@@ -99,6 +99,6 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
         elif name in GAPS:  # 0 but for what is missing, which is an error itself
             error = max(error, abs(value))
         elif name == "drift_per_cycle":  # a difference of means
-            error += LAST * abs(values.get("relative_displacement_amplitude", 0.0))
+            error += max(LAST, least) * abs(values.get("relative_displacement_amplitude", 0.0))
         out[name] = Measure(float(value), row_of(name).unit, error, row_of(name).floor)
     return out
