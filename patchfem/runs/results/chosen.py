@@ -5,7 +5,7 @@ COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 
 def chosen(result) -> dict:
     """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
-    behind the pieces' shear, how bonds are summed, and interface nodes, strips and levels of meshes of its patch.
+    behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch.
 
     A choice that the run did not make is left out.
     """
