@@ -1,0 +1,96 @@
+"""What many runs found: a column per measure, over the cases in the order they were asked in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+FAILED = "failed"  # outcome of a case that was refused or that did not come to an end
+
+
+@dataclass(eq=False, slots=True)
+class Answers:
+    """The answers of n cases, in SI.
+
+    outcome: (n,) names of `Outcome`, or FAILED. values, errors, floors: measure -> (n,) floats; NaN stands for a
+    measure that a case has not, and in `errors` for one that is not estimated. units: measure -> unit. reasons:
+    measure -> {case: why it has no value there}, "" where none was given: the measure is in the case, without a value.
+    messages: {case: text} of the failed ones. warnings, notes: {case: [sentence]}; numerics: {case: dict}, what was
+    chosen, a dict may be shared by cases. seconds: (n,) of work, that of a batch in equal shares.
+    """
+
+    outcome: np.ndarray
+    values: dict = field(default_factory=dict)
+    errors: dict = field(default_factory=dict)
+    floors: dict = field(default_factory=dict)
+    units: dict = field(default_factory=dict)
+    reasons: dict = field(default_factory=dict)
+    messages: dict = field(default_factory=dict)
+    warnings: dict = field(default_factory=dict)
+    notes: dict = field(default_factory=dict)
+    numerics: dict = field(default_factory=dict)
+    seconds: np.ndarray = None
+
+    def __post_init__(self) -> None:
+        if self.seconds is None:
+            self.seconds = np.zeros(len(self.outcome))
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    @classmethod
+    def blank(cls, count: int) -> Answers:
+        """Answers of `count` cases without an outcome and without measures."""
+        return cls(np.full(count, "", object))
+
+    def measure(self, name: str, unit: str) -> None:
+        """Give the measure its columns, NaN in every case, where it has none yet."""
+        if name not in self.values:
+            self.units[name] = unit
+            for columns in (self.values, self.errors, self.floors):
+                columns[name] = np.full(len(self), np.nan)
+
+    def fail(self, case: int, message: str) -> None:
+        """Mark a case as failed."""
+        self.outcome[case], self.messages[case] = FAILED, message
+
+    def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
+        """Fill in one case. measures: name -> core.Measure."""
+        self.outcome[case], self.seconds[case] = str(outcome), seconds
+        for name, one in measures.items():
+            self.measure(name, one.unit)
+            if one.value is None:
+                self.reasons.setdefault(name, {})[case] = one.reason
+            else:
+                self.values[name][case] = one.value
+            if one.error is not None:
+                self.errors[name][case] = one.error
+            self.floors[name][case] = one.floor
+
+    def place(self, cases: Sequence[int], part: Answers) -> None:
+        """Put the answers of `part` in for these cases, in their order."""
+        at = np.asarray(cases, int)
+        self.outcome[at], self.seconds[at] = part.outcome, part.seconds
+        for name, unit in part.units.items():
+            self.measure(name, unit)
+            for columns, given in ((self.values, part.values), (self.errors, part.errors), (self.floors, part.floors)):
+                columns[name][at] = given.get(name, np.nan)
+        for name, reasons in part.reasons.items():
+            self.reasons.setdefault(name, {}).update({int(at[case]): why for case, why in reasons.items()})
+        for mine, given in ((self.messages, part.messages), (self.warnings, part.warnings), (self.notes, part.notes),
+                            (self.numerics, part.numerics)):
+            mine.update({int(at[case]): found for case, found in given.items()})
+
+    def has(self, name: str, case: int) -> bool:
+        """Whether a case has a measure, with a value or with the reason why it has none."""
+        return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
+
+
+def joined(count: int, parts: Iterable[tuple[Sequence[int], Answers]]) -> Answers:
+    """Answers of `count` cases put together from parts, each with the places of its cases."""
+    out = Answers.blank(count)
+    for cases, part in parts:
+        out.place(cases, part)
+    return out

@@ -1,0 +1,56 @@
+"""Answers of many models: each goes, with those that share its work, to the first batch that does not refuse it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import NamedTuple
+
+from ...core import PatchfemError
+from ...model.model import Model
+from . import one_by_one
+from .answers import Answers
+
+
+class Batch(NamedTuple):
+    """A way to answer many models together.
+
+    refuses(model) -> "" or the sentence why not; group(model): equal for models that can share work; solve(models,
+    say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group.
+    """
+
+    name: str
+    refuses: Callable[[Model], str]
+    group: Callable[[Model], Hashable]
+    solve: Callable[..., Answers]
+
+
+BATCHES: tuple[Batch, ...] = ()  # the first that does not refuse a model takes it
+
+
+def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,
+            say: Callable | None = None) -> Answers:
+    """Answers of the models in their order; an error in place of a model is the message of its failed case.
+
+    keep(case, Result): called after each run; a batch has no Result, so all cases then run one by one. say: called with
+    one line when compiled code has to be made.
+    """
+    found, groups = Answers.blank(len(models)), {}
+    for case, model in enumerate(models):
+        if isinstance(model, PatchfemError):
+            found.fail(case, str(model))
+            continue
+        batch = next((one for one in BATCHES if keep is None and not one.refuses(model)), None)
+        groups.setdefault((batch, batch.group(model)) if batch else (None, None), []).append(case)
+    for (batch, _), cases in groups.items():
+        found.place(cases, _solved(batch, cases, [models[case] for case in cases], keep, say))
+    return found
+
+
+def _solved(batch: Batch | None, cases: list, models: list, keep: Callable | None, say: Callable | None) -> Answers:
+    if batch is not None:
+        try:
+            return batch.solve(models, say)
+        except Exception as error:  # the case at fault is named by its own run
+            if say is not None:
+                say(f"{len(models)} cases run one by one: {batch.name}: {type(error).__name__}: {error}")
+    return one_by_one.solve(models, say, keep and (lambda case, result: keep(cases[case], result)))

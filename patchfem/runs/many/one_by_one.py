@@ -1,0 +1,40 @@
+"""Cases run one after the other, as single runs: what every kind of model has, and what batches are held against."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+
+from ...core import PatchfemError
+from ...model.model import Model
+from ..plan import plan
+from ..results.chosen import chosen
+from ..run import run
+from .answers import Answers
+
+
+def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable | None = None) -> Answers:
+    """Answers of single runs of the models.
+
+    keep(case, Result): called after each run. A PatchfemError of one case is its message, and so is any other fault:
+    none stops the rest.
+    """
+    found = Answers.blank(len(models))
+    for case, model in enumerate(models):
+        begin = perf_counter()
+        try:
+            result = run(plan(model), say)
+            if keep is not None:
+                keep(case, result)
+        except (PatchfemError, MemoryError) as error:
+            found.fail(case, str(error) or "out of memory; make contact.element_size larger or the run shorter")
+        except Exception as error:  # a defect of one case must not cost the answers of a thousand others
+            found.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
+        else:
+            found.put(case, result.outcome, result.measures, 0.0)
+            found.numerics[case] = chosen(result)
+            for kept, said in ((found.warnings, result.warnings), (found.notes, result.extra.get("notes"))):
+                if said:
+                    kept[case] = list(said)
+        found.seconds[case] = perf_counter() - begin
+    return found
