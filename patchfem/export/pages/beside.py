@@ -1,0 +1,191 @@
+"""Several runs on one page: what differs in their scenes, their measures side by side, their curves in one picture."""
+
+import json
+import math
+import tomllib
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..drawing.pictures import LADDERS, axis_unit
+from ..report import pair, units
+from .document import Section, document
+from .sweep import NUMBER, label
+
+POINTS = 4000  # of one line in a picture
+CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
+CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
+    ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
+    ("Friction loop", ("relative_displacement", "displacement"), ("friction_force", "friction force")),
+    ("Displacement", ("time", "time before the end"), ("relative_displacement", "displacement")),
+    ("Acceleration", ("time", "time before the end"), ("absolute_acceleration", "acceleration")),
+    ("Levels", ("level_drive", "level"), ("relative_displacement_amplitude", "displacement amplitude")),
+    ("Steady motions", ("curve_frequency", "frequency"), ("curve_amplitude", "displacement amplitude")))
+
+
+class Run(NamedTuple):
+    """A finished run as its folder holds it.
+
+    name: of the folder; summary: of summary.json; resolved: the scene with every default, as nested tables; arrays:
+    variable -> (values, unit), the first frame of what has frames.
+    """
+
+    name: str
+    summary: dict
+    resolved: dict
+    arrays: dict
+
+
+def read(folder: Path) -> Run:
+    """The run in a results folder; PatchfemError where there is none."""
+    folder = Path(folder)
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        resolved = tomllib.loads((folder / "scene.resolved.toml").read_text(encoding="utf-8"))
+    except FileNotFoundError as fault:
+        raise PatchfemError(f"{folder}: no results folder: it has no {Path(fault.filename).name}") from None
+    except (ValueError, OSError) as fault:
+        raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
+    return Run(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
+
+
+def _arrays(path: Path) -> dict:
+    if not path.is_file():
+        return {}
+    import h5netcdf
+
+    wanted = {name for _, *axes in CHARTS for name, _ in axes}
+    out = {}
+    try:
+        with h5netcdf.File(path, "r") as file:
+            for name in wanted & set(file.variables):
+                values = np.asarray(file[name][...], float)
+                unit = file[name].attrs.get("units", "1")
+                one = values[0] if values.ndim == 2 else values
+                out[name] = (one, unit if isinstance(unit, str) else str(unit))
+    except OSError as fault:
+        raise PatchfemError(f"{path}: cannot be read as netCDF: {fault}") from None
+    return out
+
+
+def page(runs: list) -> str:
+    """The whole HTML page of several `Run`s, in their order; differences are from the first."""
+    names = _distinct([run.name for run in runs])
+    charts = [one for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS)) if one]
+    outcomes = "; ".join(f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs))
+    sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
+                Section("measures", "Measures side by side", _measures(runs, names))]
+    sections += [Section(one["anchor"] + "-part", one["title"], f'<div id="{one["anchor"]}" class=chart role=img '
+                         f'aria-label="{escape(one["told"])}"></div><p class=soft>{escape(one["told"])}</p>')
+                 for one in charts]
+    title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
+    return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
+                    ("figures.js", "curves.js") if charts else ())
+
+
+def _distinct(names: list) -> list:
+    """The names, numbered where several are the same."""
+    return [name if names.count(name) == 1 else f"{name} ({number})" for number, name in enumerate(names, 1)]
+
+
+def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list) -> dict | None:
+    """One picture of all runs that have both variables, in units that suit the largest values."""
+    lines = []
+    for run, name in zip(runs, names):
+        if x[0] not in run.arrays or y[0] not in run.arrays:
+            continue
+        (a, unit_a), (b, unit_b) = run.arrays[x[0]], run.arrays[y[0]]
+        if a.shape != b.shape or not a.size:
+            continue
+        if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
+            late = _late(run)
+            a, b = a[late], b[late]
+            a = a - a[-1] if x[0] == "time" else a
+        step = -(-a.size // POINTS)
+        lines.append((name, a[::step], b[::step]))
+    if not lines:
+        return None
+    (unit_a, scale_a), (unit_b, scale_b) = (
+        axis_unit(np.concatenate([line[k] for line in lines]), unit) if unit in LADDERS else (unit, 1.0)
+        for k, unit in ((1, unit_a), (2, unit_b)))
+    peaks = ", ".join(f"{name} from {np.nanmin(b) * scale_b:.4g} to {np.nanmax(b) * scale_b:.4g}"
+                      for name, _, b in lines)
+    return {"anchor": f"chart{number}", "title": title, "x": {"label": x[1], "unit": unit_a, "log": False},
+            "y": {"label": y[1], "unit": unit_b, "log": False},
+            "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
+            "lines": [{"name": name, "x": a * scale_a, "y": b * scale_b, "dots": x[0] == "level_drive"}
+                      for name, a, b in lines]}
+
+
+def _late(run: Run) -> np.ndarray:
+    """Which samples lie in the last CYCLES cycles of a sine, or in the last tenth of a run without one."""
+    time = run.arrays["time"][0]
+    written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
+    span = CYCLES / float(written[1]) if written and float(written[1]) > 0 else np.ptp(time) / 10
+    if run.summary["kind"] == "bench":
+        span = np.ptp(time)
+    return time >= time[-1] - span * (1 + 1e-9)
+
+
+def _flat(table, at: str = "") -> dict:
+    """Nested tables as one: "contact.tilt.angle" -> value; entries of lists by their name or number."""
+    if isinstance(table, dict):
+        pairs = table.items()
+    elif isinstance(table, list) and table and isinstance(table[0], dict):
+        pairs = [(one.get("name", number), one) for number, one in enumerate(table, 1)]
+    else:
+        return {at: table}
+    return {key: value for name, one in pairs for key, value in _flat(one, f"{at}.{name}" if at else str(name)).items()}
+
+
+def _differences(runs: list, names: list) -> str:
+    """A table of the keys of the resolved scenes that are not the same in all of them."""
+    flat = [_flat(run.resolved) for run in runs]
+    keys = [key for key in dict.fromkeys(key for one in flat for key in one)
+            if any(one.get(key) != flat[0].get(key) for one in flat)]
+    if not keys:
+        return "<p>Nothing: the resolved scenes are the same.</p>"
+    cells = {key: "".join(f"<td>{_written(one.get(key))}</td>" for one in flat) for key in keys}
+    rows = "".join(f"<tr><td>{escape(key)}</td>{cells[key]}</tr>" for key in keys)
+    return ("<p class=soft>Keys of the resolved scenes whose values are not the same everywhere, in SI.</p>"
+            f"<div class=across><table><thead><tr><th>key</th>{_heads(names)}</tr></thead><tbody>{rows}</tbody></table>"
+            "</div>")
+
+
+def _heads(names: list) -> str:
+    return "".join(f"<th>{escape(name)}</th>" for name in names)
+
+
+def _written(value) -> str:
+    text = "&ndash;" if value is None else f"{value:.8g}" if isinstance(value, float) else escape(str(value))
+    return text if len(text) < 80 else text[:76] + " …"
+
+
+def _measures(runs: list, names: list) -> str:
+    """A table of the measures of all runs; what differs from the first by more than both errors is marked."""
+    rows = []
+    for name in dict.fromkeys(name for run in runs for name in run.summary["measures"]):
+        found = [run.summary["measures"].get(name) for run in runs]
+        cells = "".join(f"<td class=n>{_cell(name, one, found[0] if number else None)}</td>"
+                        for number, one in enumerate(found))
+        rows.append(f"<tr><td>{escape(label(name))}</td>{cells}</tr>")
+    return ("<p class=soft>Value and estimated numerical error. Bold with its change in per cent: differs from the "
+            "first run by more than both errors together.</p><div class=across><table><thead><tr><th>measure</th>"
+            f"{_heads(names)}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>")
+
+
+def _cell(name: str, one: dict | None, first: dict | None) -> str:
+    if one is None or one["value"] is None or not math.isfinite(one["value"]):
+        return "&ndash;"
+    text = escape(pair(name, one)) if units(name, one["value"], one["unit"]) or one["unit"] == "1" else \
+        escape(f"{one['value']:.6g} {one['unit']}")
+    if first is None or first["value"] is None:
+        return text
+    change = one["value"] - first["value"]
+    if abs(change) <= (one["error"] or 0.0) + (first["error"] or 0.0):
+        return text
+    share = f" ({change / abs(first['value']):+.2%})" if first["value"] else ""
+    return f"<b>{text}</b>{share}"

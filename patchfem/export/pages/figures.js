@@ -1,0 +1,49 @@
+// What every picture of a page shares: colours of the page, numbers as people read them, an empty figure.
+"use strict";
+const pictures = (() => {
+  const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const colours = () => [ink("--accent"), ink("--warm"), "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86", "#3aa6b9", "#7d7d7d"];
+  const number = (v) => v === null ? "–" : Number(v.toPrecision(7)).toString();
+  const within = (v, e) => {                     // a value with its error, as many digits as the error allows
+    if (v === null) return "no value";
+    if (e === null || e === 0) return number(v);
+    const places = Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(Math.abs(e)))));
+    return `${Math.abs(v) >= 1e6 ? number(v) : v.toFixed(places)} ± ${Number(e.toPrecision(2))}`;
+  };
+  const named = (one) => one.unit ? `${one.label} [${one.unit}]` : one.label;
+
+  function figure(x, title, options) {           // x: {label, unit, log} of the axis; title: of the other one
+    const fig = Bokeh.Plotting.figure({sizing_mode: "stretch_width", height: 420, x_axis_type: x.log ? "log" : "linear",
+      tools: "pan,box_zoom,wheel_zoom,reset,save,tap", background_fill_color: null, border_fill_color: null,
+      outline_line_color: ink("--line"), ...options});
+    fig.toolbar.logo = null;
+    for (const axis of [fig.xaxis, fig.yaxis]) {
+      axis.axis_label_text_font_style = "normal";
+      for (const part of ["axis_label_text_color", "major_label_text_color"]) axis[part] = ink("--ink");
+      for (const part of ["axis_line_color", "major_tick_line_color", "minor_tick_line_color"]) axis[part] = ink("--soft");
+      axis.axis_label_text_font_size = "13px";
+    }
+    for (const grid of [fig.xgrid, fig.ygrid]) grid.grid_line_color = ink("--line");
+    fig.xaxis.axis_label = named(x);
+    fig.yaxis.axis_label = title;
+    return fig;
+  }
+
+  function legend(fig) {                         // beside the picture, so that it hides no line; a click hides one
+    Object.assign(fig.legend, {background_fill_color: ink("--paper"), background_fill_alpha: 0.8,
+      label_text_color: ink("--ink"), border_line_color: null, click_policy: "hide"});
+    fig.add_layout(fig.legend, "right");
+  }
+
+  function bar(fig, color_mapper, title) {       // the scale of the colours
+    fig.add_layout(new Bokeh.ColorBar({color_mapper, title, title_text_color: ink("--ink"),
+      title_text_font_style: "normal", major_label_text_color: ink("--ink"), background_fill_color: null}), "right");
+  }
+
+  let queue = Promise.resolve();                 // one picture after the other: showing takes its time
+  function put(fig, place) {
+    queue = queue.then(() => { place.replaceChildren(); return Bokeh.Plotting.show(fig, place); });
+  }
+
+  return {ink, colours, number, within, named, figure, legend, bar, put};
+})();

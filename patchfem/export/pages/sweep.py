@@ -1,0 +1,161 @@
+"""The page of a sweep: what came out over the swept keys, explored in the browser, and a table of the cases."""
+
+import re
+from collections import Counter
+from html import escape
+
+import numpy as np
+
+from ..drawing.pictures import LADDERS, axis_unit
+from .document import Section, document
+
+SETTLED = ("steady", "stuck", "done", "no_contact")
+FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
+DRAWN, LISTED = 20_000, 400  # cases in the pictures and in the table; sweep.csv has them all
+NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
+
+
+def page(table: dict) -> str:
+    """The whole HTML page of a sweep.
+
+    table: `title`, `version`, `command` (the line that made it), `scene` (its text), `seconds`; `grid`: whether the
+    cases are all combinations of the keys' values; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as
+    written, `log`}]; `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,)}}, NaN where a case has none;
+    `outcome` (n,); `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or
+    None.
+    """
+    outcome, number = list(table["outcome"]), len(table["outcome"])
+    drawn = _spread(number, DRAWN)
+    keys = [_key(one, drawn) for one in table["keys"]]
+    measures = [_measure(name, one, drawn) for name, one in table["measures"].items()
+                if np.isfinite(one["values"]).any()]
+    first = next((name for name in FIRST if any(m["name"] == name for m in measures)), None)
+    data = {"keys": keys, "measures": measures, "outcome": [outcome[i] for i in drawn], "settled": SETTLED,
+            "grid": bool(table["grid"]), "first": first, "along": _along(keys),
+            "links": None if table["folders"] is None else [table["folders"][i] for i in drawn]}
+    sections = [Section("answers", "What came out", _explorer(number, len(drawn)) if measures else
+                        "<p>No case has a value to draw.</p>"),
+                Section("cases", "Cases", _cases(table)),
+                Section("measures", "What the measures mean", _meanings(table)),
+                Section("again", "The same again", _again(table))]
+    return document(table["title"] or "patchfem sweep", _lead(table), sections, data if measures else None,
+                    ("figures.js", "explorer.js") if measures else ())
+
+
+def _spread(number: int, most: int) -> np.ndarray:
+    """At most `most` of so many cases, evenly spread."""
+    return np.arange(number) if number <= most else np.unique(np.linspace(0, number - 1, most).astype(int))
+
+
+def label(name: str) -> str:
+    """A name of the program as people read it."""
+    return name.replace("_", " ")
+
+
+def _key(one: dict, drawn) -> dict:
+    """A swept key in the unit in which it was written, where all its values are."""
+    written = [NUMBER.match(str(one["texts"][i])) for i in drawn]
+    units = {(match[2] or "").strip() if match else None for match in written}
+    if len(units) == 1 and None not in units:
+        unit, values = units.pop(), [float(match[1]) for match in written]
+    else:
+        unit, values = one["unit"], np.asarray(one["values"], float)[drawn]
+    return {"name": one["name"], "label": one["name"], "unit": "" if unit == "1" else unit, "values": values,
+            "texts": [str(one["texts"][i]) for i in drawn], "log": bool(one["log"])}
+
+
+def _measure(name: str, one: dict, drawn) -> dict:
+    """A measure in the unit that suits its largest value."""
+    unit, scale = axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
+    return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
+            "values": np.asarray(one["values"], float)[drawn] * scale,
+            "errors": np.asarray(one["errors"], float)[drawn] * scale}
+
+
+def _along(keys: list) -> str:
+    """The key with most values: the one along the axis."""
+    return max(keys, key=lambda one: len(set(np.asarray(one["values"]).tolist())))["name"] if keys else ""
+
+
+def _explorer(number: int, drawn: int) -> str:
+    """The choices and the place of the picture; `explorer.js` fills both."""
+    thinned = f"<p class=soft>Drawn are {drawn} of {number} cases, evenly spread.</p>" if drawn < number else ""
+    return ("<div class=choices><label>Measure<select id=measure></select></label>"
+            "<label>Along the axis<select id=along></select></label>"
+            "<label>Second key<select id=beside></select></label>"
+            "<label>Shown as<select id=shown><option value=lines>lines</option><option value=map>map</option></select>"
+            "</label><span id=held class=choices style='padding:0'></span></div>"
+            "<div id=chart class=chart role=img></div><p id=means class=soft aria-live=polite></p>"
+            "<p class=soft>Bands show the numerical error. Crosses, shading and hatching mark cases that did not "
+            f"settle. A click on a case opens it.</p>{thinned}<noscript><p class=verdict>The pictures need "
+            "JavaScript; the numbers stand in sweep.csv.</p></noscript>")
+
+
+def _lead(table: dict) -> str:
+    """The verdict: how many cases, over what, how they ended, and the span of the first measure."""
+    number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
+    ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
+    text = f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}."
+    for name in FIRST:
+        found = table["measures"].get(name)
+        if found is None or not np.isfinite(found["values"]).any():
+            continue
+        unit, scale = axis_unit(found["values"], found["unit"]) if found["unit"] in LADDERS else (found["unit"], 1.0)
+        low, high = (f"{value * scale:.4g}" for value in (np.nanmin(found["values"]), np.nanmax(found["values"])))
+        unit = "" if unit == "1" else f" {unit}"
+        text += (f" {escape(label(name).capitalize())} is {low}{unit} throughout." if low == high else
+                 f" {escape(label(name).capitalize())} runs from {low} to {high}{unit}.")
+        break
+    failed = table["messages"]
+    fault = ""
+    if failed:
+        shown = Counter(failed.values()).most_common(5)
+        fault = "<div class='verdict warn'>" + "".join(
+            f"<p>{count} case{'s' if count > 1 else ''} failed: {escape(why)}</p>" for why, count in shown) + "</div>"
+    return (f"<p class=soft>patchfem {escape(table['version'])} &middot; {table['seconds']:.2f} s</p>"
+            f"<p class=verdict>{text}</p>{fault}")
+
+
+def _cases(table: dict) -> str:
+    """The first cases as a table with their keys, outcome and the measures that change from case to case."""
+    shown = [name for name in FIRST if name in table["measures"]]
+    shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])]
+    shown = shown[:6]
+    columns = [_measure(name, table["measures"][name], slice(None)) for name in shown]
+    head = "".join(f"<th>{escape(one['name'])}</th>" for one in table["keys"]) + "<th>outcome</th>" + "".join(
+        f"<th class=n>{escape(one['label'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>" for one in columns)
+    rows = []
+    for i, outcome in enumerate(table["outcome"][:LISTED]):
+        cells = "".join(f"<td>{escape(str(one['texts'][i]))}</td>" for one in table["keys"])
+        said = escape(label(outcome))
+        if table["folders"] is not None:
+            said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
+        cells += f"<td>{said}</td>" + "".join(
+            f"<td class=n>{_number(one['values'][i])}</td>" for one in columns)
+        rows.append(f"<tr{'' if outcome in SETTLED else ' class=bad'}>{cells}</tr>")
+    number = len(table["outcome"])
+    more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
+    return (f"<p class=soft>Every case with every measure and its error: <a href=sweep.csv>sweep.csv</a>, "
+            f"<a href=sweep.nc>sweep.nc</a>.</p><div class=wide><table><thead><tr>{head}</tr></thead>"
+            f"<tbody>{''.join(rows)}</tbody></table></div>{more}")
+
+
+def _changes(values) -> bool:
+    found = np.asarray(values, float)
+    found = found[np.isfinite(found)]
+    return found.size > 0 and np.ptp(found) > 1e-9 * np.abs(found).max()
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}" if np.isfinite(value) else "&ndash;"
+
+
+def _meanings(table: dict) -> str:
+    rows = "".join(f"<tr><td>{escape(label(name))}</td><td>{escape(one['unit'])}</td><td>{escape(one.get('means', ''))}"
+                   "</td></tr>" for name, one in table["measures"].items())
+    return f"<table><thead><tr><th>measure</th><th>unit</th><th>meaning</th></tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _again(table: dict) -> str:
+    return (f"<p>This line made the sweep:</p><pre>{escape(table['command'])}</pre>"
+            f"<details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>")

@@ -1,0 +1,79 @@
+"""Several runs on one page: read from their folders, differences beyond both errors marked."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.export.netcdf import of_run, write
+from patchfem.export.pages.beside import page, read
+
+SCENE = """[normal]
+load = "{load} N"
+[drive]
+frequency = "100 Hz"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+"""
+
+
+def made(folder, load: float, amplitude: float, error: float):
+    """A results folder of a sine of 100 Hz, 20 cycles of 50 samples."""
+    folder.mkdir()
+    measures = {"relative_displacement_amplitude": {"value": amplitude, "unit": "m", "error": error, "floor": 0.0},
+                "normal_load": {"value": load, "unit": "N", "error": 0.0, "floor": 0.0}}
+    (folder / "summary.json").write_text(json.dumps({"kind": "rig", "outcome": "steady", "measures": measures}))
+    (folder / "scene.resolved.toml").write_text(SCENE.format(load=load))
+    time = np.linspace(0.0, 0.2, 1001)
+    motion = amplitude * np.sin(2 * np.pi * 100 * time)
+    write(of_run({"time": time, "relative_displacement": motion, "friction_force": -load * np.sign(motion)}, None, {},
+                 None, None), folder / "result.nc")
+    return folder
+
+
+def test_exact_differences_and_the_last_two_cycles(tmp_path):
+    runs = [read(made(tmp_path / "light", 10.0, 2e-6, 1e-9)), read(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9))]
+    text = page(runs)
+    assert "<b>heavy" not in text and "&lt;b&gt;heavy" in text
+    rows = re.search(r'<section id="scenes">.*?<tbody>(.*?)</tbody>', text, re.S)[1]
+    assert re.findall(r"<tr><td>(.*?)</td>", rows) == ["normal.load"]
+    assert "<b>1.0000 ± 0.0010 um</b> (-50.00%)" in text
+    data = json.loads(re.search(r"id=data>(.*?)</script>", text, re.S)[1])
+    history = next(one for one in data["charts"] if one["title"] == "Displacement")
+    assert history["x"]["unit"] == "ms" and history["y"]["unit"] == "um"
+    assert [one["name"] for one in history["lines"]] == ["light", "<b>heavy"]
+    for one, size in zip(history["lines"], (2.0, 1.0)):
+        assert one["x"][0] == pytest.approx(-20.0, abs=1e-6) and one["x"][-1] == 0.0
+        np.testing.assert_allclose(one["y"], size * np.sin(2 * np.pi * 0.1 * np.array(one["x"])), atol=1e-8)
+
+
+def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
+    text = page([read(made(tmp_path / "a", 10.0, 2e-6, 3e-8)), read(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8))])
+    assert "Nothing: the resolved scenes are the same" in text and "<b>2." not in text and "(+2" not in text
+
+
+def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
+    (tmp_path / "x").mkdir()
+    (tmp_path / "y").mkdir()
+    text = page([read(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
+    assert "out (1)" in text and "out (2)" in text
+
+
+def test_refuses_a_folder_without_results(tmp_path):
+    with pytest.raises(PatchfemError, match=r"no results folder: it has no summary\.json"):
+        read(tmp_path)
+    (tmp_path / "summary.json").write_text("{")
+    with pytest.raises(PatchfemError, match="cannot be read"):
+        read(tmp_path)
+    folder = made(tmp_path / "good", 1.0, 1e-6, 0.0)
+    (folder / "result.nc").write_bytes(b"nothing")
+    with pytest.raises(PatchfemError, match=r"result\.nc: cannot be read as netCDF"):
+        read(folder)
+
+
+def test_always_a_browser_draws_it(tmp_path, browser):
+    seen = browser(page([read(made(tmp_path / "a", 10.0, 2e-6, 0.0)), read(made(tmp_path / "b", 20.0, 1e-6, 0.0))]))
+    assert len(re.findall(r'<div id="?chart\d"?[^>]*>\s*<div', seen)) == 2, "friction loop and displacement"

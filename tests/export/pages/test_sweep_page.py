@@ -1,0 +1,103 @@
+"""The page of a sweep: one file, nothing fetched, texts shown as texts, numbers as they came."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from patchfem.export.pages import library
+from patchfem.export.pages.document import document, plain
+from patchfem.export.pages.sweep import page
+
+
+def data_of(text: str) -> dict:
+    return json.loads(re.search(r"<script type=application/json id=data>(.*?)</script>", text, re.S)[1])
+
+
+def own_part(text: str) -> str:
+    """The page without the drawing library."""
+    return text.replace(library.bokeh(), "")
+
+
+def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
+    data = data_of(page(table))
+    assert data["keys"][0]["unit"] == "mrad" and data["keys"][1]["unit"] == "N"
+    np.testing.assert_allclose(data["keys"][0]["values"], table["keys"][0]["values"] * 1e3, rtol=1e-9)
+    shown = next(one for one in data["measures"] if one["name"] == "relative_displacement_amplitude")
+    assert shown["unit"] == "um" and shown["values"][7] is None
+    rest = np.arange(12) != 7
+    np.testing.assert_allclose(np.array(shown["values"], float)[rest],
+                               table["measures"][shown["name"]]["values"][rest] * 1e6, rtol=1e-8)
+    np.testing.assert_allclose(np.array(shown["errors"], float)[rest] / np.array(shown["values"], float)[rest], 0.01,
+                               rtol=1e-8)
+    assert data["along"] == "contact.tilt.angle" and data["first"] == "relative_displacement_amplitude"
+
+
+def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
+    text = page(table)
+    assert len(text.encode()) < 3e6
+    targets = re.findall(r"(?:src|href)=[\"']?([^\"' >]+)", own_part(text))
+    assert targets and all(re.match(r"#|sweep\.|cases/", one) for one in targets)
+    assert not re.search(r"@import|url\(", own_part(text))
+
+
+def test_always_texts_from_outside_are_shown_as_texts(table):
+    text = own_part(page(table))
+    assert "Tilt &lt;/script&gt;&lt;b&gt;&amp;amp;" in text
+    for foreign in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
+        assert foreign not in text
+    assert text.count("<script") == text.count("</script>") == 4
+
+
+def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_told(table):
+    text = page(table)
+    assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
+    assert "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows." in text
+    assert "1 case failed: normal.load: &lt;refused&gt;" in text
+
+
+def test_always_a_sweep_without_a_value_has_a_page_without_pictures(table):
+    for one in table["measures"].values():
+        one["values"] = np.full(12, np.nan)
+    text = page(table)
+    assert "No case has a value to draw" in text and "<script" not in text
+
+
+def test_always_many_cases_are_thinned_and_it_is_said(table):
+    many = 50_000
+    for one in table["keys"]:
+        one["values"], one["texts"] = np.arange(many, dtype=float), [f"{value} N" for value in range(many)]
+    for one in table["measures"].values():
+        one["values"] = one["errors"] = np.linspace(1e-5, 2e-5, many)
+    table |= {"outcome": ["steady"] * many, "messages": {}, "grid": False, "folders": None}
+    text = page(table)
+    assert len(text.encode()) < 3e6 + 40 * 20_000 * 3 and "Drawn are 20000 of 50000 cases" in text
+    assert len(data_of(text)["outcome"]) == 20_000
+
+
+def test_exact_numbers_that_are_not_finite_are_null():
+    assert plain({"a": [np.nan, np.inf, 1 / 3], "b": np.float64(2.0), "c": (np.int64(3), "x", None)}) == \
+        {"a": [None, None, 0.333333333], "b": 2.0, "c": [3, "x", None]}
+
+
+def test_exact_a_script_cannot_end_its_element():
+    assert library.inert("a</script>b<!--c</SCRIPT x</p") == "a<\\/script>b<\\!--c<\\/SCRIPT x</p"
+    hostile = document("t", "", [], {"x": "</script><!--"}, ("figures.js",))
+    assert data_of(hostile) == {"x": "</script><!--"}
+
+
+@pytest.mark.parametrize("shown", ["lines", "map", "cloud"])
+def test_always_a_browser_draws_it(table, browser, shown):
+    table["grid"] = shown != "cloud"
+    text = page(table)
+    if shown == "map":
+        turn = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
+        text = text.replace("</body>", f"<script>{turn}</script></body>")
+    seen = browser(text)
+    words = re.search(r'<p id="?means"?[^>]*>(.*?)</p>', seen, re.S)[1]
+    # grid: the loads are lines of their own, so the highest is that of 40 N at 1 mrad: 1e-5 * 5 * 4 = 200 um
+    where = "" if shown == "cloud" else ", normal.load 40 N"
+    assert f"highest 200 um at contact.tilt.angle 1 mrad{where}" in words
+    assert "2 of 12 cases did not settle" in words
+    assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
