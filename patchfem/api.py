@@ -21,6 +21,7 @@ from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.results import result as found
 from .runs.run import run as run_plan
+from .scene.changed import Base
 from .scene.scene import Scene, SceneError, loads, with_files
 from .scene.scene import load as load_file
 from .scene.sets import assignments
@@ -43,10 +44,20 @@ def load(scene: str | Path | Scene, /, **sets: Any) -> Scene:
     """
     added = assignments(sets)
     if isinstance(scene, Scene):
-        return scene if not added else with_files(loads(scene.text, scene.path, (*scene.sets, *added)))
+        return scene if not added else base_of(scene).changed(added)
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
         return with_files(loads(scene, TEXT, added))
     return load_file(scene, added)
+
+
+def base_of(scene: Scene) -> Base:
+    """What scenes that differ from this one in a few keys share; kept for the scene that was asked for last."""
+    found = next((one for one in _bases if one.scene is scene), None) or Base(scene)
+    _bases[:] = [found]
+    return found
+
+
+_bases: list[Base] = []
 
 
 def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:

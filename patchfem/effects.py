@@ -154,7 +154,8 @@ def module_of(name: str):
 
 def absent(named) -> list:
     """Every effect that is not among `named`, in the order of the chain."""
-    return [name for name in EFFECTS if name not in set(named)]
+    there = set(named)
+    return [name for name in EFFECTS if name not in there]
 
 LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
         if name.startswith("friction.law=")}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from textwrap import shorten
 from typing import TYPE_CHECKING
 
@@ -119,7 +120,7 @@ def build(scene: Scene) -> Model:
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
                   (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
                   _wear(scene), tuple(absent(named)))
-    source = Source(scene.path, scene.title, scene.text, resolved(scene, found), named, tuple(scene.remarks))
+    source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks))
     return replace(found, source=source)
 
 

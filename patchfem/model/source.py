@@ -1,6 +1,6 @@
 """Where a model comes from: the scene's path, text and effects, and the place of a key for messages."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,16 +13,21 @@ from ..scene.lines import key_lines
 class Source:
     """Origin of a model: path and text of the scene, with what messages need.
 
-    text: as read; resolved: TOML in SI with every default; effects: what the scene names; remarks: sentences on keys
-    that nothing uses.
+    text: as read; write() -> the TOML of `resolved`; effects: what the scene names; remarks: sentences on keys that
+    nothing uses.
     """
 
     path: Path
     title: str
     text: str
-    resolved: str
+    write: Callable
     effects: tuple
     remarks: tuple
+
+    @property
+    def resolved(self) -> str:
+        """The scene as TOML in SI with every default written out; written when it is asked for."""
+        return self.write()
 
     def where(self, key: str) -> str:
         """``FILE:LINE: key`` for a message about a key.

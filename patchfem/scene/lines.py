@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
@@ -15,6 +16,7 @@ _STRINGS = (
 )
 
 
+@lru_cache(16)
 def key_lines(text: str) -> dict[str, int]:
     """Dotted key path -> line (from 1) in a valid TOML text; a table has the line of its header.
 

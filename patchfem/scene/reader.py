@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from functools import cache, lru_cache
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
@@ -24,6 +25,8 @@ class Draft:
         self.tables = Tables.model_construct()
         self.mistakes: list[tuple[int, str]] = []
         self.remarks: list[str] = []
+        self.read_before: dict[int, tuple[dict, Any]] = {}  # id of a written table -> itself, and the table without
+        self.made: dict[int, tuple[dict, Any]] = {}  # mistakes that was read from it before; those read now
 
     def read(self) -> None:
         """Read all tables; mistakes are noted, values that are wrong stay None."""
@@ -158,6 +161,7 @@ def _ends_in_comment(text: str) -> bool:
     return False
 
 
+@lru_cache(1024)
 def owner_of(key: str) -> tuple[type[Table] | None, str]:
     """Model and attribute a dotted key belongs to, items of an array by number or name; None for a key no table has."""
     model: type[Table] | None = Tables
@@ -177,6 +181,8 @@ def owner_of(key: str) -> tuple[type[Table] | None, str]:
 
 def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> Any:
     """A table as its model; what is missing or wrong is said and left None."""
+    if id(raw) in draft.read_before:
+        return draft.read_before[id(raw)][1]
     names, values = keys(model), {}
     for key, value in raw.items():
         path = f"{at}.{key}" if at else key
@@ -194,11 +200,24 @@ def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> An
         if model.model_fields[name].is_required() and key not in raw:
             draft.lacks(f"{at}.{key}", "")
     unsure = {name: None for key, name in names.items() if key in raw or model.model_fields[name].is_required()}
-    return model.model_construct(**_by_key(model, unsure | good))
+    found = _made(model, unsure | good)
+    draft.made[id(raw)] = raw, found
+    return found
 
 
-def _by_key(model: type[Table], values: dict[str, Any]) -> dict[str, Any]:
-    return {key: values[name] for key, name in keys(model).items() if name in values}
+def _made(model: type[Table], values: dict[str, Any]) -> Any:
+    """A table of values by attribute as `model_construct` makes it; it shares its defaults, which are frozen too."""
+    found = model.__new__(model)
+    for name, value in (("__dict__", _defaults(model) | values), ("__pydantic_fields_set__", set(values)),
+                        ("__pydantic_extra__", None), ("__pydantic_private__", None)):
+        object.__setattr__(found, name, value)
+    return found
+
+
+@cache
+def _defaults(model: type[Table]) -> dict[str, Any]:
+    return {name: field.get_default(call_default_factory=True) for name, field in model.model_fields.items()
+            if not field.is_required()}
 
 
 def _validated(draft: Draft, model: type[Table], values: dict[str, Any], at: str) -> dict[str, Any]:
@@ -245,10 +264,12 @@ def _unknown(draft: Draft, model: type[Table], key: str, value: Any, path: str) 
     draft.say(path, f"unknown {'table' if is_table else 'key'}; {help}")
 
 
+@cache
 def _types(model: type[Table], name: str) -> tuple[Any, ...]:
     return tuple(parts(model.model_fields[name].annotation))
 
 
+@cache
 def is_value(model: type[Table], name: str) -> bool:
     """Whether a key that may hold an inline table may hold a plain value as well: a material, a coating."""
     return model_of(model, name) is Material or any(get_origin(part) is Literal for part in _types(model, name))

@@ -113,15 +113,15 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
 
 def with_files(found: Scene) -> Scene:
     """The scene itself; SceneError where a file that it names is not there."""
-    lines, missing = key_lines(found.text), []
-    for key, message in absent_files(found.tables(), found.path.parent):
-        missing.append(f"{found.path}:{lines[key]}: {key}: {message}" if key in lines else f"--set: {key}: {message}")
-    if missing:
-        raise SceneError(missing)
+    absent = absent_files(found, found.path.parent)
+    if absent:
+        lines = key_lines(found.text)
+        raise SceneError([f"{found.path}:{lines[key]}: {key}: {message}" if key in lines else
+                          f"--set: {key}: {message}" for key, message in absent])
     return found
 
 
-def files_of(found: tables.Tables) -> list[tuple[str, str]]:
+def files_of(found: tables.Tables | Scene) -> list[tuple[str, str]]:
     """(key, file) of every file that the tables of a scene name."""
     profile = found.contact and found.contact.profile
     named = [("contact.mesh", found.contact and found.contact.mesh), ("contact.profile.file", profile and profile.file),
@@ -139,7 +139,7 @@ def is_there(path: Path) -> bool:
         return False
 
 
-def absent_files(found: tables.Tables, folder: Path) -> list[tuple[str, str]]:
+def absent_files(found: tables.Tables | Scene, folder: Path) -> list[tuple[str, str]]:
     """(key, message) of every file that the tables name and that is not there."""
     return [(key, f"there is no file {folder / file}; paths are relative to the scene")
             for key, file in files_of(found) if not is_there(folder / file)]
@@ -158,6 +158,11 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), 
     draft = Draft(str(path), key_lines(text), raw)
     for one in sets:
         apply_set(draft, one)
+    return scene_of(draft, path, text, sets, more)
+
+
+def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], more: Callable | None = None) -> Scene:
+    """The scene of a draft in which nothing is read yet and `sets` are applied; arguments and errors as `loads`."""
     draft.read()
     kind = check(draft)
     wrong = bool(draft.mistakes)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 from .keys.contact import Asperities, Material, OnePiece
 from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Friction, Slide
-from .keys.types import Table, keys, kind_of
+from .keys.types import Table, keys, kind_of, model_of
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
 
@@ -34,14 +35,22 @@ def _effects(table: Any, at: str) -> Iterator[str]:
         for item in table:
             yield from (effect for effect in _effects(item, at) if "=" in effect)
     elif isinstance(table, Table) and not isinstance(table, Material):
-        without = _unused(table)
-        chosen = [key for key in _SELECTORS if key in type(table).model_fields and key not in without]
+        selectors, inner = _named_by(type(table))
+        without = _unused(table) if selectors else ()
+        chosen = [key for key in selectors if key not in without]
         yield from (f"{at}.{key}={getattr(table, key)}" for key in chosen)
         if not chosen:
             yield at
-        if not isinstance(table, OnePiece):
-            for name in type(table).model_fields:
-                yield from _effects(getattr(table, name), f"{at}.{name}")
+        for name in inner:
+            yield from _effects(getattr(table, name), f"{at}.{name}")
+
+
+@cache
+def _named_by(model: type[Table]) -> tuple[list[str], list[str]]:
+    """Selector keys of a table, and its attributes that hold tables."""
+    names = list(model.model_fields)
+    inner = [] if issubclass(model, OnePiece) else [name for name in names if model_of(model, name) is not None]
+    return [key for key in _SELECTORS if key in names], inner
 
 
 def _unused(table: Table) -> set[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
-from functools import partial
+from functools import cache, partial
 from typing import Annotated, Any, get_args
 
 from pydantic import (
@@ -85,6 +85,7 @@ def choices(got: str, known: Iterable[str]) -> str:
     return (f"did you mean '{near[0]}'? " if near else "") + f"one of {', '.join(names)}"
 
 
+@cache
 def keys(model: type[BaseModel]) -> dict[str, str]:
     """Key as written in a scene -> attribute of the model; they differ only where a key is a word of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
@@ -97,6 +98,7 @@ def parts(annotation: Any) -> Iterator[Any]:
         yield from parts(part)
 
 
+@cache
 def kind_of(model: type[BaseModel], name: str) -> str | None:
     """Kind of quantity an attribute holds (each item, for an array); None for anything without a unit."""
     field = model.model_fields[name]
@@ -104,6 +106,7 @@ def kind_of(model: type[BaseModel], name: str) -> str | None:
     return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
 
 
+@cache
 def model_of(model: type[BaseModel], name: str) -> type[Table] | None:
     """The model of a key that holds a table or an array of tables; None for a plain value."""
     annotation = model.model_fields[name].annotation

@@ -1,5 +1,6 @@
 """What the rules of a scene share: the draft under check, and which key belongs to which selector."""
 
+from functools import cache
 from typing import Any, Protocol
 
 from pydantic import BaseModel
@@ -36,11 +37,16 @@ class Draft(Protocol):
     def lacks_table(self, name: str, reason: str) -> None: ...
 
 
-def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> set[str]:
+def unused(table: BaseModel, selector: str, used: dict[str, tuple[str, str]]) -> frozenset[str]:
     """Keys of a table that the value of its selector gives no meaning, among those that depend on it."""
-    needs, can = used[getattr(table, selector)]
-    dependent = {key for pair in used.values() for keys in pair for key in keys.split()}
-    return (dependent - set(needs.split()) - set(can.split())) & keys(type(table)).keys()
+    return _unused(type(table), getattr(table, selector), tuple(used.items()))
+
+
+@cache
+def _unused(model: type[BaseModel], value: str, used: tuple) -> frozenset[str]:
+    needs, can = dict(used)[value]
+    dependent = {key for _, pair in used for words in pair for key in words.split()}
+    return frozenset((dependent - set(needs.split()) - set(can.split())) & keys(model).keys())
 
 
 def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tuple[str, str]]) -> None:

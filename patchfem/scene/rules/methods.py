@@ -46,7 +46,7 @@ def method_unused(kind: str) -> tuple[str, ...]:
 def motion(tables: Tables, kind: str) -> Motion:
     """What an engine meets in a scene, as far as its tables could be read."""
     contact, structure, rubs = tables.contact, tables.structure, kind == "rig"
-    laws = [one for one in (tables.friction, *(structure.interface if structure is not None else ()))
+    laws = [one for one in (tables.friction, *((structure.interface if structure is not None else ()) or ()))
             if rubs and one is not None and one.law is not None]
     cause = changing_load(tables) if laws else ""
     apart = rubs and contact is not None and contact.strips is not None and bool(turning(tables))
@@ -68,7 +68,7 @@ def bending(structure) -> str:
 
 def turning(tables: Tables) -> str:
     """Key of the first mode that yaws the patch; empty where none does."""
-    modes = tables.structure.mode if tables.structure is not None else ()
+    modes = (tables.structure.mode if tables.structure is not None else ()) or ()
     return next((f"structure.mode.{k}.yaw" for k, mode in enumerate(modes) if mode.yaw), "")
 
 
@@ -77,7 +77,7 @@ def changing_load(tables: Tables) -> str:
     normal, structure = tables.normal, tables.structure
     if normal is not None and normal.amplitude:
         return "normal.amplitude"
-    for index, mode in enumerate(structure.mode if structure is not None else ()):
+    for index, mode in enumerate((structure.mode if structure is not None else ()) or ()):
         for key in ("normal", "pitch"):
             if getattr(mode, key, None):
                 return f"structure.mode.{index}.{key}"

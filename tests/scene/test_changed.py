@@ -1,0 +1,101 @@
+"""A scene with keys replaced, beside the same scene read from its text with the same strings."""
+
+import numpy as np
+import pytest
+
+from patchfem.api import load
+from patchfem.scene.changed import Base
+from patchfem.scene.scene import SceneError, loads, with_files
+
+RIG = """
+[normal]
+load = "100 N"
+[friction]
+law = "coulomb"
+static = 0.3
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[[structure.mode]]
+name = "second"
+frequency = "400 Hz"
+damping = 0.01
+slide = 0.1
+[drive]
+kind = "base"
+frequency = "140 Hz"
+acceleration = "5 g"
+cycles = 200
+"""
+PATCH = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.coating]
+material = "WC-Co"
+thickness = "6 mil"
+[contact.tilt]
+angle = "0.1 mrad"
+"""
+CHANGES = [  # scene, strings as --set takes them
+    (RIG, ["normal.load=101 N"]), (RIG, ["normal.load=0 N", "normal.load=3 lbf"]), (RIG, []),
+    (RIG, ["structure.mode.second.damping=0.02"]), (RIG, ["structure.mode.1.damping=0.02"]),
+    (RIG, ["structure.mode.axial.frequency=150 Hz", "drive.frequency=150 Hz", "friction.kinetic=0.2"]),
+    (RIG, ["friction.law=elastic-plastic", "friction.bond_length=1 um"]), (RIG, ["accuracy.tolerance=1e-4"]),
+    (RIG, ["normal.amplitude=3 N"]), (RIG, ["friction.kinetic=0.4"]), (RIG, ["normal.load=-1 N"]),
+    (RIG, ["normal.lod=1 N"]), (RIG, ["structure.mode.third.damping=0.1"]), (RIG, ["structure.mode.7.damping=0.1"]),
+    (RIG, ["normal=3"]), (RIG, ["normal.load"]), (RIG, ["drive.waveform=levels"]), (RIG, ["slide.kind=sine"]),
+    (RIG, ["structure.start.velocity=[0.1, 0.0]"]), (RIG, ["title=another", "normal.load=5 kg"]),
+    (RIG, ["structure.mode=[]"]), (RIG, ["structure.interface=[]", "accuracy.method=exact"]),
+    (RIG, ["friction.spread=1 um", "normal.width=1 mm"]),
+    (RIG, ["contact.tilt.angle=1 mrad"]), (RIG, ["drive.kind=free", "drive.displacement=1 mm"]),
+    (PATCH, ["contact.tilt.angle=1 mrad"]), (PATCH, ["contact.crown.radius=1 m", "contact.load=1 N"]),
+    (PATCH, ["contact.substrate={young = \"100 GPa\", poisson = 0.3, density = \"4000 kg/m^3\"}"]),
+    (PATCH, ["contact.mesh=nowhere.msh"]), (PATCH, ["contact.element_size=20 mm"]), (PATCH, ["contact.coating=none"]),
+]
+
+
+def told(make) -> tuple:
+    """What a scene says of itself, or its mistakes."""
+    try:
+        found = make()
+    except SceneError as error:
+        return ("refused", *error.mistakes)
+    return found.resolved(), found.kind, found.remarks, found.sets, found.named(), found.tables()
+
+
+@pytest.mark.parametrize(("text", "sets"), CHANGES)
+def test_exact_changed_scene_is_the_one_read_with_its_sets(text, sets):
+    own = told(lambda: with_files(loads(text, "scene.toml", sets)))
+    assert told(lambda: Base(loads(text, "scene.toml")).changed(sets)) == own
+
+
+def test_exact_changed_scene_of_one_that_has_sets_already():
+    first = loads(RIG, "scene.toml", ["normal.load=7 N", "structure.mode.axial.damping=0.1"])
+    base = Base(first)
+    own = told(lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2")))
+    assert told(lambda: base.changed(["structure.mode.second.damping=0.2"])) == own
+    assert told(lambda: base.changed(["normal.load=-2 N"])) == \
+        told(lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N")))  # a mistake at a key set before
+
+
+def test_always_a_change_leaves_the_scene_and_later_changes_alone():
+    base = Base(loads(RIG, "scene.toml"))
+    before = told(lambda: base.changed([]))
+    with pytest.raises(SceneError):
+        base.changed(["structure.mode.axial.damping=-1", "friction.lw=coulomb"])
+    assert base.changed(["structure.mode.axial.damping=0.5"]).structure.mode[0].damping == 0.5
+    assert told(lambda: base.changed([])) == before
+
+
+def test_exact_load_of_a_scene_takes_si_values():
+    scene = load(RIG)
+    for value in np.random.default_rng(5).uniform(1, 1e3, 5):
+        assert load(scene, **{"normal.load": value}).normal.load == value
