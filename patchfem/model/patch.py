@@ -3,6 +3,7 @@ solved."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from ..mesh.ends import SHARP, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
@@ -43,6 +44,16 @@ class OnePiece:
         return "flat" if self.bearing > half * (1 + CLOSE) else self.end.kind
 
 
+class Meshes(NamedTuple):
+    """The meshes of patches that share them, the one of the answer first and then those of its error.
+
+    levels: (lower, upper or None where it is alike) each; name: hash of what they hold.
+    """
+
+    levels: tuple
+    name: str
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchModel:
     """Two pieces and what presses them.
@@ -56,7 +67,7 @@ class PatchModel:
     of the holder. skin: asperities; strips: (count, roll [rad], lateral place [m] of the load line or None where the
     roll is held); shear: the pieces are compliant tangentially; gives_way: the effect that lets the patch slip part by
     part, as the scene writes it; mesh_tolerance: relative error that a chosen mesh is to meet, None: the tolerance of
-    the run.
+    the run. meshes: those that serve all cases of a sweep, None: the patch has its own.
     """
 
     length: float
@@ -84,6 +95,7 @@ class PatchModel:
     shear: bool
     gives_way: str
     mesh_tolerance: float | None = None
+    meshes: Meshes | None = None
 
     @property
     def alike(self) -> bool:

@@ -1,17 +1,19 @@
 """The two pieces of a patch: their meshes, materials and the compliance of their common interface."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from time import perf_counter
 
 import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
 from ...elasticity import cache
-from ...elasticity.elasticity import Layers, assemble, interface_compliance
+from ...elasticity.elasticity import Layers, Piece, assemble, interface_compliance
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import layers_of
 
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
+SHARED = 2  # geometries whose shared pieces are kept
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -110,6 +112,34 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     seconds = {"assemble": assembled - start, "condense": perf_counter() - assembled}
     pieces = Compliance(interface, normal, tangential)
     return Pair(grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds)
+
+
+def shared_pairs(asked) -> tuple:
+    """The condensed pieces of every level of a `PatchModel` that has `meshes`; those of the last patches are kept."""
+    pieces = asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
+    return _shared(asked.meshes.name, pieces, _Content(asked))
+
+
+class _Content:
+    """A PatchModel that is any other one to a cache: what tells them apart stands beside it."""
+
+    def __init__(self, asked):
+        self.asked = asked
+
+    def __eq__(self, other) -> bool:
+        return True
+
+    def __hash__(self) -> int:
+        return 0
+
+
+@lru_cache(maxsize=SHARED)
+def _shared(name: str, pieces: tuple, content: _Content) -> tuple:
+    out = tuple(condensed(content.asked, *level) for level in content.asked.meshes.levels)
+    for piece in {id(one): one for pair in out for one in (pair.piece, pair.upper)}.values():
+        if isinstance(piece, Piece) and not piece.rounding:
+            piece.made.clear()  # factors are far larger than the compliance, and made again where fields are wanted
+    return out
 
 
 def _rise(body, x) -> np.ndarray:

@@ -57,19 +57,24 @@ def base_grids(asked) -> list:
     """
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
-    cell = asked.size if asked.gap.profile is not None else asked.length / SEARCH_CELLS
-    layout = Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
+    layout = search_layout(asked)
     for _ in range(SEARCHES):
-        grids = _grids(asked, layout)
+        grids = grids_of(asked, layout)
         pair = condensed(asked, *grids)
         seen = [loaded(pressed(each, pair)) for each in (asked, *sweep)]
-        layout = _layout(asked, seen)
+        layout = layout_of(asked, seen)
         if max(one.cell / one.wide for one in seen) <= 1 / (EDGE[asked.still] - 1):
             break
-    return _grids(asked, layout)
+    return grids_of(asked, layout)
 
 
-def _layout(asked, seen: list) -> Layout:
+def search_layout(asked) -> Layout:
+    """Even columns on which a contact is looked for."""
+    cell = asked.size if asked.gap.profile is not None else asked.length / SEARCH_CELLS
+    return Layout(-asked.length / 2, asked.length / 2, (), (-asked.length / 2, asked.length / 2), cell, cell, 0.0)
+
+
+def layout_of(asked, seen: list) -> Layout:
     """Layout of the coarsest columns for the contacts `seen`, finest where one ends."""
     half, span = asked.length / 2, (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
     wide, thick = min(one.wide for one in seen), _coating(asked)
@@ -139,7 +144,8 @@ def loaded(patch: Patch) -> Found:
     return Found((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)))
 
 
-def _grids(asked, layout: Layout) -> list:
+def grids_of(asked, layout: Layout) -> list:
+    """Grids of the pieces, one where they are alike, with the columns of a layout, MOST_COLUMNS at most."""
     pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
     x = columns(layout, asked.gap.jumps)
     while x.size > MOST_COLUMNS + 1 and layout.bands:

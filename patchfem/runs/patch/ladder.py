@@ -10,7 +10,7 @@ from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from . import high_order
-from .condensed import condensed
+from .condensed import condensed, shared_pairs
 from .grading import base_grids
 from .measures import measures, met, missed
 from .press import pressed, solve
@@ -42,27 +42,53 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     """A patch on its mesh and on coarser ones, fine to coarse; two of them at least, None where one is not wanted.
 
     A patch whose element size is not pinned climbs a ladder of nested meshes to its `tolerance`. A mesh of any cells
-    has no coarser one: its second patch is on the mesh with every edge halved. fresh: condense anew, whatever is kept
-    on disk.
+    has no coarser one: its second patch is on the mesh with every edge halved. Where it shares meshes they are those.
+    fresh: condense anew, whatever is kept on disk.
     """
+    if asked.meshes is not None:
+        pairs = tuple(condensed(asked, *level, fresh=True) for level in asked.meshes.levels) if fresh else \
+            shared_pairs(asked)
+        return on_pairs(asked, pairs, estimate)
     if asked.chosen:
         return climbed(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
 
 
+def on_pairs(asked, pairs, estimate: bool = True) -> tuple:
+    """A patch pressed on condensed pieces, the first for the answer and the others for its error, as `solve_all`."""
+    return _filled(pressed(asked, pair) for pair in pairs[:None if estimate else 1])
+
+
+def _filled(patches) -> tuple:
+    """Patches with None for each that three lack."""
+    out = tuple(patches)
+    return out + (None,) * (3 - len(out))
+
+
 def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
     """A patch on given bodies and on coarser ones, as `solve_all`."""
-    out = [solve(asked, low, high, fresh), None, None]
-    if not estimate or low.x.size <= 8:
-        return tuple(out)
+    found = [(low, high), *(beside(low, high) if estimate else ())]
+    return _filled(solve(asked, *level, fresh) for level in found)
+
+
+def levels_of(asked) -> list:
+    """The meshes of a patch whose elements are pinned or come from a file, as `solve_all` takes them."""
+    low, high = bodies_of(asked)
+    return [(low, high), *beside(low, high)]
+
+
+def beside(low, high) -> list:
+    """The meshes, (lower, upper or None), that show the error of given ones: coarser grids, or a mesh of any cells
+    with every edge halved."""
+    if low.x.size <= 8:
+        return []
     if plan_of(low) is None:
-        out[1] = solve(asked, *(None if body is None else _halved(body) for body in (low, high)))
-        return tuple(out)
-    for k in (1, 2):
-        if low.x.size > 8:
-            low, high = coarser(low), coarser(high) if high is not None else None
-            out[k] = solve(asked, low, high, fresh)
-    return tuple(out)
+        return [tuple(None if body is None else _halved(body) for body in (low, high))]
+    out = []
+    while len(out) < 2 and low.x.size > 8:
+        low, high = coarser(low), coarser(high) if high is not None else None
+        out.append((low, high))
+    return out
 
 
 def climbed(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:

@@ -1,0 +1,172 @@
+"""Meshes that all cases of a sweep share: fine wherever the pressure of one of them ends.
+
+A mesh of a case is graded to its own contact. That of a family has at every place the cells of the case that wants the
+shortest there, and its ladder of nested meshes is climbed until the hardest case meets the tolerance. Pieces that pin
+their elements, or come from a file, have the same meshes in every case anyway.
+"""
+
+from dataclasses import replace
+from hashlib import sha256
+from itertools import pairwise
+
+import numpy as np
+
+from ....core import PatchfemError
+from ....mesh.grading import Layout
+from ....mesh.nested import finer
+from ....mesh.tensor import TensorGrid
+from ....model.patch import Meshes
+from .. import grading, ladder
+from ..condensed import condensed
+from ..measures import measures, met
+from ..press import pressed
+
+CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
+ROUNDS = 4  # of the search for the contacts
+MOST_NODES = 400  # of the finest interface
+START = (4.0, 2.8, 2.0, 1.4, 1.0)  # times the cells that a case asks of its coarsest mesh: the first that are enough
+CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
+
+
+def geometry_of(asked) -> tuple:
+    """What the meshes and the pieces of a `PatchModel` depend on beside its load and shapes; equal for patches that may
+    share them."""
+    mesh = asked.mesh and (asked.mesh, asked.mesh.stat().st_mtime_ns if asked.mesh.exists() else 0)
+    return (asked.length, asked.width, asked.height, asked.pairs, asked.plane, asked.lower, asked.upper,
+            asked.element_size, asked.still, asked.sweeps, mesh, asked.mesh_tolerance, asked.gap.jumps,
+            asked.gap.profile)
+
+
+def shared_meshes(patches, tolerance: float) -> Meshes | None:
+    """Meshes for `PatchModel`s of one geometry, whatever their order; None where no case can be pressed.
+
+    tolerance: relative error of the static measures that all of them are to meet.
+    """
+    asked = patches[0]
+    if not asked.chosen:
+        return named(ladder.levels_of(asked))
+    cases, every = spread(patches)
+    swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
+             for share in grading.SWING]
+    layout = _layout([*cases, *swept], not every)
+    for share in START if layout is not None else ():
+        levels, good = _climbed(cases, grading.grids_of(asked, layout.times(share)), tolerance, share > 1)
+        if good or share == START[-1]:
+            return named(levels)
+    return None
+
+
+def named(levels) -> Meshes:
+    """Meshes with the hash of their content."""
+    digest = sha256()
+    for body in (body for level in levels for body in level):
+        arrays = () if body is None else (body.x, body.depth) if isinstance(body, TensorGrid) else \
+            (body.points, body.triangles, body.quads, body.is_coating, body.interface, body.far)
+        for array in arrays:
+            digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
+        digest.update(repr(getattr(body, "coating_rows", None)).encode())
+    return Meshes(tuple(levels), digest.hexdigest()[:32])
+
+
+def spread(patches) -> tuple:
+    """(the patches that lie farthest apart in what presses and shapes them, CASES at most, whatever their order;
+    whether these are all)."""
+    rows = {_numbers(one): one for one in patches}
+    keys = sorted(rows)
+    if len(keys) <= CASES:
+        return [rows[key] for key in keys], True
+    sizes = np.array(keys)
+    scale = np.abs(sizes).min(axis=0, where=sizes != 0, initial=np.inf)
+    at = np.arcsinh(np.divide(sizes, scale, out=np.zeros_like(sizes), where=np.isfinite(scale)))
+    at = at / np.maximum(np.ptp(at, axis=0), 1e-300)
+    picked = [int(np.argmin(at.sum(axis=1)))]
+    apart = np.full(len(keys), np.inf)
+    while len(picked) < CASES:
+        apart = np.minimum(apart, np.abs(at - at[picked[-1]]).max(axis=1))
+        picked.append(int(np.argmax(apart)))
+    return [rows[keys[k]] for k in sorted(picked)], False
+
+
+def _numbers(asked) -> tuple:
+    """What tells the contacts of two patches of one geometry apart, as numbers."""
+    shapes = [float(value) for _, part in asked.gap.shapes for _, value in part if isinstance(value, (int, float))]
+    skin = [float(value or 0.0) for _, value in asked.skin or () if isinstance(value, (int, float)) or value is None]
+    own = (asked.load, asked.approach, asked.offset, asked.line_moment, asked.rotates, asked.spring,
+           *(asked.strips or ()))
+    return (*(float(value or 0.0) for value in own), *shapes, *skin)
+
+
+def _layout(cases: list, between: bool) -> Layout | None:
+    """The layout of the coarsest grids, that no case wants finer; None where no case can be pressed.
+
+    between: there are more cases than these, and their contacts end between those of neighbouring ones.
+    """
+    first, along = cases[0], grading.EDGE[cases[0].still]
+    layout = grading.search_layout(first)
+    for _ in range(ROUNDS):
+        pair = condensed(first, *grading.grids_of(first, layout))
+        seen = [(one, found) for one in cases if (found := _loaded(one, pair)) is not None]
+        if not seen:
+            return None
+        layout = _merged([grading.layout_of(one, [found]) for one, found in seen], between)
+        if max(found.cell / found.wide for _, found in seen) <= 1 / (along - 1):
+            break
+    return layout
+
+
+def _loaded(asked, pair):
+    """The contact of a case, None of one that cannot be pressed: its own run says why."""
+    try:
+        return grading.loaded(pressed(asked, pair))
+    except PatchfemError:
+        return None
+
+
+def _merged(layouts: list, between: bool) -> Layout:
+    """The layout whose cells are nowhere longer than those of any of `layouts`."""
+    bands = {band for one in layouts for band in (*one.bands, (*one.span, one.inside))}
+    if between:
+        bands |= set(_filled(layouts))
+    first = layouts[0]
+    out = Layout(first.start, first.stop, (), (first.start, first.stop), *2 * [min(one.largest for one in layouts)],
+                 min(one.slope for one in layouts))
+    for low, high, least in sorted(bands, key=lambda band: (band[2], band)):  # those that others make needless are many
+        if (out.size(np.linspace(low, high, 5)) > least * (1 + 1e-9)).any():
+            out = replace(out, bands=(*out.bands, (low, high, least)))
+    return out
+
+
+def _filled(layouts: list) -> list:
+    """Bands from each edge of a contact to that of the next case, with cells between those of both."""
+    out, half = [], max(one.stop for one in layouts)
+    for side in (-1, 1):
+        ends = sorted({(low, least) for one in layouts for low, high, least in one.bands
+                       if low == high and low * side >= 0 and abs(low) < half})
+        for (low, a), (high, b) in pairwise(ends):
+            count = 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(CLOSE))) or 1
+            places, sizes = np.linspace(low, high, count + 1), np.geomspace(a, b, count + 1)
+            out += [(*map(float, stretch), float(max(pair))) for stretch, pair in
+                    zip(pairwise(places), pairwise(sizes), strict=True)]
+    return out
+
+
+def _climbed(cases: list, grids, tolerance: float, once: bool) -> tuple:
+    """Levels of nested meshes from the coarsest `grids`, fine to coarse, up to one on which every case meets the
+    tolerance, or the dearest that is worth it; and whether every case does. once: no more than the least levels."""
+    pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
+    while True:
+        pairs.insert(0, condensed(cases[0], *grids))
+        grids = [finer(grid) for grid in grids]
+        if len(pairs) < ladder.LEAST_LEVELS:
+            continue
+        good = all(_enough(one, pairs, tolerance) for one in cases)  # ends with the first that is not
+        if good or once or grids[0].x.size > MOST_NODES or ladder.seconds_of(grids) > ladder.SPENT[cases[0].still]:
+            return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], good
+
+
+def _enough(asked, pairs: list, tolerance: float) -> bool:
+    """Whether a case meets the tolerance on these pieces, or cannot be pressed at all."""
+    try:
+        return met(measures(*ladder.on_pairs(asked, pairs), tolerance=tolerance), tolerance)
+    except PatchfemError:
+        return True

@@ -1,0 +1,94 @@
+"""One mesh for all cases of a sweep: whatever the order, as good as each case's own, and the same answers as a cold
+run on it."""
+
+from dataclasses import replace
+
+import pytest
+from scene_texts import COATING, PIECE
+
+from patchfem.core import PatchfemError
+from patchfem.model.model import build
+from patchfem.runs.many.meshes import meshed
+from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.patch.measures import measures
+from patchfem.runs.run import run
+from patchfem.scene import scene
+
+TEXT = PIECE + """\
+load = "{} N"
+substrate = "Ti-8Al-1Mo-1V"
+""" + COATING + """
+[contact.tilt]
+angle = "{} rad"
+{}
+[accuracy]
+tolerance = 1e-2
+"""
+
+
+def model(angle=1e-4, load=100.0, keys="", tail=""):
+    return build(scene.loads(TEXT.format(load, angle, tail).replace("substrate", keys + "substrate", 1)))
+
+
+def family(*angles, **keys):
+    return [model(angle, **keys) for angle in angles]
+
+
+def test_exact_a_case_does_not_depend_on_the_order_of_the_others():
+    cases = family(1e-6, 1e-4, 1e-3)
+    names = {meshed(some)[0].patch.meshes.name for some in (cases, cases[::-1], cases + cases[1:3])}
+    assert len(names) == 1
+    assert meshed(cases[:2])[0].patch.meshes.name not in names
+
+
+@pytest.mark.parametrize("angle", [1e-6, 1e-3])
+def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
+    one = next(m for m in meshed(family(1e-6, 1e-5, 1e-3)) if m.patch.gap.angle == angle)
+    run(one)
+    warm, cold = run(one), run(one, fresh=True)
+    assert warm.patch.x.size == cold.patch.x.size
+    for name, m in cold.measures.items():
+        same = warm.measures[name]
+        assert same.value == pytest.approx(m.value, rel=1e-12, abs=1e-12 * m.floor), name
+        assert same.error == pytest.approx(m.error, rel=1e-12, abs=1e-12 * abs(m.value)), name
+
+
+def test_always_the_shared_mesh_serves_the_hardest_case():
+    cases = family(1e-6, 1e-2)
+    for own, shared in zip(cases, meshed(cases), strict=True):
+        mine, truth = (measures(*solve_all(one.patch, tolerance), tolerance=tolerance)
+                       for one, tolerance in ((shared, 1e-2), (own, 1e-3)))
+        for name, m in mine.items():
+            assert abs(m.value - truth[name].value) <= m.error + truth[name].error + m.floor, name
+            assert m.error <= 1e-2 * abs(m.value) + max(m.floor, 1e-2 * own.patch.length / 2), name
+
+
+def test_exact_opposite_tilts_press_mirrored():
+    left, right = (solve_all(one.patch, 1e-2)[0] for one in meshed(family(-2e-4, 2e-4)))
+    assert left.pressure.sigma_n[::-1] == pytest.approx(right.pressure.sigma_n, rel=1e-9,
+                                                        abs=1e-10 * right.pressure.sigma_n.max())
+
+
+def test_exact_pinned_elements_stay_those_of_a_single_run():
+    cases = family(1e-5, 1e-4, keys='element_size = "0.4 mm"\n')
+    for own, shared in zip(cases, meshed(cases), strict=True):
+        a, b = run(own), run(shared)
+        assert {k: (m.value, m.error) for k, m in a.measures.items()} == \
+            {k: (m.value, m.error) for k, m in b.measures.items()}
+
+
+def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
+    plane, fault = family(1e-4, 1e-5, keys='plane = "stress"\n'), PatchfemError("a case that was refused")
+    found = meshed([*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')])
+    assert [getattr(getattr(one, "patch", None), "meshes", None) is None for one in found] == \
+        [True, True, False, False, True]
+    assert found[1] is fault
+
+
+def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
+    good = family(1e-5, 1e-4)
+    tipped = [replace(one, patch=replace(one.patch, load=100.0, line_moment=10.0, rotates=True)) for one in good[:1]]
+    found = meshed([*good, *tipped])
+    assert found[0].patch.meshes.name == meshed(good)[0].patch.meshes.name
+    with pytest.raises(PatchfemError, match="tips over"):
+        run(found[2])
