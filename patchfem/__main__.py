@@ -19,12 +19,12 @@ from .commands.run import run  # noqa: E402
 from .commands.scene import check, mesh, plan  # noqa: E402
 from .commands.shared import Ended, Refused, say  # noqa: E402
 from .commands.study import cost, fit  # noqa: E402
+from .commands.sweep import sweep  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-VERBS = (check, plan, run, profile, compare, cost, fit, mesh, export, view)
-NOT_BUILT = ("sweep", "report", "import", "demo", "new",
-             "schema", "doctor", "cite")
+VERBS = (check, plan, run, sweep, profile, compare, cost, fit, mesh, export, view)
+NOT_BUILT = ("report", "import", "demo", "new", "schema", "doctor", "cite")
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")

@@ -141,6 +141,7 @@ EFFECTS = {
     "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds per point, or tau ds of form 'energy'",
                    ("pressure", "traction")),
     "measured": Effect("", "overlay of measured rows"),
+    "sweep": Effect("patchfem.campaigns.sweeps.cases", "one case per combination of the values of its keys"),
 }
 
 # an interface between two masses carries the keys of [friction] itself

@@ -147,3 +147,14 @@ def test_always_an_answer_in_a_third_of_a_second(scene, words):
     if os.getloadavg()[0] > 1.5 * os.cpu_count():
         pytest.skip("several programs share each core here, which doubles CPU times")
     assert best_of(10, "-m", "patchfem", *words) < 0.3
+
+
+def test_exact_a_scene_without_a_sweep_imports_none_of_it(scene):
+    absent(loaded(FROM_PYTHON, scene(BENCH)), "campaigns", "export.sweeps", "scene.axes", "runs.many")
+    absent(loaded(FROM_SHELL, "check", scene(BENCH)), "campaigns", "export.sweeps", "scene.axes", "runs.many")
+
+
+def test_exact_a_sweep_over_a_point_needs_no_mesh_and_no_pictures(scene, tmp_path):
+    modules = loaded(FROM_SHELL, "sweep", scene(BENCH), "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a", "-q")
+    absent(modules, "contact", "mesh", "export.report", "export.drawing", "export.fields")
+    assert not {"matplotlib", "pandas", "xarray", "dask", "distributed"} & modules

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from math import prod
 from textwrap import shorten
 from typing import TYPE_CHECKING
 
+from ..core import PatchfemError
 from ..effects import absent
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
@@ -94,8 +96,12 @@ class Model:
 def build(scene: Scene) -> Model:
     """The model of a valid scene; files that it names are read. PatchfemError with the place of the key at fault.
 
-    Only what the scene names is imported.
+    Only what the scene names is imported. A scene with [sweep] is many models and is refused.
     """
+    if scene.sweep:
+        count = prod(len(axis.texts) for axis in scene.sweep)
+        raise PatchfemError(f"{scene.where('sweep')}: one run cannot hold its {count} cases; use `patchfem sweep`, or "
+                            "leave [sweep] out")
     patch = point = slide = rig = None
     if scene.contact is not None:
         from .patch import patch_asked

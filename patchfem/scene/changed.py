@@ -12,11 +12,16 @@ from .scene import Scene, scene_of, with_files
 
 
 class Base:
-    """A valid scene that others differ from in a few keys; its text is parsed and its tables are read once."""
+    """A valid scene that others differ from in a few keys; its text is parsed and its tables are read once.
+
+    A table [sweep] says which others there are and is in none of them.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.lines = scene, key_lines(scene.text)
-        read = Draft(str(scene.path), self.lines, tomllib.loads(scene.text))
+        tables = tomllib.loads(scene.text)
+        tables.pop("sweep", None)
+        read = Draft(str(scene.path), self.lines, tables)
         for one in scene.sets:
             apply_set(read, one)
         read.read()

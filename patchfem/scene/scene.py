@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -38,8 +38,8 @@ class SceneError(Exception):
 
 @dataclass(frozen=True)
 class Scene:
-    """A valid scene in SI: its tables (None where absent), the kind of run, its text, remarks on unused keys and the
-    --set strings that were applied."""
+    """A valid scene in SI: its tables (None where absent), the kind of run, its text, remarks on unused keys, the
+    --set strings that were applied and the axes of [sweep], () without it."""
 
     path: Path
     text: str
@@ -56,6 +56,7 @@ class Scene:
     measured: tables.Measured | None
     remarks: list[str]
     sets: tuple[str, ...] = ()
+    sweep: tuple = ()
 
     def __repr__(self) -> str:
         sets = f"\n  with {shorten(', '.join(self.sets), 160)}" if self.sets else ""
@@ -72,7 +73,7 @@ class Scene:
 
     def named(self) -> list[str]:
         """The effects the scene names: a table, or ``table.key=value`` for the selectors of a table that has them."""
-        return effects(self.tables())
+        return effects(self.tables()) + ["sweep"] * bool(self.sweep)
 
     def where(self, key: str) -> str:
         """``FILE:LINE: key`` for a message about a key; the line of its table where it is not written itself."""
@@ -92,23 +93,28 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
     of more mistakes, such as those inside these files; it sees the tables as far as they could be read, whole where
     they have no mistake.
     """
-    try:
-        content = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise SceneError([f"{path}: cannot be read: {reason}"]) from None
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        byte = content[error.start]
-        raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
+    text = text_of(path)
 
     def of_files(found: tables.Tables, whole: bool) -> Iterable[tuple[str, str]]:
         folder = Path(path).parent
         return [*absent_files(found, folder), *(faults(found, folder, whole) if faults else ())]
 
     return loads(text, path, sets, of_files)
+
+
+def text_of(path: str | Path) -> str:
+    """The text of a scene file; SceneError where it cannot be read."""
+    try:
+        content = Path(path).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SceneError([f"{path}: cannot be read: {reason}"]) from None
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        byte = content[error.start]
+        raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
 
 
 def with_files(found: Scene) -> Scene:
@@ -154,11 +160,15 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), 
         raw = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise SceneError([_syntax(error, text, path)]) from None
-    sets = tuple(sets)
+    sets, axes = tuple(sets), []
     draft = Draft(str(path), key_lines(text), raw)
-    for one in sets:
+    if "sweep" in raw:
+        axes = _axes(draft, raw.pop("sweep"))
+    given = [axis for axis in axes if not draft.given(axis.key)]  # a key that only [sweep] holds has its first value
+    for one in (*(f"{axis.key}={axis.texts[0]}" for axis in given), *sets):
         apply_set(draft, one)
-    return scene_of(draft, path, text, sets, more)
+    found = scene_of(draft, path, text, sets, more)
+    return replace(found, sweep=tuple(axes)) if axes else found
 
 
 def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], more: Callable | None = None) -> Scene:
@@ -176,6 +186,27 @@ def scene_of(draft: Draft, path: str | Path, text: str, sets: tuple[str, ...], m
         raise SceneError(draft.lines_of_mistakes())
     values = {name: getattr(found, name) for name in tables.Tables.model_fields}
     return Scene(path=Path(path), text=text, kind=kind, remarks=draft.remarks, sets=sets, **values)
+
+
+def axes_of(text: str, path: str | Path) -> tuple[list, list[str]]:
+    """(axes, mistakes) of the table [sweep] of a text, of which nothing else is read; SceneError if it is no TOML."""
+    try:
+        raw = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise SceneError([_syntax(error, text, path)]) from None
+    draft = Draft(str(path), key_lines(text), raw)
+    axes = _axes(draft, raw["sweep"]) if "sweep" in raw else []
+    return axes, draft.lines_of_mistakes()
+
+
+def _axes(draft: Draft, table: Any) -> list:
+    """The axes of [sweep]; mistakes are said."""
+    from .axes import of_table
+
+    found, wrong = of_table(table)
+    for key, message in wrong:
+        draft.say(key, message)
+    return found
 
 
 def _syntax(error: Exception, text: str, path: str | Path) -> str:

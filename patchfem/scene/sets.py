@@ -21,6 +21,13 @@ def assignments(sets: dict[str, Any]) -> tuple[str, ...]:
     return tuple(f"{key}={value if isinstance(value, str) else _written(key, value)}" for key, value in sets.items())
 
 
+def texts(key: str, values: Any) -> list[str]:
+    """Values of one key as the texts of a scene without quotes: texts as they are, numbers in SI with its unit."""
+    listed = values.tolist() if hasattr(values, "tolist") else values
+    found = [assignments({key: one})[0].partition("=")[2] for one in listed]
+    return [text[1:-1] if text.startswith('"') and '"' not in text[1:-1] else text for text in found]
+
+
 def _written(key: str, value: Any) -> str:
     """A value of TOML, to the last bit; a number of a key with a unit as a text in SI."""
     value = value.tolist() if hasattr(value, "tolist") else value

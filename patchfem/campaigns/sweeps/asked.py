@@ -1,0 +1,87 @@
+"""A scene asked again and again with other values of a few keys: the model of each case, or why there is none."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from ... import __version__
+from ...core import PatchfemError
+from ...model.model import Model, build
+from ...scene.changed import Base
+from ...scene.scene import Scene, SceneError, axes_of, is_there, loads, with_files
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The text of a scene, its path, which other files are relative to, and the --set strings that all cases share."""
+
+    path: Path
+    text: str
+    sets: tuple = ()
+
+    def scene(self, sets: Sequence[str]) -> Scene:
+        """The scene with `table.key=value` of each changed key; SceneError names every mistake."""
+        base = _base(self)
+        return base.changed(sets) if base is not None else self._read(sets)
+
+    def _read(self, sets: Sequence[str]) -> Scene:
+        return replace(with_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
+
+    def model(self, sets: Sequence[str]) -> Model:
+        """The model of a case; PatchfemError, with every mistake of its scene, where there is none."""
+        try:
+            return build(self.scene(sets))
+        except SceneError as error:
+            raise PatchfemError("; ".join(error.mistakes)) from None
+
+    def mistakes(self, sets: Sequence[str]) -> list[str]:
+        """Every mistake of the scene of a case; none where it is valid."""
+        try:
+            self.scene(sets)
+        except SceneError as error:
+            return error.mistakes
+        return []
+
+    def axes(self) -> tuple[list, list[str]]:
+        """(axes, mistakes) of the table [sweep], none of either without it."""
+        try:
+            return axes_of(self.text, self.path)
+        except SceneError as error:
+            return [], error.mistakes
+
+    def digest(self) -> str:
+        """Sign of what all cases share: the version, the tables as written but for [sweep], what is set, the files."""
+        tables = {name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"}
+        files = [self.content(text) for text in _texts(tables)]
+        return sha256(json.dumps([__version__, tables, self.sets, files], sort_keys=True,
+                                 default=str).encode()).hexdigest()
+
+    def content(self, text: str) -> str:
+        """Sign of the content of the file that a text names; "" where it names none."""
+        path = self.path.parent / text
+        return sha256(path.read_bytes()).hexdigest() if is_there(path) else ""
+
+
+@lru_cache(maxsize=2)
+def _base(asked: Asked) -> Base | None:
+    """What the scenes of all cases are made from; None where the text without their values is no valid scene."""
+    try:
+        return Base(asked._read(()))
+    except SceneError:
+        return None
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """Every text in the tables of a scene, in their order."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict | list):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from _texts(one)

@@ -1,0 +1,92 @@
+"""The cases of a sweep: every combination of the values of its keys, or one row of values each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from math import prod
+
+from ...scene.axes import Axis, values_of
+from .asked import Asked
+
+
+@dataclass(frozen=True, slots=True)
+class Cases:
+    """Cases numbered from 0.
+
+    axes: the keys with their values. rows: case k has the k-th value of every axis; otherwise the cases are all
+    combinations, the last axis fastest.
+    """
+
+    axes: tuple[Axis, ...]
+    rows: bool = False
+
+    def __len__(self) -> int:
+        return len(self.axes[0].texts) if self.rows else prod(self.shape)
+
+    @property
+    def shape(self) -> tuple:
+        """Number of values of each axis; of rows the number of cases."""
+        return (len(self),) if self.rows else tuple(len(axis.texts) for axis in self.axes)
+
+    def places(self, number: int) -> tuple:
+        """Place of a case along each axis."""
+        if self.rows:
+            return (number,) * len(self.axes)
+        out = []
+        for axis in reversed(self.axes):
+            number, place = divmod(number, len(axis.texts))
+            out.append(place)
+        return tuple(reversed(out))
+
+    def texts(self, number: int) -> tuple:
+        """Values of a case as written, axis by axis."""
+        return tuple(axis.texts[place] for axis, place in zip(self.axes, self.places(number)))
+
+    def sets(self, number: int) -> tuple:
+        """The case as `table.key=value` strings."""
+        return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
+
+    def keys(self, asked: Asked) -> list[str]:
+        """Name of every case, made of what it computes: the same values in other units or another order, or as part of
+        another sweep of the same scene, have the same name."""
+        shared = asked.digest()
+        marks = [[json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
+                  for value in axis.values] for axis in self.axes]
+        out = []
+        for number in range(len(self)):
+            own = sorted(mark[place] for mark, place in zip(marks, self.places(number)))
+            out.append(sha256("\n".join([shared, *own]).encode()).hexdigest()[:16])
+        return out
+
+
+def product(parts: Sequence[Cases]) -> Cases:
+    """All combinations of the cases of the parts, the last part fastest; rows where one of the parts has rows."""
+    if not any(part.rows for part in parts):
+        return Cases(tuple(axis for part in parts for axis in part.axes))
+    count, axes, inner = prod(map(len, parts)), [], prod(map(len, parts))
+    for part in parts:
+        inner //= len(part)
+        picked = [part.places(number // inner % len(part)) for number in range(count)]
+        for at, axis in enumerate(part.axes):
+            axes.append(Axis(axis.key, tuple(axis.texts[one[at]] for one in picked),
+                             tuple(axis.values[one[at]] for one in picked), axis.unit))
+    return Cases(tuple(axes), True)
+
+
+def rows_of(columns: dict) -> Cases:
+    """Cases of rows: key -> a text per case; ValueError, a line per mistake, names key and value."""
+    axes, wrong = [], []
+    for key, texts in columns.items():
+        try:
+            unlike = values_of(key, dict.fromkeys(texts), distinct=False)
+        except ValueError as error:
+            wrong += [f"{key}: {line}" for line in str(error).split("\n")]
+            continue
+        known = dict(zip(unlike.texts, unlike.values))
+        axes.append(Axis(key, tuple(texts), tuple(known[text] for text in texts), unlike.unit))
+    if wrong:
+        raise ValueError("\n".join(wrong))
+    return Cases(tuple(axes), True)

@@ -1,0 +1,126 @@
+"""The cases of a sweep answered in chunks by an executor, with what died on the way tried again."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+from ...core import PatchfemError
+from ...runs.many import many
+from ...runs.many.answers import Answers
+from .asked import Asked
+from .cases import Cases
+
+TRIES = 3  # a case whose worker died is tried twice more
+SPAN = 1.0  # seconds that a chunk is to take: long beside its way to a worker, short beside a sweep
+MOST = 4096  # cases of a chunk
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What every worker needs to answer any case; it is sent to each once.
+
+    tell(number, model or error, Answers, place in them): what is made of an answer beside its columns; keep(number,
+    Result): called after each run. Both are functions of a module, or objects that travel.
+    """
+
+    asked: Asked
+    cases: Cases
+    tell: Callable | None = None
+    keep: Callable | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Died:
+    """What an executor gives for a chunk that did not come back, with the reason in a few words."""
+
+    reason: str
+
+
+def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[Answers, list]:
+    """Answers of some cases, and of each what `work.tell` makes of it. This is what a worker does with a chunk."""
+    models = [_model(work, number) for number in numbers]
+    keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
+    found = many.answers(models, keep, say)
+    told = [] if work.tell is None else [work.tell(number, model, found, case)
+                                         for case, (number, model) in enumerate(zip(numbers, models))]
+    return found, told
+
+
+def _model(work: Work, number: int):
+    try:
+        return work.asked.model(work.cases.sets(number))
+    except PatchfemError as error:
+        return error
+
+
+class Chunks:
+    """The cases that are still to be handed out, neighbours together, in chunks as long as cases have been found to
+    take."""
+
+    def __init__(self, numbers: Sequence[int], workers: int):
+        self.left, self.alone, self.workers = deque(numbers), deque(), max(workers, 1)
+        self.deaths: dict[int, int] = {}
+        self.each = SPAN  # seconds of a case, by the last chunk
+
+    def take(self) -> list | None:
+        """The next chunk; None where nothing is left for now."""
+        if self.alone:
+            return [self.alone.popleft()]
+        fair = -(-len(self.left) // (2 * self.workers))  # so that the last chunks end together
+        count = max(1, min(int(SPAN / max(self.each, 1e-9)), MOST, fair))
+        return [self.left.popleft() for _ in range(min(count, len(self.left)))] or None
+
+    def done(self, numbers: Sequence[int], seconds: float) -> None:
+        """Note how long a chunk took."""
+        self.each = seconds / len(numbers)
+
+    def died(self, numbers: Sequence[int]) -> list:
+        """Hand the cases of a dead chunk out again, one by one; those that were tried often enough come back."""
+        out = []
+        for number in numbers:
+            self.deaths[number] = self.deaths.get(number, 0) + 1
+            (out if self.deaths[number] >= TRIES else self.alone).append(number)
+        return out
+
+
+def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = None) -> Iterator[tuple]:
+    """(numbers, Answers, told) of chunk after chunk as they come in.
+
+    executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
+    every chunk that `take` hands out until it hands out none.
+    """
+    chunks = Chunks(numbers, executor.workers)
+    for chunk, seconds, found in executor.run(work, chunks.take, say):
+        if isinstance(found, Died):
+            lost = chunks.died(chunk)
+            if lost:
+                failed = Answers.blank(len(lost))
+                for case in range(len(lost)):
+                    failed.fail(case, f"{found.reason}, {TRIES} times")
+                yield lost, failed, []
+            continue
+        chunks.done(chunk, seconds)
+        yield chunk, *found
+
+
+class Clock:
+    """How far a sweep is, and how long it will still take."""
+
+    def __init__(self, total: int, there: int):
+        self.total, self.done, self.new, self.begin = total, there, 0, perf_counter()
+
+    def __call__(self, count: int) -> str:
+        """The line after `count` more cases: "12/144 cases, 3 min left"."""
+        self.done, self.new = self.done + count, self.new + count
+        left = (self.total - self.done) * (perf_counter() - self.begin) / max(self.new, 1)
+        return f"{self.done}/{self.total} cases, {lasting(left)} left"
+
+
+def lasting(seconds: float) -> str:
+    """A time in the unit that reads best."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,168 @@
+"""The folder of a sweep: `cases/<key>/` for each case that is answered, named by what it computes, never half written.
+
+What is not whole has a name that starts with a dot or ends in .partial.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ... import __version__
+from ...campaigns.sweeps.cases import Cases
+from ...core import Measure, Missing, PatchfemError
+from ...effects import EFFECTS
+from ...model.model import Model
+from ...runs.many.answers import FAILED, Answers
+from ..folder import save
+from ..summary import summary
+
+CASES, SUMMARY, LOCK, TABLES = "cases", "summary.json", ".writer", ("sweep.csv", "sweep.nc", "report.html")
+
+
+@dataclass(frozen=True, slots=True)
+class Summaries:
+    """summary.json of a case, made where the case was run."""
+
+    cases: Cases
+
+    def __call__(self, number: int, model: Model | PatchfemError, found: Answers, case: int) -> str:
+        """The text of summary.json of a case; found: Answers with the case at place `case`."""
+        values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
+        known = isinstance(model, Model)
+        effects = model.source.effects if known else ()
+        answer = summary(__version__, model.source.title if known else "", model.kind if known else "",
+                         found.outcome[case], _measures(found, case),
+                         [{"effect": name, "equations": EFFECTS[name].equations} for name in effects],
+                         list(model.absent) if known else [],
+                         (found.warnings.get(case, ()), found.notes.get(case, ())),
+                         {"total": found.seconds[case]})
+        if case in found.messages:
+            answer["message"] = found.messages[case]
+        return json.dumps(answer | {"numerics": found.numerics.get(case, {}), "case": values}, allow_nan=False,
+                          ensure_ascii=False) + "\n"
+
+
+def _measures(found: Answers, case: int) -> dict:
+    out = {}
+    for name, unit in found.units.items():
+        if found.has(name, case):
+            reasons = found.reasons.get(name, {})
+            value, error = (None if number != number else float(number)
+                            for number in (found.values[name][case], found.errors[name][case]))
+            out[name] = Measure(value, unit, error, float(found.floors[name][case]), reason=reasons.get(case, ""))
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """Keeps the whole results folder of each case."""
+
+    folder: Path
+    keys: tuple
+
+    def __call__(self, number: int, result) -> None:
+        """Write the folder of a case that has been run."""
+        save(result, self.folder / CASES / self.keys[number])
+
+
+class Folder:
+    """The folder of a sweep, claimed while it is open unless it is shared by shards.
+
+    PatchfemError for a place that holds other files, Missing where it cannot be written or is being written.
+    """
+
+    def __init__(self, target: Path, keys: Sequence[str], shared: bool = False):
+        self.target, self.shown, self.keys, self.shared = Path(os.path.abspath(target)), target, keys, shared
+
+    def __enter__(self) -> Folder:
+        _only_ours(self.target, self.shown)
+        try:
+            (self.target / CASES).mkdir(parents=True, exist_ok=True)
+            if not self.shared:
+                self._claim()
+        except OSError as error:
+            raise Missing(f"{self.shown}: the folder of the sweep cannot be made ({error.strerror})") from None
+        return self
+
+    def __exit__(self, *_) -> None:
+        if not self.shared:
+            (self.target / LOCK).unlink(missing_ok=True)
+
+    def there(self) -> list[int]:
+        """Numbers of the cases that have an answer."""
+        named = {one.name for one in os.scandir(self.target / CASES)}
+        return [number for number, key in enumerate(self.keys) if key in named]
+
+    def put(self, numbers: Sequence[int], texts: Sequence[str]) -> None:
+        """Write the summaries of cases; an older folder of a case is replaced."""
+        for number, text in zip(numbers, texts):
+            self._put(self.target / CASES / self.keys[number], text)
+
+    def _put(self, place: Path, text: str) -> None:
+        draft = place.with_name(f".{place.name}.{os.getpid()}")
+        try:
+            draft.mkdir(exist_ok=True)
+            (draft / SUMMARY).write_text(text, encoding="utf-8")
+            try:
+                os.rename(draft, place)
+            except OSError:  # it is there already
+                shutil.rmtree(place, ignore_errors=True)
+                os.rename(draft, place)
+        except OSError as error:
+            raise Missing(f"{self.shown}: a case cannot be written ({error.strerror}); what is whole is kept") from None
+
+    def answers(self, numbers: Iterable[int]) -> tuple[list[int], Answers]:
+        """(numbers, Answers) of the cases whose summary is there and can be read."""
+        read = []
+        for number in numbers:
+            try:
+                text = (self.target / CASES / self.keys[number] / SUMMARY).read_text(encoding="utf-8")
+                read.append((number, json.loads(text)))
+            except (OSError, ValueError):
+                continue
+        found = Answers.blank(len(read))
+        for case, (_, one) in enumerate(read):
+            _read(found, case, one)
+        return [number for number, _ in read], found
+
+    def drop_others(self) -> None:
+        """Remove the cases of other sweeps, and what is left of cases that died half written."""
+        own = set(self.keys)
+        for one in os.scandir(self.target / CASES):
+            if one.name not in own:
+                shutil.rmtree(one.path, ignore_errors=True)
+
+    def _claim(self) -> None:
+        lock = self.target / LOCK
+        writer = lock.read_text() if lock.is_file() else ""
+        if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
+            raise Missing(f"{self.shown}: another sweep (process {writer}) is writing it; name another -o or wait")
+        lock.write_text(str(os.getpid()))
+
+
+def _read(found: Answers, case: int, one: dict) -> None:
+    """Put a summary into the answers."""
+    measures = {name: Measure(m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", ""))
+                for name, m in one["measures"].items()}
+    found.put(case, one["outcome"], measures, one["seconds"]["total"])
+    if one["outcome"] == FAILED:
+        found.fail(case, one.get("message", ""))
+
+
+def _only_ours(place: Path, shown: Path) -> None:
+    """Refuse a place that is no folder or holds files that no sweep writes."""
+    if not place.exists():
+        return
+    if not place.is_dir():
+        raise PatchfemError(f"{shown}: {place.name} is a file, a sweep is a folder; name another -o")
+    foreign = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in (CASES, *TABLES)
+                     and not one.name.startswith("."))
+    if foreign:
+        raise PatchfemError(f"{shown}: {place.name} holds files that are not of a sweep ({', '.join(foreign[:3])}"
+                            f"{', ...' if len(foreign) > 3 else ''}); name another -o")
+

@@ -1,0 +1,103 @@
+"""A sweep run into its folder: what is there is kept, what is missing is answered, then the tables are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...campaigns.sweeps.asked import Asked
+from ...campaigns.sweeps.cases import Cases
+from ...campaigns.sweeps.sweep import Work, solved
+from ...core import Missing
+from ...runs.many.answers import Answers
+from .. import netcdf
+from .folder import Folder, Summaries, Whole
+from .tables import columns, contents, write_csv
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a sweep is kept, and how.
+
+    resume: answers that are there are taken as they are; whole: the results folder of each case is kept; shard: (i, n)
+    to answer the i-th of n parts only, into a folder that the parts share.
+    """
+
+    target: Path
+    resume: bool = False
+    whole: bool = False
+    shard: tuple | None = None
+
+
+def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable | None = None,
+               told: Callable | None = None) -> Answers:
+    """Answer the cases into a folder and write its tables; a shard writes none.
+
+    told(done, total): called as cases are done, first with those that were there. What was answered is kept when an
+    exception or an interrupt ends the sweep.
+    """
+    keys = cases.keys(asked)
+    with Folder(place.target, keys, place.shard is not None) as folder:
+        wanted = _part(len(cases), place.shard)
+        total, there = Answers.blank(len(cases)), []
+        if place.resume or place.shard is not None:
+            there, found = folder.answers(sorted(set(folder.there()) & set(wanted)))
+            total.place(there, found)
+        done = len(there)
+        if told is not None:
+            told(done, len(wanted))
+        kept = set(there)
+        work = Work(asked, cases, Summaries(cases), Whole(folder.target, tuple(keys)) if place.whole else None)
+        for numbers, found, texts in solved(work, [one for one in wanted if one not in kept], executor, say):
+            folder.put(*_to_write(numbers, found, texts, place.whole))
+            _columns_only(found)
+            total.place(numbers, found)
+            done += len(numbers)
+            if told is not None:
+                told(done, len(wanted))
+        if place.shard is None:
+            write_tables(asked, cases, total, folder)
+    return total
+
+
+def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
+    """The tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
+    keys = cases.keys(asked)
+    with Folder(target, keys) as folder:
+        numbers, found = folder.answers(folder.there())
+        if len(numbers) < len(cases):
+            raise Missing(f"{target}: {len(cases) - len(numbers)} of {len(cases)} cases have no answer; run their "
+                          "shards again, or go on with --resume")
+        write_tables(asked, cases, found, folder)
+    return found
+
+
+def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder) -> None:
+    """Write sweep.csv and sweep.nc of all cases, and drop the cases of other sweeps from the folder."""
+    write_csv(columns(cases, found, folder.keys), folder.target / "sweep.csv")
+    netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
+    folder.drop_others()
+
+
+def _part(count: int, shard: tuple | None) -> list[int]:
+    """Numbers of the cases of a shard (i, n): neighbours, for they share most."""
+    if shard is None:
+        return list(range(count))
+    i, n = shard
+    return list(range((i - 1) * count // n, i * count // n))
+
+
+def _to_write(numbers: Sequence[int], found: Answers, texts: Sequence[str], whole: bool) -> tuple:
+    """(numbers, summaries) of the cases to write: not those that died, which a resumed sweep tries again, and not those
+    whose whole folder is there."""
+    if not whole:
+        return numbers[:len(texts)], texts
+    pairs = [(number, text) for case, (number, text) in enumerate(zip(numbers, texts)) if case in found.messages]
+    return [number for number, _ in pairs], [text for _, text in pairs]
+
+
+def _columns_only(found: Answers) -> None:
+    """Drop what is on disk and in no table: a sweep of many cases would fill the memory with it."""
+    for part in (found.warnings, found.notes, found.numerics):
+        part.clear()

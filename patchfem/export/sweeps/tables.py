@@ -1,0 +1,98 @@
+"""All cases of a sweep in one table: sweep.csv for people, sweep.nc for programs."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ... import __version__
+from ...campaigns.sweeps.asked import Asked
+from ...campaigns.sweeps.cases import Cases
+from ...response import rows
+from ...runs.many.answers import Answers
+from ...runs.results.patch_rows import TABLE as STATIC
+from ...runs.results.result import meaning
+from ...scene.keys import meanings
+from ...scene.reader import owner_of
+from .. import netcdf
+from ..summary import versions
+
+ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
+
+
+def names_of(found: Answers) -> list[str]:
+    """Measures of the cases in the order of the reference, whatever order the cases came in."""
+    return sorted(found.values, key=lambda name: (ORDER.get(rows.of_first(name), len(ORDER)), name))
+
+
+def columns(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> dict[str, list]:
+    """Columns of sweep.csv by name: the swept keys as written, outcome, every measure in SI, then the message of a
+    failed case and the name of its folder. "" stands for what a case has not.
+    """
+    texts = list(zip(*(cases.texts(number) for number in range(len(cases)))))
+    out = {axis.key: list(column) for axis, column in zip(cases.axes, texts)}
+    out["outcome"] = [str(one) for one in found.outcome]
+    for name in names_of(found):
+        out[name] = ["" if value != value else repr(value) for value in found.values[name].tolist()]
+    out["message"] = [found.messages.get(number, "") for number in range(len(cases))]
+    return out | ({"case": list(keys)} if keys else {})
+
+
+def write_csv(table: dict[str, list], path: Path) -> Path:
+    """Write columns to `path`, whole beside it first and then renamed."""
+    partial = path.with_name(path.name + ".partial")
+    with open(partial, "w", newline="", encoding="utf-8") as file:
+        out = csv.writer(file)
+        out.writerow(table)
+        out.writerows(zip(*table.values()))
+    partial.replace(path)
+    return path
+
+
+def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = ()) -> netcdf.Contents:
+    """What sweep.nc holds, in SI.
+
+    A dimension per swept key, dots as underscores, or the one dimension `case` where the cases are rows; a variable
+    and an error per measure, outcome, the message of failed cases and the names of their folders.
+    """
+    dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
+    coordinates = {axis.name: ("case" if cases.rows else axis.name, _numbers(axis.values), _about(axis))
+                   for axis in cases.axes}
+    if cases.rows:
+        coordinates["case"] = ("case", np.arange(len(cases)), {"units": "1", "long_name": "number of the case"})
+    data = {}
+    for name in (one for one in names_of(found) if one not in coordinates):  # normal.load is the measure of its name
+        about = {"units": found.units[name], "long_name": meaning(name)}
+        data[name] = (dims, found.values[name].reshape(cases.shape), about)
+        error = {"units": found.units[name], "long_name": f"estimated numerical half-width of {name}"}
+        data[f"{name}_error"] = (dims, found.errors[name].reshape(cases.shape), error)
+    texts = {"outcome": (found.outcome, "how the case ended")}
+    if found.messages:
+        messages = [found.messages.get(number, "") for number in range(len(cases))]
+        texts["message"] = (messages, "why the case failed")
+    if keys:
+        texts["folder"] = (keys, "folder of the case below cases/")
+    for name, (values, text) in texts.items():
+        data[name] = (dims, np.asarray(values, object).astype(str).reshape(cases.shape), {"long_name": text})
+    return netcdf.Contents(data, coordinates, {
+        "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
+        "source": f"patchfem {__version__}", "scene": asked.text, "sets": json.dumps(list(asked.sets)),
+        "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(), "versions": json.dumps(versions())})
+
+
+def _numbers(values: Sequence) -> np.ndarray:
+    return np.asarray(values, float if isinstance(values[0], float) else str)
+
+
+def _about(axis) -> dict:
+    model, name = owner_of(axis.key)
+    try:
+        text = meanings.meaning(model, name)
+    except KeyError:
+        text = axis.key
+    return {"long_name": text, "key": axis.key} | ({"units": axis.unit} if axis.unit else {})

@@ -1,0 +1,273 @@
+"""Values that a key takes from case to case: lists and ranges, as `--over` and the table [sweep] write them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, get_origin
+
+from pydantic import ValidationError
+
+from .keys import quantities
+from .keys.types import choices, keys, kind_of, model_of, parts
+from .reader import _message, _set_value, owner_of
+
+LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+MOST = 10_000_000  # values of one range
+_RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
+_TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
+_ENDS = {"]": "[", "}": "{"}
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A key with its values: texts as a scene would hold them; values: floats in SI, or the texts where these are no
+    numbers; unit: that of the values in SI, "1" for plain numbers, "" for texts."""
+
+    key: str
+    texts: tuple
+    values: tuple
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """The key as a name of a variable: dots as underscores."""
+        return re.sub(r"\W", "_", self.key)
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A key with the two ends between which values are drawn, both in the unit that is written behind them ("" of a
+    plain number): evenly, or evenly in the logarithm."""
+
+    key: str
+    low: float
+    high: float
+    unit: str
+    log: bool
+
+    def axis(self, shares: Iterable[float]) -> Axis:
+        """The values at shares of the way from low to high, each in [0, 1]."""
+        return values_of(self.key, [_written(_between(self.low, self.high, share, self.log), self.unit)
+                                    for share in shares], False)
+
+
+def read(texts: Iterable[str], sampled: bool = False) -> tuple[list[Axis | Span], list[str]]:
+    """(axes, mistakes) of texts `table.key=v1,v2,...`, where a value may be a range `low..high:n`.
+
+    sampled: a range stands without its number of values and becomes a Span.
+    """
+    found, wrong = [], []
+    for text in texts:
+        key, equals, values = (part.strip() for part in text.partition("="))
+        if not equals or not key:
+            wrong.append(f"--over {text}: table.key=v1,v2,... or table.key=low..high:n is wanted, such as "
+                         "contact.tilt.angle=1e-6 rad..1e-2 rad:9")
+            continue
+        _add(found, wrong, key, values, sampled)
+    named = [one.key for one in found]
+    return found, wrong + [f"{key}: stands twice" for key in dict.fromkeys(named) if named.count(key) > 1]
+
+
+def _add(found: list, wrong: list, key: str, values: str, sampled: bool) -> None:
+    try:
+        found.append(_axis(key, values, sampled))
+    except ValueError as error:
+        wrong += [f"{key}: {line}" for line in str(error).split("\n")]
+
+
+def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
+    _known(key)
+    out, wrong = [], []
+    pieces = _split(text)
+    for piece in pieces:
+        try:
+            if not piece:
+                raise ValueError("an empty value; one stands between two commas")
+            ends = _RANGE.fullmatch(piece) if ".." in piece and _is_number(key) else None
+            if ends is None:
+                out.append(piece)
+            elif sampled and len(pieces) == 1:
+                return _span(key, *ends.groups())
+            else:
+                out += _steps(key, *ends.groups())
+        except ValueError as error:
+            wrong.append(str(error))
+    if wrong:
+        raise ValueError("\n".join(wrong))
+    return values_of(key, out)
+
+
+def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:
+    """The axis of these values; ValueError, a line per mistake, for values that the key cannot hold.
+
+    A value beyond the limits of its key is no mistake here: its case says so. distinct: no value may stand twice.
+    """
+    _known(key)
+    texts, values, wrong = tuple(texts), [], []
+    for text in texts:
+        try:
+            values.append(_value(key, text))
+        except ValueError as error:
+            wrong.append(str(error))
+    if not wrong and distinct and len(set(values)) < len(values):
+        twice = next(text for place, text in enumerate(texts) if values.index(values[place]) < place)
+        wrong.append(f"{twice} stands twice")
+    if wrong:
+        raise ValueError("\n".join(wrong))
+    model, name = owner_of(key)
+    if not all(isinstance(value, float) for value in values):
+        return Axis(key, texts, texts, "")
+    kind = kind_of(model, name)
+    return Axis(key, texts, tuple(values), next(iter(quantities.KINDS[kind])) if kind else "1")
+
+
+def of_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
+    """(axes, mistakes as (key, message)) of the table [sweep] as it was written: "table.key" = "v1,v2,..."."""
+    if not isinstance(table, dict) or not table:
+        return [], [("sweep", "keys with their values are wanted, such as "
+                              '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"')]
+    found, wrong = [], []
+    for key, values in _flat(table):
+        if isinstance(values, list):
+            values = ",".join(map(str, values))
+        if not isinstance(values, str):
+            wrong.append((f"sweep.{key}", "a text of values is wanted, such as \"0.1..0.6:6\""))
+            continue
+        mistakes: list[str] = []
+        _add(found, mistakes, key, values, False)
+        wrong += [(f"sweep.{key}", text.removeprefix(f"{key}: ")) for text in mistakes]
+    return found, wrong
+
+
+def _flat(table: dict, at: str = "") -> list[tuple[str, Any]]:
+    """(dotted key, value) of a table whose keys may be dotted, in quotes or not."""
+    out = []
+    for key, value in table.items():
+        path = f"{at}.{key}" if at else key
+        out += _flat(value, path) if isinstance(value, dict) else [(path, value)]
+    return out
+
+
+def _known(key: str) -> None:
+    """ValueError, with the nearest known key, where no scene has the key."""
+    model, _ = owner_of(key)
+    if model is None:
+        table, _, last = key.rpartition(".")
+        owner, at = owner_of(table) if table else (None, "")
+        inner = model_of(owner, at) if owner is not None else None
+        raise ValueError("not a key of a scene" + (f"; {choices(last, keys(inner))}" if inner is not None else ""))
+
+
+def _types(key: str) -> tuple:
+    model, name = owner_of(key)
+    annotation = model.model_fields[name].annotation
+    return (annotation, *parts(annotation))
+
+
+def _is_number(key: str) -> bool:
+    """Whether a key holds one number, with or without a unit."""
+    model, name = owner_of(key)
+    types = _types(key)
+    return model_of(model, name) is None and tuple not in map(get_origin, types) and (float in types or int in types)
+
+
+def _split(text: str) -> list[str]:
+    """The text cut at its commas, but for those inside brackets and quotes."""
+    pieces, open_, quote, begin = [], [], "", 0
+    for place, sign in enumerate(text):
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "\"'":
+            quote = sign
+        elif sign in "[{":
+            open_.append(sign)
+        elif sign in _ENDS and open_ and open_[-1] == _ENDS[sign]:
+            open_.pop()
+        elif sign == "," and not open_:
+            pieces.append(text[begin:place].strip())
+            begin = place + 1
+    return [*pieces, text[begin:].strip()]
+
+
+def _value(key: str, text: str) -> float | str:
+    """SI value of a text that a key holds, or the text where it is no number; ValueError where it cannot hold it."""
+    model, name = owner_of(key)
+    kind = kind_of(model, name) if _is_number(key) else None
+    if kind is not None:
+        return quantities.parse(text, kind)
+    given = _set_value(key, text)
+    if model_of(model, name) is not None and isinstance(given, dict):
+        return text
+    alias = model.model_fields[name].alias or name
+    number = isinstance(given, int | float) and not isinstance(given, bool)
+    try:
+        model.model_validate({alias: float(given) if number and int not in _types(key) else given})
+    except ValidationError as caught:
+        for error in caught.errors(include_url=False):
+            if error["loc"][0] == alias and error["type"] not in ("missing", *LIMITS):
+                raise ValueError(_message(model, name, error, given)) from None
+    if number and not math.isfinite(given):
+        raise ValueError(f"'{text}' is not a finite number")
+    return float(given) if number else text
+
+
+def _ends(key: str, low: str, high: str) -> tuple:
+    """(low, high, unit) of a range, both as Fractions in the unit of the first."""
+    model, name = owner_of(key)
+    kind = kind_of(model, name)
+    if kind is None:
+        if any(re.fullmatch(quantities._NUMBER, end) is None for end in (low, high)):
+            raise ValueError(f"{low}..{high}: both ends of the range are plain numbers here")
+        return Fraction(low), Fraction(high), ""
+    for end in (low, high):
+        quantities.parse(end, kind)
+    (first, unit), (last, other) = (quantities._QUANTITY.fullmatch(end).groups() for end in (low, high))
+    factors = [Fraction(repr(quantities.KINDS[kind][quantities._plain(one)])) for one in (unit, other)]
+    return Fraction(first), Fraction(last) * factors[1] / factors[0], unit
+
+
+def _is_log(low: Fraction, high: Fraction, how: str | None) -> bool:
+    positive = low > 0 and high > 0
+    if how == "log" and not positive:
+        raise ValueError("a logarithmic range wants both ends > 0")
+    return how == "log" or (how is None and positive and max(low / high, high / low) >= _TEN)
+
+
+def _steps(key: str, low: str, high: str, count: str | None, how: str | None) -> list[str]:
+    """The values of a range as texts in the unit of its first end."""
+    first, last, unit = _ends(key, low, high)
+    number = int(count) if count else 0
+    if not 2 <= number <= MOST:
+        raise ValueError(f"{low}..{high}: the number of values is wanted behind a colon, from 2 on, such as :9")
+    if first == last:
+        raise ValueError(f"{low}..{high}: both ends are the same value")
+    log = _is_log(first, last, how)
+    return [_written(_between(first, last, Fraction(place, number - 1), log), unit) for place in range(number)]
+
+
+def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
+    first, last, unit = _ends(key, low, high)
+    if count:
+        raise ValueError(f"{low}..{high}:{count}: values are drawn between the ends; leave :{count} out")
+    if not first < last:
+        raise ValueError(f"{low}..{high}: the first end must lie below the second")
+    return Span(key, float(first), float(last), unit, _is_log(first, last, how))
+
+
+def _between(low: Fraction | float, high: Fraction | float, share: Fraction | float, log: bool) -> float:
+    """The value at a share of the way; fractions keep an even range exact until it is rounded once."""
+    if not log:
+        return float(low + (high - low) * share)
+    ends = {0: low, 1: high}
+    return float(ends[share]) if share in ends else float(low) * (float(high) / float(low)) ** float(share)
+
+
+def _written(value: float, unit: str) -> str:
+    """A value with its unit; 15 digits, so that a tenth of a range is 0.1 and not 0.1 with a tail."""
+    number = float(f"{value:.15g}")
+    text = repr(int(number)) if number.is_integer() and abs(number) < 1e15 and unit == "" else repr(number)
+    return f"{text.removesuffix('.0') if unit else text} {unit}".rstrip()

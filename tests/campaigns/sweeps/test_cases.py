@@ -1,0 +1,79 @@
+"""The cases of a sweep: which there are, in which order, under which names."""
+
+from itertools import product as combinations
+from pathlib import Path
+
+import pytest
+from scene_texts import BENCH
+
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.cases import Cases, product, rows_of
+from patchfem.scene.axes import read
+from patchfem.scene.scene import loads
+
+THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
+
+
+def cases(*texts) -> Cases:
+    found, wrong = read(texts)
+    assert wrong == []
+    return Cases(tuple(found))
+
+
+def test_exact_all_combinations_the_last_key_fastest():
+    found = cases(*THREE)
+    want = list(combinations(("1 N", "2 N"), ("0.1", "0.2", "0.3"), ("1 mm/s", "2 mm/s")))
+    assert [found.texts(number) for number in range(len(found))] == want and found.shape == (2, 3, 2)
+    assert found.sets(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
+
+
+def test_exact_a_product_of_products_is_the_product():
+    whole = cases(*THREE)
+    assert product([cases(THREE[0]), cases(*THREE[1:])]) == whole
+
+
+def test_exact_rows_beside_lists():
+    rows = rows_of({"normal.load": ["1 N", "2 N"], "friction.static": ["0.3", "0.3"]})
+    found = product([rows, cases("slide.speed=1 mm/s,2 mm/s")])
+    assert found.rows and found.shape == (4,)
+    assert [found.texts(number) for number in range(4)] == [
+        ("1 N", "0.3", "1 mm/s"), ("1 N", "0.3", "2 mm/s"), ("2 N", "0.3", "1 mm/s"), ("2 N", "0.3", "2 mm/s")]
+    with pytest.raises(ValueError, match=r"normal.load: .*'lbf'.*\nfriction.static: "):
+        rows_of({"normal.load": ["1 lb"], "friction.static": ["a"]})
+
+
+def test_exact_a_name_says_what_is_computed():
+    asked = Asked(Path("a.toml"), BENCH)
+    one = cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").keys(asked)
+    assert len(set(one)) == 4
+    assert cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").keys(asked) == [one[0], one[2], one[1],
+                                                                                            one[3]]
+    assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").keys(asked)) & set(one) == set(one[:2])
+    swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
+    assert cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").keys(Asked(Path("a.toml"), swept)) == one
+
+
+@pytest.mark.parametrize("other", [Asked(Path("a.toml"), BENCH.replace("5 mm/s", "6 mm/s")),
+                                   Asked(Path("a.toml"), BENCH, ("slide.speed=6 mm/s",))], ids=["text", "set"])
+def test_exact_another_scene_has_other_names(other):
+    found = cases("normal.load=1 N,2 N")
+    assert not set(found.keys(other)) & set(found.keys(Asked(Path("a.toml"), BENCH)))
+
+
+def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
+    path = tmp_path / "path.csv"
+    path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")
+    text = BENCH[:BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
+    asked, found = Asked(tmp_path / "a.toml", text), cases("normal.load=1 N")
+    asked_beside, beside = Asked(tmp_path / "a.toml", BENCH), cases("slide.file=path.csv")
+    before = found.keys(asked), beside.keys(asked_beside)
+    path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
+    assert found.keys(asked) != before[0] and beside.keys(asked_beside) != before[1]
+
+
+def test_exact_a_case_is_the_scene_with_its_values_set():
+    """Whether the base is a valid scene by itself or not, with and without a table [sweep]."""
+    for text in (BENCH, BENCH.replace("static = 0.3\n", ""), BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n'):
+        for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
+            found, want = Asked(Path("a.toml"), text).scene(sets), loads(BENCH, "a.toml", sets)
+            assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind

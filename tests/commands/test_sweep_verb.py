@@ -1,0 +1,169 @@
+"""patchfem sweep, as a person calls it."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+from scene_texts import COULOMB, POINT, SHORT
+
+import patchfem as pf
+
+RIG = POINT + COULOMB + SHORT
+LOADS, LEVELS = ["10 N", "26 lbf", "-1 N"], ["1 g", "5 g"]
+OVER = ("--over", f"normal.load={','.join(LOADS)}", "--over", "drive.acceleration=1 g..5 g:2")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "rig.toml"
+    path.write_text(RIG, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def swept(scene):
+    out = scene.parent / "swept"
+    return out, cli("sweep", scene, *OVER, "-o", out)
+
+
+def rows(out) -> list:
+    with open(out / "sweep.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_exact_every_case_is_a_single_run(swept, scene):
+    out, answer = swept
+    assert answer.code == 3  # two cases were refused
+    found = rows(out)
+    assert [(row["normal.load"], row["drive.acceleration"]) for row in found] == \
+        [(load, level) for load in LOADS for level in LEVELS]
+    for row in found[:4]:
+        sets = {"normal.load": row["normal.load"], "drive.acceleration": row["drive.acceleration"]}
+        single = pf.run(scene, **sets)
+        assert row["outcome"] == single.outcome and row["message"] == ""
+        for name, one in single.measures.items():
+            assert row[name] == ("" if one.value is None else repr(one.value)), name
+        kept = json.loads((out / "cases" / row["case"] / "summary.json").read_text())
+        assert kept["case"] == sets and kept["kind"] == "rig" and kept["outcome"] == single.outcome
+        assert kept["warnings"] == single.warnings and kept["notes"] == single.notes
+        for name, one in single.measures.items():
+            assert (kept["measures"][name]["value"], kept["measures"][name]["error"]) == (one.value, one.error)
+            assert kept["measures"][name].get("reason", "") == one.reason
+
+
+def test_exact_a_refused_case_is_a_row_with_its_message(swept):
+    out, answer = swept
+    for row in rows(out)[4:]:
+        assert row["outcome"] == "failed" and "normal.load: must be >= 0" in row["message"]
+        assert row["loop_area"] == ""
+        assert json.loads((out / "cases" / row["case"] / "summary.json").read_text())["message"] == row["message"]
+    assert "6 cases:" in answer.out and "2 failed" in answer.out and answer.err.count("must be >= 0") == 2
+
+
+def test_exact_the_dataset_has_a_dimension_per_key(swept):
+    out, _ = swept
+    with xr.open_dataset(out / "sweep.nc") as found:
+        assert dict(found.sizes) == {"normal_load": 3, "drive_acceleration": 2}
+        np.testing.assert_allclose(found.normal_load, [10, 26 * 4.4482216152605, -1])
+        np.testing.assert_allclose(found.drive_acceleration, [9.80665, 5 * 9.80665], rtol=1e-15)
+        assert (found.normal_load.units, found.drive_acceleration.units) == ("N", "m/s^2")
+        names = {"loop_area", "relative_displacement_amplitude"}
+        for number, row in enumerate(rows(out)):
+            at = {"normal_load": number // 2, "drive_acceleration": number % 2}
+            assert found.outcome.isel(at) == row["outcome"]
+            for name in names:
+                value, error = found[name].isel(at), found[f"{name}_error"].isel(at)
+                assert np.isnan(value) if row[name] == "" else value == float(row[name])
+                assert np.isnan(error) == (row[name] == "") and found[name].units == found[f"{name}_error"].units
+
+
+def test_exact_nothing_unfinished_is_left(swept):
+    out, _ = swept
+    assert sorted(one.name for one in out.iterdir()) == ["cases", "sweep.csv", "sweep.nc"]
+    assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(row["case"] for row in rows(out))
+
+
+def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
+    path = tmp_path / "rig.toml"
+    table = f'[sweep]\n"normal.load" = "{",".join(LOADS)}"\n"drive.acceleration" = "1 g..5 g:2"\n'
+    path.write_text(RIG + table, encoding="utf-8")
+    assert cli("check", path).code == 0
+    assert cli("sweep", path, "-o", tmp_path / "swept").code == 3
+    assert (tmp_path / "swept" / "sweep.csv").read_bytes() == (swept[0] / "sweep.csv").read_bytes()
+    told = cli("run", path, "-o", tmp_path / "one")
+    assert told.code == 2 and "use `patchfem sweep`" in told.err
+
+
+def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monkeypatch):
+    from patchfem.runs.many import one_by_one
+
+    ran, real = [], one_by_one.run
+    monkeypatch.setattr(one_by_one, "run", lambda what, say: ran.append(what) or real(what, say))
+    out = tmp_path / "swept"
+    assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
+    assert len(ran) == 2
+    answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
+    assert answer.code == 3 and len(ran) == 4
+    for name in ("sweep.csv", "sweep.nc"):
+        assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
+    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 8
+
+
+def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):
+    from patchfem.runs.many import one_by_one
+
+    real, left = one_by_one.run, [2]
+
+    def stops(what, say):
+        if not left[0]:
+            raise KeyboardInterrupt
+        left[0] -= 1
+        return real(what, say)
+
+    monkeypatch.setattr(one_by_one, "run", stops)
+    out = tmp_path / "swept"
+    answer = cli("sweep", scene, *OVER, "-o", out)
+    assert answer.code == 130 and "--resume" in answer.err
+    assert 1 <= len(list((out / "cases").iterdir())) <= 2 and not (out / "sweep.csv").exists()  # whole chunks are kept
+    monkeypatch.setattr(one_by_one, "run", real)
+    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3
+    for name in ("sweep.csv", "sweep.nc"):
+        assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
+
+
+def test_exact_one_object_on_stdout(scene, tmp_path):
+    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a", "--json", "-q")
+    assert answer.code == 0 and answer.err == ""
+    told = json.loads(answer.out)
+    assert told["cases"] == 2 and told["failed"] == 0 and sum(told["outcomes"].values()) == 2
+
+
+@pytest.mark.parametrize("words, says", [
+    (["--over", "normal.load=1 lb", "--over", "friction.statc=1"], ["'lbf'", "did you mean 'static'"]),
+    (["--over", "normal.load=1 lb", "--set", "drive.cycles=0"], ["'lbf'", "drive.cycles: must be > 0"]),
+    (["--over", "normal.load=-1 N,-2 N"], ["-1 N", "-2 N"]),
+    (["--set", "drive.cycles=0", "--over", "normal.load=1 N,2 N"], ["drive.cycles: must be > 0"]),
+    ([], ["nothing to sweep over"]),
+])
+def test_refuses_before_anything_runs(scene, tmp_path, words, says):
+    answer = cli("sweep", scene, *words, "-o", tmp_path / "a")
+    assert answer.code == 2 and not (tmp_path / "a").exists()
+    assert len(answer.err.splitlines()) == len(says)
+    for one in says:
+        assert one in answer.err
+
+
+def test_refuses_a_folder_of_others(scene, tmp_path):
+    (tmp_path / "mine.txt").write_text("x")
+    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path)
+    assert answer.code == 2 and "mine.txt" in answer.err
+
+
+def test_refuses_a_second_writer(scene, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / ".writer").write_text("1")
+    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
+    assert answer.code == 4 and "another sweep (process 1)" in answer.err

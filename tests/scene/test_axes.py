@@ -1,0 +1,129 @@
+"""Values of a key from case to case: lists and ranges as --over and [sweep] write them."""
+
+import numpy as np
+import pytest
+from scene_texts import BENCH, line_of, mistakes
+
+import patchfem as pf
+from patchfem.core import PatchfemError
+from patchfem.scene.axes import Span, read
+from patchfem.scene.scene import loads
+from patchfem.scene.sets import texts
+
+SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
+
+
+def axis(text, **how):
+    (found,), wrong = read([text], **how)
+    assert wrong == []
+    return found
+
+
+@pytest.mark.parametrize("text, values, unit", [
+    ("contact.tilt.angle=1e-6 rad..1e-2 rad:9", np.logspace(-6, -2, 9), "rad"),
+    ("contact.tilt.angle=1 mrad..2 mrad:5", np.linspace(1e-3, 2e-3, 5), "rad"),
+    ("contact.tilt.angle=1 mrad..10 mrad:3", np.geomspace(1e-3, 1e-2, 3), "rad"),  # b/a = 10 is logarithmic
+    ("contact.tilt.angle=1 mrad..9.99 mrad:3", np.linspace(1e-3, 9.99e-3, 3), "rad"),
+    ("contact.tilt.angle=0 rad..1 rad:3", [0, 0.5, 1], "rad"),
+    ("contact.tilt.angle=-1 rad..10 rad:3", [-1, 4.5, 10], "rad"),
+    ("contact.tilt.angle=1 mrad..100 mrad:3lin", [1e-3, 50.5e-3, 0.1], "rad"),
+    ("contact.tilt.angle=1 mrad..4 mrad:3log", [1e-3, 2e-3, 4e-3], "rad"),
+    ("contact.tilt.angle=100 urad..1 urad:3", [1e-4, 1e-5, 1e-6], "rad"),
+    ("contact.length=1 mm..1 in:3", np.geomspace(1e-3, 25.4e-3, 3), "m"),
+    ("friction.static=0.1..0.6:6", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "1"),
+    ("contact.load=26 lbf,100 N", [26 * 4.4482216152605, 100], "N"),
+    ("contact.crown.radius=1 mm..3 mm:3, 5 mm", [1e-3, 2e-3, 3e-3, 5e-3], "m"),
+    ("structure.mode.axial.frequency=150 Hz,151 Hz", [150, 151], "Hz"),
+    ("contact.pairs=1,2", [1, 2], "1"),
+    ("friction.static=-1,2", [-1, 2], "1"),  # beyond the limits of the key: its case says so
+])
+def test_exact_values_in_si(text, values, unit):
+    found = axis(text)
+    np.testing.assert_allclose(found.values, values, rtol=1e-14, atol=0)
+    assert found.unit == unit and len(found.texts) == len(found.values)
+
+
+def test_exact_texts_stand_as_a_scene_holds_them():
+    assert axis("contact.load=26 lbf, 100 N").texts == ("26 lbf", "100 N")
+    assert axis("contact.length=1 mm..3 mm:3").texts == ("1 mm", "2 mm", "3 mm")
+    assert axis("friction.static=0.1..0.3:3").texts == ("0.1", "0.2", "0.3")
+    assert axis("friction.law=coulomb,tanh").values == ("coulomb", "tanh")
+    assert axis('drive.levels=["3 g", "4 g"],["5 g"]').texts == ('["3 g", "4 g"]', '["5 g"]')
+    assert axis("slide.file=../a.csv,../b.csv").texts == ("../a.csv", "../b.csv")
+
+
+def test_exact_a_text_gives_the_value_beside_it():
+    """Whatever the range, a case that reads the text has the very float of the table."""
+    for text in ("contact.tilt.angle=1 mrad..1 deg:7", "contact.load=1 lbf..1 kN:11", "friction.static=0.1..0.7:13"):
+        found = axis(text)
+        assert [axis(f"{found.key}={one}").values[0] for one in found.texts] == list(found.values)
+
+
+@pytest.mark.parametrize("text, says", [
+    ("contact.load=5 lb", "did you mean 'lbf'"),
+    ("contact.load=5", "a bare number without a unit"),
+    ("contact.tilt.angle=1e-6..1e-2 rad:9", "'1e-6' is a bare number"),
+    ("contact.tilt.angle=1 mm..2 rad:9", "'mm' is a unit of length"),
+    ("contact.lod=3 N", "did you mean 'load'"),
+    ("friction.law=coulom", "did you mean 'coulomb'"),
+    ("friction.static=a", "a plain number is wanted"),
+    ("friction.static=0.1..0.6", "the number of values is wanted behind a colon"),
+    ("friction.static=0.1..0.6:1", "from 2 on"),
+    ("friction.static=-1..2:3log", "both ends > 0"),
+    ("friction.static=0.1..0.1:3", "both ends are the same"),
+    ("friction.static=0.1,,0.2", "an empty value"),
+    ("contact.tilt.angle=1 mrad,0.001 rad", "stands twice"),
+    ("contact.tilt.angle", "table.key=v1,v2"),
+])
+def test_refuses_what_is_no_list_of_values(text, says):
+    found, wrong = read([text])
+    assert not found and len(wrong) == 1 and says in wrong[0] and text.partition("=")[0] in wrong[0]
+
+
+def test_refuses_all_at_once():
+    _, wrong = read(["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"])
+    assert [line.partition(":")[0] for line in wrong] == ["contact.load", "contact.load", "friction.static",
+                                                          "contact.pairs"]
+
+
+def test_exact_drawn_values_lie_between_the_ends():
+    span = axis("contact.tilt.angle=1 mrad..100 mrad", sampled=True)
+    assert isinstance(span, Span) and span.log
+    np.testing.assert_allclose(span.axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14)
+    even = axis("friction.static=0.2..0.6:lin", sampled=True)
+    np.testing.assert_allclose(even.axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
+    assert "leave :9 out" in read(["friction.static=0.2..0.6:9"], True)[1][0]
+
+
+def test_exact_values_from_python():
+    assert texts("contact.load", [26.0, "26 lbf"]) == ["26.0 N", "26 lbf"]
+    assert texts("friction.static", np.array([0.1, 0.2])) == ["0.1", "0.2"]
+    assert texts("friction.law", ["tanh"]) == ["tanh"]
+
+
+def test_exact_a_table_of_a_scene_says_the_same():
+    scene = loads(SWEPT, "a.toml")
+    assert list(scene.sweep) == read(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
+    assert scene.named()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
+
+
+def test_exact_a_key_that_only_the_table_holds_has_its_first_value():
+    scene = loads(SWEPT.replace("static = 0.3\n", ""), "a.toml")
+    assert scene.friction.static == 0.1
+
+
+def test_refuses_mistakes_of_the_table_with_their_lines():
+    text = BENCH + '[sweep]\n"friction.static" = "0.1, a"\n"normal.lod" = "1 N"\n"normal.load" = 3\n'
+    found = mistakes(text)
+    for start, says in (('"friction.static"', "sweep.friction.static: a plain number"),
+                        ('"normal.lod"', "sweep.normal.lod: not a key of a scene; did you mean 'load'?"),
+                        ('"normal.load"', "sweep.normal.load: a text of values")):
+        line = line_of(text, start)
+        assert any(one.startswith(f"a.toml:{line}: {says}") for one in found), (says, found)
+    assert len(found) == 3
+    assert "a.toml:10: sweep: keys with their values" in mistakes(BENCH + "[sweep]\n")[0]
+
+
+def test_refuses_one_run_of_many_cases():
+    with pytest.raises(PatchfemError, match=r"sweep: one run cannot hold its 12 cases; use `patchfem sweep`"):
+        pf.run(SWEPT)
