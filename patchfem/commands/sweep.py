@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from .shared import Ended, Json, NotReached, Out, Quiet, Refused, Sets, say
 
-FIRST = 5  # failed cases that are named
+FIRST = 5  # messages of failed cases that are printed
 
 
 @Parameter(name="*")
@@ -24,20 +24,28 @@ class Over:
                                                "table.key=low unit..high unit:n (:9log, :9lin), may be repeated")] = ()
 
 
-def sweep(scene: Path, /, *, what: Over | None = None, out: Out = None, set_: Sets = (),
+@Parameter(name="*")
+@dataclass
+class By:
+    """Who works: -j processes of this machine."""
+
+    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine; 1: this one")] = 1
+
+
+def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: Annotated[bool, Parameter(negative=(), help="go on with what the folder holds")] = False,
           json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv and
     sweep.nc, by default in out/<scene name>-sweep."""
-    from ..campaigns.sweeps.executors.here import Here
     from ..export.sweeps.run import Place, sweep_into
 
     begin, talk = perf_counter(), (lambda text: None) if quiet else say
+    executor = executor_of(by or By())
     asked, cases = asked_of(scene, set_, what or Over())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     line = Progress(quiet)
     try:
-        found = sweep_into(asked, cases, Place(target, resume), Here(), talk, line)
+        found = sweep_into(asked, cases, Place(target, resume), executor, talk, line)
     except KeyboardInterrupt:
         line.end()
         talk(f"interrupted; {line.done} of {len(cases)} cases are kept; go on with --resume: patchfem "
@@ -52,6 +60,19 @@ def asked_of(path: Path, sets, what: Over) -> tuple:
     from ..campaigns.sweeps.ask import asked_of as read
 
     return read(path, sets, what.over)
+
+
+def executor_of(by: By):
+    """Who answers the chunks."""
+    if by.jobs < 1:
+        raise Refused(f"sweep -j {by.jobs}: at least one process is wanted")
+    if by.jobs == 1:
+        from ..campaigns.sweeps.executors.here import Here
+
+        return Here()
+    from ..campaigns.sweeps.executors.pool import Pool
+
+    return Pool(by.jobs)
 
 
 def _words() -> list:
@@ -96,10 +117,13 @@ def _answer(found, target: Path, json_: bool, seconds: float) -> None:
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
         print(f"results: {target / 'sweep.csv'} {target / 'sweep.nc'}")
     sys.stdout.flush()
-    for number in failed[:FIRST]:
-        say(f"case {number + 1}: {found.messages[number]}")
-    if len(failed) > FIRST:
-        say(f"and {len(failed) - FIRST} more; sweep.csv names them")
+    alike = {}
+    for number in failed:
+        alike.setdefault(found.messages[number], []).append(number + 1)
+    for text, numbers in list(alike.items())[:FIRST]:
+        say(f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}")
+    if len(alike) > FIRST:
+        say("sweep.csv has the messages of all failed cases")
     if len(failed) == len(found):
         raise Refused("sweep: no case could be run")
     if failed or FAILED in counts or "not_converged" in counts:

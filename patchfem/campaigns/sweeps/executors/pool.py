@@ -1,0 +1,111 @@
+"""Chunks answered by processes of this machine; one that dies takes only its own chunk with it, and is replaced.
+
+The standard pools give every chunk up when one process dies, and run the caller's own script again where processes are
+started afresh; so each worker is an interpreter of its own, at the other end of one pipe.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from time import perf_counter
+
+from ....core import Missing
+from ..sweep import Died, Work
+
+ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+MODULE = __name__.rpartition(".")[0] + ".worker"
+ROOT = Path(__file__).parents[4]  # where the package lies: a worker imports this one and no other
+
+
+class Worker:
+    """A process that answers one chunk after the other."""
+
+    def __init__(self, work: Work):
+        here, there = Pipe()
+        path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
+        self.process = subprocess.Popen([sys.executable, "-c", f"from {MODULE} import main; main()",
+                                         str(there.fileno())], pass_fds=[there.fileno()], stdin=subprocess.DEVNULL,
+                                        env=os.environ | ONE_THREAD | {"PYTHONPATH": path})
+        there.close()  # so that the death of the process closes the pipe
+        self.pipe: Connection = here
+        self.chunk, self.begin = None, 0.0
+        self.pipe.send(work)
+
+    def give(self, chunk: list) -> None:
+        """Send a chunk."""
+        self.chunk, self.begin = chunk, perf_counter()
+        try:
+            self.pipe.send(chunk)
+        except OSError:
+            pass  # it is dead, which `taken` finds next
+
+    def taken(self) -> tuple:
+        """(chunk, seconds, its answer), or Died in place of the answer."""
+        try:
+            found = self.pipe.recv()
+        except (EOFError, OSError):
+            found = Died(f"its process died ({_how(self.process.wait())})")
+        chunk, self.chunk = self.chunk, None
+        return chunk, perf_counter() - self.begin, found
+
+    def end(self) -> None:
+        """Stop the process, whatever it does."""
+        self.pipe.close()
+        self.process.kill()
+        self.process.wait()
+
+
+class Pool:
+    """The executor of some processes of this machine."""
+
+    def __init__(self, workers: int):
+        self.workers = workers
+
+    def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
+        """(chunk, seconds, answer or Died) of each chunk that `take` hands out, as they come in."""
+        workers: list[Worker] = []
+        try:
+            while True:
+                self._hand_out(workers, work, take)
+                busy = {one.pipe: one for one in workers if one.chunk is not None}
+                if not busy:
+                    return
+                for pipe in wait(list(busy)):
+                    one = busy[pipe]
+                    taken = one.taken()
+                    if isinstance(taken[2], Died):
+                        workers.remove(one)
+                        one.end()
+                    yield taken
+        finally:
+            for one in workers:
+                one.end()
+
+    def _hand_out(self, workers: list, work: Work, take: Callable) -> None:
+        """Give every idle process a chunk; start another while there are chunks and not yet enough processes."""
+        for one in [one for one in workers if one.chunk is None] + [None] * (self.workers - len(workers)):
+            chunk = take()
+            if chunk is None:
+                return
+            if one is None:
+                workers.append(one := _started(work))
+            one.give(chunk)
+
+
+def _started(work: Work) -> Worker:
+    try:
+        return Worker(work)
+    except OSError as error:
+        raise Missing(f"a process of the sweep cannot be started ({error.strerror}); lower -j") from None
+
+
+def _how(status: int) -> str:
+    if status == -9:
+        return "killed, by hand or for want of memory"
+    return f"signal {-status}" if status < 0 else f"exit code {status}"

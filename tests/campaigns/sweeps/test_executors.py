@@ -1,0 +1,152 @@
+"""Executors: whoever works, and whatever dies on the way, the answers are those of this process."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import cli
+from deadly_cases import Deadly
+from scene_texts import BENCH, COULOMB, POINT, SHORT
+
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors.here import Here
+from patchfem.campaigns.sweeps.executors.pool import Pool
+from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Work, solved
+from patchfem.runs.many.answers import FAILED, Answers, joined
+from patchfem.scene.axes import read
+
+SUPPORT = Path(__file__).parents[2] / "support"
+RIG = POINT + COULOMB + SHORT
+
+
+def work(text=BENCH, count=8, tell=None) -> Work:
+    axes, _ = read([f"friction.static=0.05..0.6:{count}lin"])
+    return Work(Asked(Path("a.toml"), text), Cases(tuple(axes)), tell)
+
+
+def all_of(asked: Work, executor) -> tuple:
+    """(Answers in the order of the cases, what was told in that order)."""
+    count = len(asked.cases)
+    parts = list(solved(asked, range(count), executor))
+    assert sorted(number for numbers, _, _ in parts for number in numbers) == list(range(count))
+    return joined(count, [part[:2] for part in parts]), dict(pair for one in parts for pair in zip(one[0], one[2]))
+
+
+def same(found: Answers, want: Answers, cases) -> None:
+    at = list(cases)
+    assert found.outcome[at].tolist() == want.outcome[at].tolist()
+    for name in want.values:
+        np.testing.assert_array_equal(found.values[name][at], want.values[name][at])
+        np.testing.assert_array_equal(found.errors[name][at], want.errors[name][at])
+
+
+@pytest.fixture
+def importable(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(SUPPORT), os.environ.get("PYTHONPATH", "")]))
+
+
+@pytest.mark.parametrize("once", [True, False], ids=["once", "always"])
+def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, once):
+    deadly = (3, 5) if once else (3,)
+    asked = work(tell=Deadly(deadly, tmp_path, once))
+    found, told = all_of(asked, Pool(2))
+    want, _ = all_of(work(), Here())
+    lost = [] if once else [3]
+    rest = [number for number in range(8) if number not in lost]
+    same(found, want, rest)
+    assert told == {number: number for number in rest}
+    for number in deadly:
+        assert len((tmp_path / str(number)).read_text()) == (1 if once else TRIES)
+    for number in lost:
+        assert found.outcome[number] == FAILED and "killed" in found.messages[number]
+
+
+def test_exact_chunks_hand_out_every_case_once():
+    chunks, seen = Chunks(range(1000), 2), []
+    while (chunk := chunks.take()) is not None:
+        seen += chunk
+        chunks.done(chunk, 0.01 * len(chunk))
+    assert seen == list(range(1000))
+
+
+def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
+    chunks = Chunks(range(1000), 2)
+    assert len(chunks.take()) == 1
+    chunks.done([0], 0.02)
+    assert len(chunks.take()) == 50  # of a second
+    chunks.done([0], 1e-6)
+    assert len(chunks.take()) == 238  # a quarter of what is left, for two workers
+    assert chunks.died([5, 6]) == [] and chunks.take() == [5] and chunks.take() == [6]
+    assert chunks.died([5]) == [] and chunks.died([5]) == [5]
+
+
+KILLED = """\
+import os, signal, sys
+from pathlib import Path
+from patchfem.campaigns.sweeps.ask import asked_of
+from patchfem.campaigns.sweeps.executors.pool import Pool
+from patchfem.export.sweeps.run import Place, sweep_into
+def told(done, total):
+    if done > 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+sweep_into(*asked_of(Path(sys.argv[1]), (), sys.argv[3:]), Place(Path(sys.argv[2])), Pool(2), told=told)
+"""
+
+
+def names(folder: Path) -> list:
+    return sorted(one.name for one in folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    place = tmp_path_factory.mktemp("whole")
+    (place / "rig.toml").write_text(RIG, encoding="utf-8")
+    over = "friction.static=0.05..0.6:20lin"
+    assert cli("sweep", place / "rig.toml", "--over", over, "-o", place / "whole").code == 0
+    return place / "rig.toml", over, place / "whole"
+
+
+def resumed(whole: tuple, out: Path) -> None:
+    """What is there is whole, some but not all of it; going on gives the same files as one sweep from end to end."""
+    path, over, want = whole
+    there = [one for one in (out / "cases").iterdir() if not one.name.startswith(".")]
+    assert 0 < len(there) < len(names(want / "cases")) and not (out / "sweep.csv").exists()
+    assert all((one / "summary.json").read_text().endswith("}\n") for one in there)
+    assert cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
+    for name in ("sweep.csv", "sweep.nc"):
+        assert (out / name).read_bytes() == (want / name).read_bytes()
+    assert names(out / "cases") == names(want / "cases") and names(out) == names(want)
+
+
+def test_exact_a_sweep_killed_in_the_middle_goes_on_to_the_same_files(whole, tmp_path):
+    path, over, _ = whole
+    out = tmp_path / "swept"
+    done = subprocess.run([sys.executable, "-c", KILLED, path, out, over], timeout=120)
+    assert done.returncode == -signal.SIGKILL
+    half = out / "cases" / ".0123456789abcdef.1"  # as a process killed while it writes leaves it
+    half.mkdir()
+    (half / "summary.json").write_text('{"patchf')
+    resumed(whole, out)
+
+
+@pytest.mark.slow
+def test_exact_an_interrupted_pool_keeps_what_is_done(whole, tmp_path):
+    path, _, _ = whole
+    out = tmp_path / "swept"
+    command = [sys.executable, "-m", "patchfem", "sweep", path, "--over", "friction.static=0.05..0.6:400lin",
+               "-o", out, "-j", "2"]
+    running = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while not ((out / "cases").is_dir() and any((out / "cases").glob("[0-9a-f]*"))):
+        assert running.poll() is None
+        time.sleep(0.005)
+    os.killpg(running.pid, signal.SIGINT)
+    _, said = running.communicate(timeout=60)
+    assert running.returncode == 130 and said.rstrip().endswith("--resume")
+    assert cli("sweep", path, "--over", "friction.static=0.05..0.6:400lin", "-o", out, "--resume").code == 0
+    assert len(names(out / "cases")) == 400
