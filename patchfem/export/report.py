@@ -1,6 +1,5 @@
-"""report.html: one page that stands alone, the verdict first; pictures are inline SVG, nothing is fetched."""
+"""report.html: one page that stands alone, the verdict first; the browser draws its pictures, nothing is fetched."""
 
-import re
 import tomllib
 from collections.abc import Callable
 from html import escape
@@ -11,21 +10,9 @@ import numpy as np
 
 from ..core import rounded
 from .drawing import curves, pictures
+from .pages import charts
+from .pages.document import Section, document
 
-CSS = """
-:root{--ink:#1c2430;--soft:#5d6877;--line:#dfe4ea;--tint:#f4f7fa;--accent:#1f5f99}
-body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);max-width:62rem;margin:2rem auto;padding:0 1.2rem}
-h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.1rem;margin:2rem 0 .4rem}
-.verdict{background:var(--tint);border-left:4px solid var(--accent);padding:.8rem 1rem;margin:1rem 0;font-size:1.05rem}
-.v{white-space:nowrap}.warn{border-color:#c8551b;font-size:1rem}.warn p{margin:.2rem 0}
-table{border-collapse:collapse;width:100%;font-size:.92rem}
-td,th{padding:.25rem .6rem;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}th{color:var(--soft);font-weight:600}
-figure{margin:1.6rem 0}figure svg{display:block;width:100%;height:auto}
-figcaption,.soft{color:var(--soft);font-size:.9rem}figcaption{margin-top:.3rem}
-pre{background:var(--tint);padding:.8rem;overflow:auto;font-size:.82rem}details{margin:.6rem 0}
-@media print{details{display:none}body{margin:0}figure{break-inside:avoid}}
-"""
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
 WORKSHOP = {  # as pictures.LADDERS
@@ -35,6 +22,9 @@ WORKSHOP = {  # as pictures.LADDERS
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
+FILES = (("summary.json", "measures, outcome, warnings, what ran"),
+         ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
+         ("scene.resolved.toml", "the scene in SI with every default"))
 
 
 def matched(value, error=None) -> tuple:
@@ -133,40 +123,37 @@ def page(data: dict) -> str:
     """The whole HTML page from the plain data of a run, as `shown.report_data` gives them."""
     summary = data["summary"]
     title = summary["title"] or data.get("name") or "patchfem run"
-    parts = [f"<h1>{escape(title)}</h1><p class=soft>patchfem {escape(summary['patchfem'])} &middot; "
-             f"{escape(summary['kind'])} &middot; engine {escape(data['engine'] or 'static')} &middot; "
-             f"{summary['seconds'].get('total', 0):.2f} s</p>", f"<p class=verdict>{verdict(data)}</p>"]
+    lead = [f"<p class=soft>patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])} &middot; engine "
+            f"{escape(data['engine'] or 'static')} &middot; {summary['seconds'].get('total', 0):.2f} s</p>",
+            f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     if warnings:
-        parts.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
-    parts += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
-    parts += [placed(number, *shown) for number, shown in enumerate(figures(data))]
+        lead.append("<div class='verdict warn'>" + "".join(f"<p>{escape(w)}</p>" for w in warnings) + "</div>")
+    lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
+    drawn, shown = figures(data)
+    sections = [Section("pictures", "Pictures", shown)] if drawn else []
     if "measured" in data:
-        parts.append(_table_one(data))
+        sections += _table_one(data)
     if "levels" in data:
-        parts.append(_table_of_levels(data["levels"]))
-    parts += [_measures(data), _cost(data)]
-    parts.append(f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>")
-    parts.append(f"<details><summary>Scene in SI, every default written out</summary><pre>{escape(data['resolved'])}"
-                 "</pre></details>")
-    versions = ", ".join(f"{k} {v}" for k, v in data["versions"].items())
-    parts.append(f"<p class=soft>{escape(versions)}</p>")
-    body = "\n".join(parts)
-    return (f"<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content='width=device-width'>"
-            f"<title>{escape(title)}</title><style>{CSS}</style></head><body>{body}</body></html>\n")
+        sections.append(_table_of_levels(data["levels"]))
+    sections += [_measures(data), _cost(data), _origin(data)]
+    return document(title, "".join(lead), sections, {"charts": drawn} if drawn else None,
+                    ("figures.js", "curves.js") if drawn else ())
 
 
-def placed(number: int | str, svg: str, caption: str) -> str:
-    """A figure; one page holds many pictures, so their ids are told apart by the number."""
-    svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
-    svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
-    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
-
-
-def figures(data: dict) -> list:
-    """Pictures [(svg, caption)] that this run has something to show in."""
-    found = [picture(name, data) for name in PICTURES]
-    return [(one.draw(*one.values), one.caption) for one in found if one is not None]
+def figures(data: dict) -> tuple:
+    """The charts that this run has something to show in, each with its anchor, and the HTML of their places."""
+    drawn, places = [], []
+    for found in (picture(name, data) for name in PICTURES):
+        if found is None:
+            continue
+        made = getattr(charts, found.draw.__name__)(*found.values)
+        made = [one | {"anchor": f"chart{len(drawn) + number}"} for number, one in enumerate(made)]
+        cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
+                        for one in made)
+        places.append(f"<figure><div class=row>{cells}</div><figcaption>{escape(found.caption)}</figcaption></figure>")
+        drawn += made
+    return drawn, "\n".join(places)
 
 
 class Picture(NamedTuple):
@@ -258,11 +245,11 @@ def _histories(data: dict) -> Picture | None:
     count = (window["time"][-1] - window["time"][0]) / period
     title = f"The run's {count:.2g} cycles" if count >= cycles(data) - 1e-6 else f"Last {count:.2g} cycles"
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
-    caption = "Displacement over the whole run; beside it accelerations (left axis) and displacement (right axis)."
+    caption = "Displacement over the whole run; displacement, and acceleration of block and base, at its end."
     begin = pictures.whole_from(history["time"], period, w["time"][0])
     kept = int(np.sum(history["time"] < begin))
     if kept:
-        what = "reversals were kept: dots, with a band from the lowest to the highest of each cycle." \
+        what = "reversals were kept: a band from the lowest to the highest of each cycle." \
             if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
         unit, scale = pictures.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
@@ -293,10 +280,11 @@ def _unsettled(data: dict) -> str:
     return "" if outcome in SETTLED else f" The run ended as {outcome}: the computed values are not of a steady motion."
 
 
-def _table_one(data: dict) -> str:
+def _table_one(data: dict) -> list:
+    """The section that sets the computed values beside the measured ones, none where nothing compares."""
     m, found = data["measured"], data["summary"]["measures"]
     if m.get("input") is None or m.get("frequency") is None:
-        return ""
+        return []
     rows = []
     for r in m["rows"]:
         if abs(r.frequency - m["frequency"]) > 0.5 or abs(r.input - m["input"]) > 0.01 * m["input"]:
@@ -312,12 +300,14 @@ def _table_one(data: dict) -> str:
             rows.append(f"<tr><td>{kind}</td><td class=n>{value / scale:.3g} {unit}</td>"
                         f"<td class=n>{mine / scale:.3g} {unit}</td><td class=n>{ratio}</td></tr>")
     if not rows:
-        return "<p class=soft>No measured row has this frequency and input.</p>"
-    return ("<h2>Against the measurement</h2><table><tr><th>reading<th class=n>measured<th class=n>computed"
+        text = "<p class=soft>No measured row has this frequency and input.</p>"
+        return [Section("measured", "Against the measurement", text)]
+    text = ("<table><tr><th>reading<th class=n>measured<th class=n>computed"
             f"<th class=n>ratio</tr>{''.join(rows)}</table><p class=soft>{escape(_unsettled(data).strip())}</p>")
+    return [Section("measured", "Against the measurement", text)]
 
 
-def _table_of_levels(levels: list) -> str:
+def _table_of_levels(levels: list) -> Section:
     """Drive, amplitude, acceleration and whether it held, of every level."""
     rows = []
     for number, one in enumerate(levels, 1):
@@ -331,7 +321,7 @@ def _table_of_levels(levels: list) -> str:
                     + "".join(f"<td class=n>{cell}</td>" for cell in cells)
                     + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    return (f"<h2>Levels</h2><table><tr><th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak"
+    return Section("levels", "Levels", f"<table><tr><th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak"
             f"<th class=n>peak acceleration<th>interface</tr>{''.join(rows)}</table>")
 
 
@@ -340,29 +330,43 @@ def measure(value: float, unit: str, error: float | None) -> dict:
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
-def _measures(data: dict) -> str:
-    rows = []
+def _measures(data: dict) -> Section:
+    """Every measure with its error, in other units, and what it means."""
+    rows, means = [], data.get("means", {})
     for name, m in data["summary"]["measures"].items():
         value, error = matched(m["value"], m["error"])
+        cells = f"<td id='measure-{escape(name)}'>{escape(name)}</td><td class=n>{value}</td>"
         if m.get("reason"):
-            rows.append(f"<tr><td>{escape(name)}</td><td class=n>{value}</td><td class=soft colspan=3>"
-                        f"{escape(m['reason'])}</td></tr>")
-            continue
-        rows.append(f"<tr><td>{escape(name)}</td><td class=n>{value}</td><td class=n>{error}</td>"
-                    f"<td>{escape(m['unit'])}</td><td>{escape(others(name, m))}</td></tr>")
+            cells += f"<td class=soft colspan=3>{escape(m['reason'])}</td>"
+        else:
+            cells += (f"<td class=n>{error}</td><td>{escape(m['unit'])}</td>"
+                      f"<td>{escape(others(name, m))}</td>")
+        rows.append(f"<tr>{cells}<td class=soft>{escape(means.get(name, ''))}</td></tr>")
     note = (f"<p class=soft>The run holds {cycles(data):.2g} of a cycle: measures per cycle are not those of a whole "
             "one.</p>") if part_of_cycle(data) else ""
-    return ("<h2>Measures</h2><table><tr><th>measure<th class=n>value<th class=n>error (±)<th>unit<th>in other units"
-            f"</tr>{''.join(rows)}</table>{note}")
+    return Section("measures", "Measures", "<div class=across><table><tr><th>measure<th class=n>value<th class=n>error "
+                   f"(±)<th>unit<th>in other units<th>what it is</tr>{''.join(rows)}</table></div>{note}")
 
 
-def _cost(data: dict) -> str:
+def _cost(data: dict) -> Section:
+    """What ran, by which equations, and how long it took."""
     summary = data["summary"]
     rows = "".join(f"<tr><td>{escape(e['effect'])}</td><td>{escape(e['equations'])}</td>"
                    f"<td class=n>{e['seconds']:.3f}</td></tr>" for e in summary["effects"])
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
     shared = " The law and the modes share one loop; its time stands with the law." if summary["kind"] == "rig" else ""
-    return (f"<h2>What ran and what it cost</h2><table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
+    text = (f"<table><tr><th>effect<th>equations<th class=n>seconds</tr>{rows}"
             f"</table><p class=soft>{escape(parts)}.{shared}</p>"
             f"<p class=soft>Not in the scene, so neither imported nor computed: "
             f"{escape(', '.join(summary['not_in_scene']))}.</p>")
+    return Section("cost", "What ran and what it cost", text)
+
+
+def _origin(data: dict) -> Section:
+    """The scene as written and as understood, the files beside the page, the versions."""
+    versions = ", ".join(f"{k} {v}" for k, v in data["versions"].items())
+    files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in FILES)
+    return Section("origin", "Scene and files", f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre>"
+                   "</details><details><summary>Scene in SI, every default written out</summary><pre>"
+                   f"{escape(data['resolved'])}</pre></details><p>Beside this page:</p><ul>{files}</ul>"
+                   f"<p class=soft>{escape(versions)}</p>")

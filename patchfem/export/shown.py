@@ -13,7 +13,8 @@ def report_data(result: Result) -> dict:
     source = model.source
     data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": source.resolved,
             "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
-            "x": None if result.patch is None else result.patch.x, "versions": versions()}
+            "x": None if result.patch is None else result.patch.x, "versions": versions(),
+            "means": {name: one.text for name, one in result.measures.items()}}
     if "curve" in result.extra:
         data["curve"] = result.extra["curve"]
     if "wear" in result.extra:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
+from page_data import charts_of
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import Outcome
@@ -113,7 +114,9 @@ def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     """Of three motions at one frequency the measures are of the largest, which the curve found."""
     folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))
     page = (folder / "report.html").read_text()
-    assert ">fold<" in page and data.curve_fold.size == 2
+    marks = charts_of(page)["Steady motion at the output", "half peak-to-peak"]["marks"]
+    assert [mark["x"] for mark in marks if mark["name"] == "fold"] == pytest.approx(data.curve_fold.values)
+    assert {mark["dash"] for mark in marks if mark["name"] == "unstable"} == {"dashed"} and data.curve_fold.size == 2
     top = float(data.curve_amplitude.max())
     assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=2e-3)
     # backbone: omega^2 + 3/4 (k3/m) x^2 where the largest motion is
@@ -136,7 +139,9 @@ def test_exact_levels_on_the_page(written):
     assert [(int(n), int(g), word) for n, g, _, word in rows] == [
         (1, 3, "stuck"), (2, 5, "slips"), (3, 6, "slips"), (4, 5, "slips"),
         (5, 4, "slips"), (6, 3, "stuck")]
-    assert "Level by level" in page and ">raised<" in page and ">lowered<" in page
+    marks = charts_of(page)["Level by level", "half peak-to-peak"]["marks"]
+    arrows = [(mark["name"], *mark["x"]) for mark in marks if mark["kind"] == "arrow"]
+    assert arrows == [("raised", 3, 5), ("raised", 5, 6), ("lowered", 6, 5), ("lowered", 5, 4), ("lowered", 4, 3)]
     assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..drawing.pictures import LADDERS, axis_unit
 from ..report import pair, units
+from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import NUMBER, label
 
@@ -116,8 +117,8 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
     return {"anchor": f"chart{number}", "title": title, "x": {"label": x[1], "unit": unit_a, "log": False},
             "y": {"label": y[1], "unit": unit_b, "log": False},
             "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
-            "lines": [{"name": name, "x": a * scale_a, "y": b * scale_b, "dots": x[0] == "level_drive"}
-                      for name, a, b in lines]}
+            "marks": [mark("dots" if x[0] == "level_drive" else "line", colour, name, x=a * scale_a, y=b * scale_b)
+                      for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}
 
 
 def _late(run: Run) -> np.ndarray:

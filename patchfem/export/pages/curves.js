@@ -1,24 +1,87 @@
-// Draws the charts of a page: lines over a common axis, one set per chart, with hover values, zoom and a legend.
+// Draws the charts of a page, each in the element of its anchor: hover values, zoom, a legend whose entries hide lines.
 //
-// data.charts: [{anchor, x: {label, unit, log}, y: {label, unit, log}, lines: [{name, x: [...], y: [...], dots}]}]
+// data.charts: [{anchor, title, x, y: {label, unit, log, range}, marks: [{kind, colour, name, ...numbers}], frame}]
+// frame: [width, height] in pixels where both axes share a scale.
 "use strict";
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const {colours, named, figure, legend, put} = pictures;
+  const {ink, named, figure, legend, bar, put} = pictures;
+  const whole = (values) => values.map((v) => v ?? NaN);
+  const shade = (name) => name.startsWith("#") ? name : ink(`--${name}`);
+  const label = (mark) => mark.name ? {legend_label: mark.name} : {};
+
+  const kinds = {
+    line(fig, mark) {
+      return fig.line({field: "x"}, {field: "y"}, {source: column(mark, {}), line_color: shade(mark.colour),
+        line_width: mark.width ?? 1.6, line_alpha: mark.alpha ?? 1, line_dash: mark.dash ?? "solid", ...label(mark)});
+    },
+    dots(fig, mark) {
+      const errors = mark.errors ?? mark.x.map(() => 0), colour = shade(mark.colour);
+      const source = column(mark, {low: mark.y.map((v, k) => v - errors[k]), high: mark.y.map((v, k) => v + errors[k])});
+      fig.segment({field: "x"}, {field: "low"}, {field: "x"}, {field: "high"}, {source, line_color: colour});
+      return fig.scatter({field: "x"}, {field: "y"}, {source, size: 9, marker: mark.shape ?? "circle",
+        fill_color: colour, fill_alpha: 0.6, line_color: colour, ...label(mark)});
+    },
+    band(fig, mark) {
+      const source = new Bokeh.ColumnDataSource({data: {x: mark.x, low: whole(mark.low), high: whole(mark.high)}});
+      fig.varea({field: "x"}, {field: "low"}, {field: "high"}, {source, fill_color: shade(mark.colour),
+        fill_alpha: 0.22});
+    },
+    span(fig, mark) {
+      fig.add_layout(new Bokeh.BoxAnnotation({left: mark.left, right: mark.right, fill_color: shade(mark.colour),
+        fill_alpha: 0.15, line_color: null}));
+    },
+    rule(fig, mark) {
+      fig.add_layout(new Bokeh.Span({location: mark.x, dimension: "height", line_color: shade(mark.colour),
+        line_dash: "dotdash"}));
+      if (mark.name) fig.line([], [], {line_color: shade(mark.colour), line_dash: "dotdash", ...label(mark)});
+    },
+    arrow(fig, mark) {
+      const [a, b] = mark.x, [c, d] = mark.y, at = (s, p, q) => p + s * (q - p);
+      fig.add_layout(new Bokeh.Arrow({x_start: at(0.45, a, b), x_end: at(0.58, a, b), y_start: at(0.45, c, d),
+        y_end: at(0.58, c, d), line_color: null, end: new Bokeh.NormalHead({size: 9, fill_color: shade(mark.colour),
+          line_color: null})}));
+      return kinds.line(fig, mark);
+    },
+    cells(fig, mark) {                           // a grid of cells over the lines x and y, coloured by their value
+      const low = Math.min, high = Math.max, box = {left: [], right: [], bottom: [], top: [], value: []};
+      mark.value.forEach((row, i) => row.forEach((v, j) => {
+        box.left.push(mark.x[i]); box.right.push(mark.x[i + 1]);
+        box.bottom.push(low(mark.y[j], mark.y[j + 1])); box.top.push(high(mark.y[j], mark.y[j + 1])); box.value.push(v);
+      }));
+      const transform = new Bokeh.LinearColorMapper({palette: Bokeh.Palettes.viridis(256), low: 0, high: mark.top});
+      const fill = {field: "value", transform};
+      if (!fig.coloured) bar(fig, transform, mark.unit);
+      fig.coloured = true;
+      const cells = fig.quad({field: "left"}, {field: "right"}, {field: "bottom"}, {field: "top"},
+        {source: new Bokeh.ColumnDataSource({data: box}), fill_color: fill, line_color: fill, line_width: 1});
+      fig.add_tools(new Bokeh.HoverTool({renderers: [cells], formatters: {"@value": "printf"},
+        tooltips: [["stress", `@value{%.4g} ${mark.unit}`]]}));
+    },
+  };
+
+  function column(mark, more) {
+    return new Bokeh.ColumnDataSource({data: {x: whole(mark.x), y: whole(mark.y),
+      name: mark.x.map(() => mark.name || ""), ...more}});
+  }
 
   function draw(chart) {
-    const fig = figure(chart.x, named(chart.y), {y_axis_type: chart.y.log ? "log" : "linear"}), cycle = colours();
-    const shown = chart.lines.map((one, k) => {
-      const source = new Bokeh.ColumnDataSource({data: {x: one.x.map((v) => v ?? NaN), y: one.y.map((v) => v ?? NaN),
-        name: one.x.map(() => one.name)}});
-      const style = {source, line_color: cycle[k % cycle.length], legend_label: one.name};
-      const line = fig.line({field: "x"}, {field: "y"}, {...style, line_width: 1.6});
-      return one.dots ? fig.scatter({field: "x"}, {field: "y"}, {...style, size: 7, fill_color: cycle[k % cycle.length]})
-        : line;
-    });
-    fig.add_tools(new Bokeh.HoverTool({renderers: shown, line_policy: "nearest", formatters: {"@x": "printf", "@y": "printf"},
-      tooltips: [["run", "@name"], [named(chart.x), "@x{%.7g}"], [named(chart.y), "@y{%.7g}"]]}));
-    if (chart.lines.length > 1) legend(fig); else fig.legend.visible = false;
+    const range = (axis) => axis.range ? new Bokeh.Range1d({start: axis.range[0], end: axis.range[1]}) : undefined;
+    const ranges = {x_range: range(chart.x), y_range: range(chart.y)};
+    Object.keys(ranges).forEach((name) => ranges[name] === undefined && delete ranges[name]);
+    const fig = figure(chart.x, named(chart.y), {y_axis_type: chart.y.log ? "log" : "linear",
+      height: chart.height ?? 330, tools: "pan,box_zoom,wheel_zoom,reset,save", ...ranges,
+      ...(chart.frame ? {sizing_mode: "fixed", frame_width: chart.frame[0], frame_height: chart.frame[1]} : {})});
+    const shown = chart.marks.map((mark) => kinds[mark.kind](fig, mark)).filter((one) => one);
+    const rows = [[named(chart.x), "@x{%.7g}"], [named(chart.y), "@y{%.7g}"]];
+    const several = new Set(chart.marks.map((mark) => mark.name)).size > 1;
+    if (shown.length) {
+      fig.add_tools(new Bokeh.HoverTool({renderers: shown, line_policy: "nearest", attachment: "right",
+        formatters: {"@x": "printf", "@y": "printf"}, tooltips: several ? [["", "@name"], ...rows] : rows}));
+    }
+    fig.title.text = chart.title;
+    Object.assign(fig.title, {text_color: ink("--ink"), text_font_style: "normal", text_font_size: "13px"});
+    if (chart.marks.some((mark) => mark.name)) legend(fig);
     put(fig, document.getElementById(chart.anchor));
   }
 

@@ -29,10 +29,12 @@ const pictures = (() => {
     return fig;
   }
 
-  function legend(fig) {                         // beside the picture, so that it hides no line; a click hides one
-    Object.assign(fig.legend, {background_fill_color: ink("--paper"), background_fill_alpha: 0.8,
+  function legend(fig) {                         // outside the picture, so that it hides no line; a click hides one
+    const few = fig.legend.items.length < 4;
+    Object.assign(fig.legend, {label_text_font_size: "12px", background_fill_color: ink("--paper"), background_fill_alpha: 0.8,
       label_text_color: ink("--ink"), border_line_color: null, click_policy: "hide"});
-    fig.add_layout(fig.legend, "right");
+    if (few) fig.legend.orientation = "horizontal";
+    fig.add_layout(fig.legend, few ? "above" : "right");
   }
 
   function bar(fig, color_mapper, title) {       // the scale of the colours

@@ -6,8 +6,8 @@ from pathlib import Path
 from ... import __version__
 from ...surface.profile import say
 from ...surface.roughness.report import RoughnessReport, Value
+from ..drawing.inline import CSS
 from ..drawing.pictures import LADDERS, step_of
-from ..report import CSS
 from . import pictures
 
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "
@@ -155,7 +155,7 @@ def figures(report: RoughnessReport) -> list:
 
 
 def _figure(number: str, svg: str, caption: str, alternative: str) -> str:
-    from ..report import placed
+    from ..drawing.inline import placed
 
     svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
     return placed(number, svg, caption)

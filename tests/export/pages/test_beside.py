@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from page_data import charts_of
 
 from patchfem.core import PatchfemError
 from patchfem.export.netcdf import of_run, write
@@ -41,11 +42,10 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
     rows = re.search(r'<section id="scenes">.*?<tbody>(.*?)</tbody>', text, re.S)[1]
     assert re.findall(r"<tr><td>(.*?)</td>", rows) == ["normal.load"]
     assert "<b>1.0000 ± 0.0010 um</b> (-50.00%)" in text
-    data = json.loads(re.search(r"id=data>(.*?)</script>", text, re.S)[1])
-    history = next(one for one in data["charts"] if one["title"] == "Displacement")
+    history = charts_of(text)["Displacement", "displacement"]
     assert history["x"]["unit"] == "ms" and history["y"]["unit"] == "um"
-    assert [one["name"] for one in history["lines"]] == ["light", "<b>heavy"]
-    for one, size in zip(history["lines"], (2.0, 1.0)):
+    assert [one["name"] for one in history["marks"]] == ["light", "<b>heavy"]
+    for one, size in zip(history["marks"], (2.0, 1.0)):
         assert one["x"][0] == pytest.approx(-20.0, abs=1e-6) and one["x"][-1] == 0.0
         np.testing.assert_allclose(one["y"], size * np.sin(2 * np.pi * 0.1 * np.array(one["x"])), atol=1e-8)
 

@@ -1,23 +1,14 @@
 """The page of a sweep: one file, nothing fetched, texts shown as texts, numbers as they came."""
 
-import json
 import re
 
 import numpy as np
 import pytest
+from page_data import data_of, own_part
 
 from patchfem.export.pages import library
 from patchfem.export.pages.document import document, plain
 from patchfem.export.pages.sweep import page
-
-
-def data_of(text: str) -> dict:
-    return json.loads(re.search(r"<script type=application/json id=data>(.*?)</script>", text, re.S)[1])
-
-
-def own_part(text: str) -> str:
-    """The page without the drawing library."""
-    return text.replace(library.bokeh(), "")
 
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
@@ -43,11 +34,12 @@ def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
 
 
 def test_always_texts_from_outside_are_shown_as_texts(table):
-    text = own_part(page(table))
+    whole = page(table)
+    text = own_part(whole)
     assert "Tilt &lt;/script&gt;&lt;b&gt;&amp;amp;" in text
     for foreign in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
         assert foreign not in text
-    assert text.count("<script") == text.count("</script>") == 4
+    assert whole.count("</script>") == 4
 
 
 def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_told(table):

@@ -1,0 +1,202 @@
+"""The pictures of a run as data that `curves.js` draws: the same arguments as the functions of `drawing` take.
+
+A chart is a dict: `title`; `x`, `y`: {label, unit, log}, and `range` [low, high] where not all is shown; `marks`: what
+is drawn, from back to front. A mark has a `kind` (line, dots, band, span, rule, arrow, cells), a `name` for the legend
+("" for none), a `colour` (accent, warm, soft, or #rrggbb) and its numbers, in the units of the axes.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from ...core import G_N
+from ..drawing import curves
+from ..drawing.pictures import axis_unit, closer, envelope, part_in_contact, whole_from
+from ..drawing.wear import MEASURES, SHOWN
+
+LINE, FRAMES = 6000, 40  # points of a line, frames of the shear stress behind the largest one
+REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
+COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
+MIL = 25.4e-6
+TALL, WIDEST = 270, 300  # pixels of a frame in which both axes have one scale
+
+
+def axis(label: str, unit: str = "", log: bool = False) -> dict:
+    """An axis of a chart."""
+    return {"label": label, "unit": unit, "log": log}
+
+
+def chart(title: str, x: dict, y: dict, marks: list) -> dict:
+    """A chart of these marks."""
+    return {"title": title, "x": x, "y": y, "marks": [mark for mark in marks if mark]}
+
+
+def mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
+    """What is drawn: `numbers` holds its arrays and its style."""
+    return {"kind": kind, "colour": colour, "name": name, **numbers}
+
+
+def line(x, y, colour: str, name: str = "", **style) -> dict:
+    """A line of at most LINE points; of a longer one every so manieth is drawn, its turning points among them."""
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    if x.size > LINE:
+        step = -(-x.size // LINE)
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(y)))) + 1
+        keep = np.unique(np.concatenate([np.arange(0, x.size, step), turns, [x.size - 1]]))
+        x, y = x[keep], y[keep]
+    return mark("line", colour, name, x=x, y=y, **style)
+
+
+def interface(x, fields: dict) -> list:
+    """Pressure, and shear stress in every frame with that of the largest resultant in colour."""
+    sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
+    part = part_in_contact(x, sigma) or (x[0], x[-1])
+    along, size = axis_unit(part, "m")
+    place = axis("x", along) | {"range": [part[0] * size, part[1] * size]}
+    unit, scale = axis_unit(sigma, "Pa")
+    out = [chart("Pressure on the interface", place, axis("normal stress", unit),
+                 [mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
+                  line(x * size, sigma * scale, "accent")])]
+    if tau is not None and np.any(tau):
+        unit, scale = axis_unit(tau, "Pa")
+        frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
+        name, per = axis_unit(fields["time"], "s")
+        shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
+        frames = [line(x * size, tau[k] * scale, "soft", width=0.6, alpha=0.6) for k in shown]
+        out.append(chart(f"Shear stress, largest resultant at {fields['time'][frame] * per:.4g} {name}", place,
+                         axis("shear stress", unit), [*frames, line(x * size, tau[frame] * scale, "warm")]))
+    return out
+
+
+def bodies(x, depths, mises, sigma) -> list:
+    """Von Mises stress of both pieces: the whole pair, and the part around the contact."""
+    depth = max(depths, key=lambda rows: rows[-1])
+    box = closer(x, depth, sigma, 1.3)
+    (unit, scale), top, out = axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"), 0.0, []
+    for left, right, height in (box, (x[0], x[-1], depth[-1])):
+        name, size = axis_unit((left, right, height), "m")
+        i = slice(max(np.searchsorted(x, left, "right") - 1, 0), np.searchsorted(x, right) + 1)
+        rows = [part[:np.searchsorted(part, height) + 1] for part in depths]
+        cells = [part[i.start:i.stop - 1, :row.size - 1] * scale for part, row in zip(mises, rows)]
+        # the part around the contact comes first and sets the colours
+        top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
+        marks = [mark("cells", "", x=x[i] * size, y=side * row * size, value=part, top=top, unit=unit)
+                 for side, row, part in zip((-1, 1), rows, cells)]
+        across, up = ({"range": [low * size, high * size]} for low, high in ((left, right), (-height, height)))
+        out.append(chart("Von Mises stress", axis("x", name) | across, axis("y", name) | up, marks)
+                   | {"frame": _frame((right - left) / (2 * height))})
+    return out[::-1]
+
+
+def _frame(ratio: float) -> list:
+    """Width and height [pixel] of a frame `ratio` times as wide as tall."""
+    return [round(TALL * ratio), TALL] if TALL * ratio <= WIDEST else [WIDEST, round(WIDEST / ratio)]
+
+
+def loop(slide, force, title: str) -> list:
+    """The friction force against the slide."""
+    (along, size), (up, scale) = axis_unit(slide, "m"), axis_unit(force, "N")
+    return [chart(title, axis("slide", along), axis("friction force", up),
+                  [line(slide * size, force * scale, "accent")])]
+
+
+def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles") -> list:
+    """The whole run, and its last cycles (a rig) or its friction force (a bench)."""
+    time, value, (name, per) = history["time"], history["displacement"], axis_unit(history["time"], "s")
+    unit, scale = axis_unit(value, "m")
+    begin = whole_from(time, period, window["time"][0] if window else 0.0) if period else time[0]
+    late, marks = time >= begin, []
+    if not late.all():
+        middle, low, high = envelope(time[~late], value[~late], period)
+        marks.append(mark("band", "accent", x=middle * per, low=low * scale, high=high * scale))
+    marks.append(line(time[late] * per, value[late] * scale, "accent", width=1.0))
+    out = [chart("Whole run", axis("time", name), axis("displacement", unit), marks)]
+    if window is None:
+        if np.any(history["force"]):
+            up, size = axis_unit(history["force"], "N")
+            out.append(chart("Friction force", axis("time", name), axis("friction force", up),
+                             [line(time * per, history["force"] * size, "warm")]))
+        return out
+    since = window["time"] - window["time"][0]
+    (name, per), (unit, scale) = axis_unit(since, "s"), axis_unit(window["displacement"], "m")
+    out.append(chart(title, axis("time", name), axis("displacement", unit),
+                     [line(since * per, window["displacement"] * scale, "accent")]))
+    out.append(chart(title, axis("time", name), axis("acceleration", "g"),
+                     [line(since * per, window["acceleration"] / G_N, "warm", "block"),
+                      line(since * per, window["base"] / G_N, "soft", "base", dash="dashed")]))
+    return out
+
+
+def measured(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
+    """Measured readings against the input at one frequency, with the computed point."""
+    near, out = [r for r in rows if abs(r.frequency - frequency) < 0.5], []
+    for name, unit, scale, found in (("acceleration", "g", G_N, acceleration),
+                                     ("displacement", "mil", MIL, displacement)):
+        read, marks = [r for r in near if getattr(r, name) is not None], []
+        marks += [mark("rule", "warm", "unstable in the test", x=place)
+                  for place in sorted({r.input / G_N for r in near if "U" in r.flag})]
+        for repeat, text in ((False, "measured"), (True, "measured, repeat run")):
+            pick = [r for r in read if ("R" in r.flag) == repeat]
+            if pick:
+                marks.append(mark("dots", "soft", text, x=[r.input / G_N for r in pick],
+                                  y=[getattr(r, name) / scale for r in pick], shape="square" if repeat else "circle"))
+        if found is not None:
+            marks.append(mark("dots", "accent", "computed", x=[level / G_N], y=[found[0] / scale], shape="diamond",
+                              errors=[(found[1] or 0.0) / scale]))
+        title = f"{name.capitalize()} at {frequency:g} Hz" + ("" if read else ", not measured")
+        out.append(chart(title, axis("input", "g"), axis(name, unit), marks))
+    return out
+
+
+def curve(found: dict) -> list:
+    """Amplitude of the steady motion over frequency or level, the regime by colour and line, folds marked."""
+    along, what, unit = curves.axis_of(found)
+    name, scale = axis_unit(found["amplitude"], "m")
+    value, parts = np.asarray(found["amplitude"]) * scale, curves.spans(found)
+    colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
+    lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
+    marks = [mark("span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)])
+             for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)]
+    for regime, first, last in parts:
+        stop = min(last + 1, along.size)  # on to the next part, so that the line is whole
+        marks.append(line(along[first:stop], value[first:stop], colours[regime], regime,
+                          dash=REGIMES.get(regime, "solid")))
+    marks += [mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N) for at in found.get("folds", ())]
+    return [chart("Steady motion at the output", axis(what, unit), axis("half peak-to-peak", name), marks)]
+
+
+def levels(rows: list) -> list:
+    """Amplitude after every level, in the order of the test, with arrows upwards and downwards."""
+    forced = rows[0].get("unit") == "N"
+    drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G_N)
+    amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
+    name, scale = axis_unit(amplitude, "m")
+    error = np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows]) * scale
+    held, y = np.array([row["stuck"] for row in rows]), amplitude * scale
+    marks = []
+    for k, (a, b) in enumerate(pairwise(drive)):
+        up = b >= a
+        marks.append(mark("arrow", "accent" if up else "warm", "raised" if up else "lowered", x=[a, b],
+                          y=[y[k], y[k + 1]], dash="solid" if up else "dashed"))
+    for which, text, shape in ((~held, "slips", "circle"), (held, "stuck", "square")):
+        if which.any():
+            marks.append(mark("dots", "soft", text, x=drive[which], y=y[which], errors=error[which], shape=shape))
+    what = axis("force", "N") if forced else axis("base acceleration", "g")
+    return [chart("Level by level", what, axis("half peak-to-peak", name), marks)]
+
+
+def wear(x, cycles, pressure, depth, history: dict) -> list:
+    """Pressure and worn depth over x at some of the cycles, and measures over their first value."""
+    (along, size), out = axis_unit(x, "m"), []
+    pick = np.unique(np.linspace(0, len(cycles) - 1, SHOWN).round().astype(int))
+    for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
+        name, scale = axis_unit(values, unit)
+        lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{cycles[k]:.6g} cycles")
+                 for k, colour in zip(pick, ("soft", *COLOURS))]
+        out.append(chart(title, axis("x", along), axis(title.lower(), name), lines))
+    top = float(np.max(pressure[-1])) * axis_unit(pressure, "Pa")[1]
+    out[0]["y"]["range"] = [0.0, min(2.5 * top, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1])]
+    over = [line(history["cycle"], history[name] / history[name][0], colour, text)
+            for colour, (name, (text, *_)) in zip(COLOURS, MEASURES.items())
+            if history.get(name) is not None and history[name][0]]
+    return [*out, chart("Over the cycles", axis("cycles"), axis("over its first value"), over)]
