@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
+from importlib import import_module
 from typing import NamedTuple
 
 from ...core import PatchfemError
@@ -24,7 +25,17 @@ class Batch(NamedTuple):
     solve: Callable[..., Answers]
 
 
-BATCHES: tuple[Batch, ...] = ()  # the first that does not refuse a model takes it
+def _batch(name: str, *kinds: str) -> Batch:
+    """The batch of the module of this name, which takes models of these kinds and is imported for the first of them."""
+    def of(function: str) -> Callable:
+        return lambda *given: getattr(import_module(f"patchfem.runs.many.{name}"), function)(*given)
+
+    asked = of("refuses")
+    return Batch(name, lambda model: asked(model) if model.kind in kinds else f"it is a {model.kind}", of("group"),
+                 of("solve"))
+
+
+BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"),)  # the first that does not refuse a model takes it
 
 
 def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,22 +32,41 @@ def plane_band(asked, patch: Patch) -> list:
     There is none for a piece far wider than tall in plane strain or far taller than wide in plane stress. Between the
     two no mesh narrows the band.
     """
-    pair, ratio = patch.pair, asked.width / asked.height
-    if ratio >= CLEAR if asked.plane == "strain" else ratio <= 1 / CLEAR:
+    other = other_plane(asked)
+    if other is None:
         return []
-    other = "stress" if asked.plane == "strain" else "strain"
+    pair = patch.pair
     upper = None if pair.upper is pair.piece else pair.upper_grid
-    assumed = f"plane {asked.plane} is assumed for pieces {ratio:.2g} times as wide as tall"
     try:
-        mine, theirs = values(patch), values(solve(replace(asked, plane=other), pair.grid, upper))
+        mine, theirs = values(patch), values(solve(other, pair.grid, upper))
     except PatchfemError as error:
-        return [f"{assumed}; the truth lies towards plane {other}, where the patch has no answer ({error})"]
+        return [f"{_assumed(asked)}; the truth lies towards plane {other.plane}, where the patch has no answer "
+                f"({error})"]
+    return band_words(asked, mine, theirs)
+
+
+def other_plane(asked):
+    """The `PatchModel` in the other plane state, None where its own is clearly the right one."""
+    ratio = asked.width / asked.height
+    if ratio >= CLEAR if asked.plane == "strain" else ratio <= 1 / CLEAR:
+        return None
+    return replace(asked, plane="stress" if asked.plane == "strain" else "strain")
+
+
+def _assumed(asked) -> str:
+    return f"plane {asked.plane} is assumed for pieces {asked.width / asked.height:.2g} times as wide as tall"
+
+
+def band_words(asked, mine: dict, theirs: dict) -> list:
+    """The sentence of `plane_band`, from values by name in the plane state of the model and in the other one."""
     first = "approach" if asked.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {closing:+.2g} m"] if closing else []
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
-    return [f"{assumed}; the truth lies towards plane {other}, which would change {', '.join(parts)}"] if parts else []
+    other = "stress" if asked.plane == "strain" else "strain"
+    return [f"{_assumed(asked)}; the truth lies towards plane {other}, which would change {', '.join(parts)}"] \
+        if parts else []
 
 
 def strip_error(asked, patch: Patch, found: dict) -> dict:
@@ -74,29 +94,41 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     and its error what the change from mesh to mesh leaves to come (`limits`) with what no change of the mesh shows.
     tolerance: of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
     """
-    series, mine, floors = [one for one in coarse if one is not None], values(fine), _floors()
+    series, mine = [one for one in coarse if one is not None], values(fine)
     if not series:
-        return _bounded(fine, {name: Measure(value, TABLE[name].unit, None, floors[name])
-                               for name, value in mine.items()})
+        return _bounded(_unbounded(fine), combined([mine], {}))
     missed_peak = unresolved_rounding(fine)
-    found, least, out = [values(one) for one in reversed(series)], _least(fine, mine, missed_peak), {}
-    nested = all(_halved(a, b) for a, b in pairwise((fine, *series)))
+    found = [values(one) for one in reversed(series)]
+    nested = all(halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
-    for name, value in mine.items():
-        if not mine["normal_load"] > 0:
-            out[name] = Measure(value, TABLE[name].unit, 0.0, floors[name])
-            continue
-        seen = limit([*(one[name] for one in found), value], nested)
-        wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
-        best, error = seen.best(wanted)
-        error = max(rough * error, least.get(name, 0.0), max(ALIKE, fine.pair.rounding) * abs(value))
-        out[name] = Measure(float(best), TABLE[name].unit, float(error), floors[name])
-    if mine["pressure_peak"] > 0:
-        out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
+    least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
+    out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough)
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
             out[name] = replace(out[name], value=value, error=error)
-    return _bounded(fine, out)
+    return _bounded(_unbounded(fine), out)
+
+
+def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = ALIKE,
+             rough: float = 1.0) -> dict:
+    """Measures by name from their values on meshes, coarse to fine, each a dict by name.
+
+    least: errors that the meshes may agree to hide; nested, tolerance: as `measures` has them; alike: relative error
+    that stays; rough: factor of the errors. Without a coarser mesh there are no errors, without a load they are 0.
+    """
+    mine, floors, out = series[-1], _floors(), {}
+    if len(series) == 1 or not mine["normal_load"] > 0:
+        error = None if len(series) == 1 else 0.0
+        return {name: Measure(value, TABLE[name].unit, error, floors[name]) for name, value in mine.items()}
+    for name, value in mine.items():
+        seen = limit([one[name] for one in series], nested)
+        wanted = np.inf if tolerance is None else tolerance * abs(value) + floors[name]
+        best, error = seen.best(wanted)
+        error = max(rough * error, least.get(name, 0.0), alike * abs(value))
+        out[name] = Measure(float(best), TABLE[name].unit, float(error), floors[name])
+    if mine["pressure_peak"] > 0:
+        out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
+    return out
 
 
 def met(found: dict, tolerance: float) -> bool:
@@ -110,9 +142,10 @@ def missed(found: dict, tolerance: float) -> float:
     return max((m.error / max(tolerance * abs(m.value) + m.floor, 1e-300) for m in some), default=0.0)
 
 
-def _bounded(fine: Patch, found: dict) -> dict:
-    """The measures without the numbers that no mesh bounds: the peak beside a step that bears, or at a free corner."""
-    why = _unbounded(fine)
+def _bounded(why: str, found: dict) -> dict:
+    """The measures without the numbers that no mesh bounds: the peak beside a step that bears, or at a free corner.
+
+    why: there is none, "" where there is."""
     if not why:
         return found
     return found | {name: replace(found[name], value=None, error=None, reason=why)
@@ -144,18 +177,12 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
     return replace(fraction, error=max(fraction.error, fraction.value * share / (1 - min(share, 0.5))))
 
 
-def _halved(fine: Patch, coarse: Patch) -> bool:
-    """Whether every cell of the coarse grids was split in two."""
-    bodies = ((fine.pair.grid, coarse.pair.grid), (fine.pair.upper_grid, coarse.pair.upper_grid))
+def halved(fine, coarse) -> bool:
+    """Whether every cell of the coarse Pair was split in two."""
+    bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     plans = [tuple(map(plan_of, pair)) for pair in bodies]
     return all(None not in (a, b) and a.x.size == 2 * b.x.size - 1 and a.depth.size == 2 * b.depth.size - 1
                for a, b in plans)
-
-
-def _cell(patch: Patch) -> float:
-    """Length [m] of the cell in which the contact ends, on the average of the ends where they are many; 0 if full."""
-    cells = edge_cells(patch.x, patch.active)
-    return float(max(cells.max(), cells.sum() / 2)) if cells.size else 0.0
 
 
 def _floors() -> dict:
@@ -163,54 +190,83 @@ def _floors() -> dict:
     return {name: row.floor for name, row in TABLE.items()}
 
 
-def _least(patch: Patch, mine: dict, missed_peak: float) -> dict:
-    """Errors that three meshes may agree to hide.
+class Hidden(NamedTuple):
+    """What a pressed patch is told by that three meshes may agree to hide.
+
+    length [m]; count: nodes in contact; cells: lengths [m] of those in which the contact ends; offset: cells by which
+    an edge may lie off; turns: the rotation is free; spread: range of the gap and largest elastic closing [m]; corner,
+    wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact of few nodes, of a rounding that is
+    passed over; open_ends [m] of rounded faces; skin: it is smooth.
+    """
+
+    length: float
+    count: int
+    cells: tuple
+    offset: float
+    turns: bool
+    spread: float
+    corner: float
+    wedge: float
+    missed: float = 0.0
+    open_ends: float = 0.0
+    skin: bool = False
+
+
+def _hidden(patch: Patch, missed_peak: float) -> Hidden:
+    """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
+    cells, count = edge_cells(patch.x, patch.active), max(int(patch.active.sum()), 1)
+    moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
+    corner = 0.0 if patch.pieces is not patch.pair.compliance else \
+        corner_layer(patch.pair, patch.pressure.sigma_n[[0, -1]], np.diff(patch.x)[[0, -1]])  # a skin evens it out
+    return Hidden(patch.pieces.interface.length, count, tuple(cells.tolist()),
+                  offset(patch.pair, cells.max(initial=0.0)), "moment_balance" in patch.pressure.residuals,
+                  float(np.ptp(patch.gap) + moved), corner,
+                  _wedge(patch) if count <= POINT and cells.any() else 0.0, missed_peak, float(open_ends(patch)),
+                  patch.skin is not None)
+
+
+def least_of(hidden: Hidden, mine: dict) -> dict:
+    """Errors that three meshes may agree to hide, by name; mine: values on the finest of them.
 
     They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
-    smaller than the cells (missed_peak [Pa], `unresolved_rounding`), and round-off.
+    smaller than the cells, and round-off.
     """
-    length, load, cell = patch.pieces.interface.length, mine["normal_load"], _cell(patch)
-    count = max(int(patch.active.sum()), 1)
+    length, load, count, cells = hidden.length, mine["normal_load"], hidden.count, hidden.cells
+    cell = max(max(cells), sum(cells) / 2) if cells else 0.0  # the average where the ends are many
     aside = cell / (2 * count**2) if count <= POINT else 1e-3 * cell
-    turns = "moment_balance" in patch.pressure.residuals
-    peak = _corner_layer(patch) + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
-    if count <= POINT and cell:
-        peak = max(peak, _wedge(patch))
-    peak = max(peak, missed_peak - mine["pressure_peak"])
-    moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
-    turned = ROUND * (abs(mine["approach"]) + np.ptp(patch.gap) + moved) + abs(mine["rotation"]) * aside * turns
+    peak = hidden.corner + (mine["pressure_peak"] / (4 * count**2) if cell and count <= FEW else 0.0)
+    peak = max(peak, hidden.wedge, hidden.missed - mine["pressure_peak"])
+    turned = ROUND * (abs(mine["approach"]) + hidden.spread) + abs(mine["rotation"]) * aside * hidden.turns
     fullness = mine["loaded_fraction"] / mine["pressure_peak"] if mine["pressure_peak"] else 0.0
     # an edge of a contact of few nodes lies anywhere in its cell
-    near = max(_offset(patch), 1.0 if count <= POINT else 1 / count**2)
-    off = near * edge_cells(patch.x, patch.active).sum() if patch.skin is None else 0.0
-    off += float(open_ends(patch))
+    near = max(hidden.offset, 1.0 if count <= POINT else 1 / count**2)
+    off = (0.0 if hidden.skin else near * sum(cells)) + hidden.open_ends
     return {"normal_load": 1e-10 * load, "pressure_peak": peak, "contact_fraction": off / length,
             "contact_half_width": off / 2, "loaded_fraction": peak * fullness,
             "pressure_centre": ROUND * length + aside, "moment": (ROUND * length + aside) * load,
-            "rotation": turned / length, "approach": ROUND * (np.ptp(patch.gap) + moved)}
+            "rotation": turned / length, "approach": ROUND * hidden.spread}
 
 
-def _offset(patch: Patch) -> float:
-    """Cells by which an edge may lie off its place between two nodes.
+def offset(pair, cell: float) -> float:
+    """Cells by which an edge may lie off its place between two nodes of a Pair; cell [m]: the longest there.
 
     A soft coating thinner than the cells is a bed of springs, whose edge lies where the pressure of a node vanishes.
     """
-    out, cell = OFFSET, max(edge_cells(patch.x, patch.active), default=0.0)
-    for grid, piece in ((patch.pair.grid, patch.pair.piece), (patch.pair.upper_grid, patch.pair.upper)):
+    out = OFFSET
+    for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
         if grid.coating > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             out = max(out, edges.behind(1.0) * min(1.0, cell / grid.coating) * (1 - min(ratio, 1 / ratio)))
     return out
 
 
-def _corner_layer(patch: Patch) -> float:
+def corner_layer(pair, sigma, cells) -> float:
     """Pressure [Pa] that the free end of a coating may add at a loaded corner, unresolved by cells longer than it is
-    thick; it falls with the square of the cells."""
-    thick = [grid.coating for grid in (patch.pair.grid, patch.pair.upper_grid) if grid.coating > 0]
-    sigma, cells = patch.pressure.sigma_n, np.diff(patch.x)
-    if not thick or patch.pieces is not patch.pair.compliance:  # a skin evens the pressure out
+    thick; it falls with the square of the cells. sigma [Pa], cells [m]: at both ends."""
+    thick = [grid.coating for grid in (pair.grid, pair.upper_grid) if grid.coating > 0]
+    if not thick:
         return 0.0
-    return max(CORNER * s * min(1.0, (h / min(thick))**2) for s, h in ((sigma[0], cells[0]), (sigma[-1], cells[-1])))
+    return max(CORNER * s * min(1.0, (h / min(thick))**2) for s, h in zip(sigma, cells, strict=True))
 
 
 def _wedge(patch: Patch) -> float:

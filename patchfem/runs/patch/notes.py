@@ -18,7 +18,7 @@ def left_out(model, patch, coarse) -> list:
     computed.
     """
     asked = model.patch
-    out = [*drawn_otherwise(patch.pair), *slender(asked, patch)]
+    out = [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper:
         out.append("static measures come from Gauss-Lobatto cells of order 4 where these have the smaller errors; the "
                    f"bilinear mesh of {patch.x.size} interface points serves fields and motion")
@@ -52,15 +52,15 @@ def drawn_otherwise(pair) -> list:
     return out
 
 
-def slender(asked, patch) -> list:
+def slender(asked, mean: float) -> list:
     """A note for each piece so tall that its bending moves the load sideways: the lever arm that grows with it is left
     out.
 
     The measure is the load over that under which the piece buckles, clamped at the holder and free at the patch (Euler,
     pi^2 E' L^2/48 H^2 as a mean pressure); what the motion lacks is about that share. A piece no taller than long bends
-    too little.
+    too little. mean [Pa]: pressure over the whole interface.
     """
-    out, mean = [], patch.pressure.load / patch.pieces.interface.weight.sum()
+    out = []
     for side in ("lower", "upper"):
         piece = getattr(asked, side)
         young, nu = piece.substrate.young, piece.substrate.poisson

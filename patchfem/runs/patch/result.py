@@ -37,8 +37,13 @@ def measured(model, patch, coarse) -> dict:
     A measure that is a difference of larger terms has the tolerance times those as floor: of the approach the rotation
     times half the length, of the centre of pressure half the length, of the moment the load times that.
     """
-    tolerance, arm = model.patch.mesh_tolerance or model.accuracy.tolerance, model.patch.length / 2
-    found = measures(patch, *coarse, tolerance=tolerance if model.patch.chosen else None)
+    tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
+    return floored(model, measures(patch, *coarse, tolerance=tolerance if model.patch.chosen else None))
+
+
+def floored(model, found: dict) -> dict:
+    """Measures with the floors of `measured`."""
+    arm = model.patch.length / 2
     terms = {"approach": abs(found["rotation"].value) * arm, "pressure_centre": arm,
              "moment": found["normal_load"].value * arm}
     return found | {name: replace(found[name], floor=max(found[name].floor, model.accuracy.tolerance * size))
@@ -58,17 +63,22 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 def strained(asked, patch) -> list:
     """Warnings where the answer leaves small strains, or where bilinear cells lock."""
+    beyond = ["the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches here; "
+              "lower the tilt or the load"] if beyond_gentle(patch) else []
+    return strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond)
+
+
+def strained_by(asked, top: float, approach: float, beyond=()) -> list:
+    """The warnings of `strained` from the largest nodal pressure [Pa] and the approach [m]; beyond: one in between."""
     out, pieces = [], (asked.lower, asked.upper)
     stuff = [m for piece in pieces for m in (piece.substrate, piece.coating and piece.coating.material) if m]
-    deep = patch.pressure.sigma_n.max(initial=0.0) / min(m.young for m in stuff)
-    closed = patch.pressure.approach / sum(piece.height for piece in pieces)
+    deep = top / min(m.young for m in stuff)
+    closed = approach / sum(piece.height for piece in pieces)
     for share, what in ((deep, "the peak pressure is {:.3g} of the lowest Young's modulus"),
                         (closed, "the approach is {:.3g} of the pieces' height")):
         if share > 0.02:
             out.append(what.format(share) + ", beyond the small strains that are assumed (0.02)")
-    if beyond_gentle(patch):
-        out.append("the contact reaches the place where a rounded end is 0.097 steep, beyond which nothing touches "
-                   "here; lower the tilt or the load")
+    out += beyond
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > 0.47:
         out.append(f"Poisson's ratio {stiff:g} in plane strain: bilinear cells lock towards 0.5; the pressure peak is "

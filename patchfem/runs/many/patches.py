@@ -1,0 +1,77 @@
+"""Static patches that share their pieces: pressed together, a pass per mesh for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core import Outcome
+from ...model.model import Model
+from ..patch import result as of_patch
+from ..patch.notes import slender
+from ..patch.shared import static
+from ..patch.shared.meshes import geometry_of
+from ..results.loose import loose
+from . import one_by_one
+from .answers import Answers, joined
+
+AT_ONCE = 1000  # cases whose forces are held at once
+
+
+class _Seen(NamedTuple):
+    """What `loose` asks of a result."""
+
+    plan: Any
+    measures: dict
+    patch: Any
+    extra: dict
+
+
+class _Plan(NamedTuple):
+    model: Model
+
+
+class _Nodes(NamedTuple):
+    x: np.ndarray
+
+
+def refuses(model: Model) -> str:
+    """Why a model is not pressed together with others; "" where it may be."""
+    return static.refuses(model.patch) if model.kind == "patch" else "it is no static patch"
+
+
+def group(model: Model) -> Hashable:
+    """Equal for models whose patches are pressed together."""
+    return geometry_of(model.patch), static.kind_of(model.patch), model.accuracy.tolerance
+
+
+def solve(models: Sequence[Model], say: Callable | None = None) -> Answers:
+    """Answers of a group; cases that do not press together with the others are run by themselves."""
+    begin, first, found = perf_counter(), models[0], []
+    for start in range(0, len(models), AT_ONCE):
+        found += static.solved([model.patch for model in models[start:start + AT_ONCE]], first.accuracy.tolerance)
+    out, single = Answers.blank(len(models)), [case for case, one in enumerate(found) if one is None]
+    area, nodes = first.patch.length * first.patch.width * first.patch.pairs, None
+    for case, (model, one) in enumerate(zip(models, found, strict=True)):
+        if one is None:
+            continue
+        nodes = nodes or {"interface_nodes": one.nodes}
+        measures = of_patch.floored(model, one.measures)
+        out.put(case, Outcome.DONE, measures, 0.0)
+        out.numerics[case] = nodes
+        seen = _Seen(_Plan(model), measures, _Nodes(np.broadcast_to(0.0, one.nodes)), {})
+        said = [*model.source.remarks, *of_patch.strained_by(model.patch, one.top, one.approach),
+                *loose(seen)]
+        if said:
+            out.warnings[case] = said
+        notes = [*slender(model.patch, measures["normal_load"].value / area), *one.band]
+        if notes:
+            out.notes[case] = notes
+    out.seconds[:] = (perf_counter() - begin) / len(models)
+    if not single:
+        return out
+    return joined(len(models), [(range(len(models)), out),
+                                (single, one_by_one.solve([models[case] for case in single], say))])

@@ -1,0 +1,79 @@
+"""Static patches pressed together, held against their own single runs: values, bars, warnings and notes."""
+
+import numpy as np
+import pytest
+from scene_texts import COATING, PIECE
+
+from patchfem.model.model import build
+from patchfem.runs.many import many, one_by_one, patches
+from patchfem.runs.many.meshes import meshed
+from patchfem.scene import scene
+
+TEXT = PIECE + '{}load = "{} N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING + "{}\n[accuracy]\ntolerance = 1e-2\n"
+TILT, LINE = '[contact.tilt]\nangle = "{} rad"\n', '[contact.load_line]\noffset = "{} m"\n'
+SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
+HOLDER, CROWN = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n', '[contact.crown]\nradius = "2 m"\n'
+PEAK = 1e-9  # of the pressure at an end of bare pieces, the mean over a cell of a micron: its digits end there
+PINNED = 'element_size = "0.2 mm"\n'  # no mesh has to be chosen
+
+
+def family(tables, *values, loads=(100.0, 600.0), size=PINNED):
+    texts = [TEXT.format(size, load, tables.format(value)) for value in values for load in loads]
+    return meshed([build(scene.loads(text)) for text in texts])
+
+
+def same(models, together=None):
+    """Answers of both ways; every case is held against its own run."""
+    mine, single = (together or many.answers)(models), one_by_one.solve(models)
+    assert mine.outcome.tolist() == single.outcome.tolist()
+    assert (mine.warnings, mine.notes, mine.numerics, mine.units) == \
+        (single.warnings, single.notes, single.numerics, single.units)
+    for name, values in single.values.items():
+        near = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
+        size = np.abs(values) + 1e-3 * np.abs(values).max()
+        for column, wanted in ((mine.values, values), (mine.errors, single.errors[name]),
+                               (mine.floors, single.floors[name])):
+            assert np.abs(column[name] - wanted).max() <= near * size.max(), name
+            assert (np.abs(column[name] - wanted) <= near * size).all(), name
+    return mine
+
+
+@pytest.mark.parametrize(("tables", "values"), [
+    (TILT, (-2e-4, 0.0, 1e-5, 1e-4)), (TILT + SKIN, (-1e-4, 1e-5, 2e-4)), (LINE, (-5e-3, -1e-3, 3e-3)),
+    (TILT + HOLDER, (1e-5, -2e-4))])
+def test_exact_together_as_one_by_one(tables, values):
+    models = family(tables, *values)
+    assert all(patches.refuses(model) == "" for model in models)
+    assert all(one is not None for one in patches.static.solved([model.patch for model in models], 1e-2))
+    same(models)
+
+
+def test_exact_together_as_one_by_one_on_a_mesh_chosen_for_them():
+    same(family(TILT + SKIN, -1e-4, 1e-3, loads=(100.0,), size=""))
+
+
+def test_exact_contacts_inside_the_interface_are_run_by_themselves():
+    same(family(CROWN + TILT, 1e-5, 1e-3))
+
+
+def test_exact_a_case_does_not_depend_on_its_neighbours():
+    models = family(TILT, -1e-4, 1e-5, 1e-3)
+    found, turned = many.answers(models), many.answers(models[::-1])
+    for name, values in found.values.items():
+        assert turned.values[name][::-1] == pytest.approx(values, rel=1e-9 if name in ("pressure_peak",
+                                                                                       "loaded_fraction") else 1e-12)
+
+
+def test_exact_opposite_tilts_have_the_same_contact():
+    found = many.answers(family(TILT, -2e-4, 2e-4, loads=(100.0,)))
+    for name, (left, right) in found.values.items():
+        sign = -1 if name in ("moment", "pressure_centre", "rotation") else 1
+        assert left == pytest.approx(sign * right, rel=1e-9), name
+
+
+def test_refuses_what_is_not_pressed_together():
+    lonely = build(scene.loads(TEXT.format("", 100.0, TILT.format(1e-4))))
+    assert "its own" in patches.refuses(lonely)
+    assert patches.refuses(family(TILT + SKIN.replace("linear", "hertz").replace(
+        'normal_stiffness = "1e14 Pa/m"', 'radius = "50 um"\ndensity = "1e9 1/m^2"\nheight_deviation = "1 um"'),
+        1e-4)[0]) == "strips or a smooth skin lie between the pieces"
