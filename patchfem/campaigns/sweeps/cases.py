@@ -49,6 +49,25 @@ class Cases:
         """The case as `table.key=value` strings."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
+    def spread(self, most: int) -> list[int]:
+        """Numbers of `most` cases or somewhat fewer, spread over all axes with the ends of each; all where there are no
+        more."""
+        if len(self) <= most:
+            return list(range(len(self)))
+        each = [1] * len(self.shape)
+        while True:
+            rising = [k for k, size in enumerate(self.shape) if each[k] < size]
+            k = min(rising, key=lambda k: each[k])
+            if prod(each) // each[k] * (each[k] + 1) > most:
+                break
+            each[k] += 1
+        places = [[round(j * (size - 1) / max(count - 1, 1)) for j in range(count)]
+                  for size, count in zip(self.shape, each)]
+        numbers = [0]
+        for size, some in zip(self.shape, places):
+            numbers = [number * size + place for number in numbers for place in some]
+        return numbers
+
     def keys(self, asked: Asked) -> list[str]:
         """Name of every case, made of what it computes: the same values in other units or another order, or as part of
         another sweep of the same scene, have the same name."""

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 from ...core import PatchfemError
+from ...model.model import Model
 from ...runs.many import many
 from ...runs.many.answers import Answers
+from ...runs.many.meshes import Shared
 from .asked import Asked
 from .cases import Cases
 
 TRIES = 3  # a case whose worker died is tried twice more
 SPAN = 1.0  # seconds that a chunk is to take: long beside its way to a worker, short beside a sweep
 MOST = 4096  # cases of a chunk
+LOOKED = 256  # cases that the meshes of a sweep are chosen by
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +26,15 @@ class Work:
     """What every worker needs to answer any case; it is sent to each once.
 
     tell(number, model or error, Answers, place in them): what is made of an answer beside its columns; keep(number,
-    Result): called after each run. Both are functions of a module, or objects that travel.
+    Result): called after each run. Both are functions of a module, or objects that travel. meshes: those that the cases
+    share, made from all of them by `with_meshes`.
     """
 
     asked: Asked
     cases: Cases
     tell: Callable | None = None
     keep: Callable | None = None
+    meshes: Shared | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +56,22 @@ def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> t
 
 def _model(work: Work, number: int):
     try:
-        return work.asked.model(work.cases.sets(number))
+        model = work.asked.model(work.cases.sets(number))
     except PatchfemError as error:
         return error
+    return model if work.meshes is None else work.meshes.given(model)
+
+
+def with_meshes(work: Work) -> Work:
+    """The work with the meshes that its cases share, whichever of them are still to be done."""
+    if work.meshes is not None:
+        return work
+    numbers, models = work.cases.spread(LOOKED), []
+    for number in numbers:
+        models.append(_model(work, number))
+        if isinstance(models[-1], Model) and models[-1].patch is None:
+            return work
+    return replace(work, meshes=Shared(models, len(numbers) == len(work.cases)))
 
 
 class Chunks:
@@ -92,7 +110,7 @@ def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = 
     executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
     every chunk that `take` hands out until it hands out none.
     """
-    chunks = Chunks(numbers, executor.workers)
+    work, chunks = with_meshes(work) if len(numbers) else work, Chunks(numbers, executor.workers)
     for chunk, seconds, found in executor.run(work, chunks.take, say):
         if isinstance(found, Died):
             lost = chunks.died(chunk)

@@ -2,31 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ...core import PatchfemError
 from ...model.model import Model
-from ..patch.shared.meshes import geometry_of, shared_meshes
+
+
+class Shared:
+    """The meshes of a sweep: by geometry and tolerance those that its cases share.
+
+    They depend on all the models that they are chosen by, not on their order. So a sweep makes them once of its cases,
+    before these are handed out in chunks. `all_`: there are no other cases beside these models.
+    """
+
+    def __init__(self, models: Iterable[Model | PatchfemError], all_: bool = True):
+        self.meshes, groups = {}, {}
+        for model in models:
+            if _wants(model):
+                groups.setdefault(_key(model), []).append(model.patch)
+        for key, patches in groups.items():
+            if len(patches) < 2:
+                continue
+            from ..patch.shared.meshes import shared_meshes
+
+            try:
+                self.meshes[key] = shared_meshes(patches, key[1], all_)
+            except PatchfemError:  # each case is told by its own run what is wrong
+                continue
+
+    def given(self, model: Model | PatchfemError) -> Model | PatchfemError:
+        """The model with the meshes that it shares; as it is where it shares none."""
+        meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
+        return model if meshes is None else replace(model, patch=replace(model.patch, meshes=meshes))
 
 
 def meshed(models: Sequence[Model | PatchfemError]) -> list:
-    """The models in their order, those of one geometry with meshes that they share; all others as they are.
+    """The models in their order, those of one geometry with meshes that they share; a patch that stands alone keeps the
+    mesh that its own run chooses."""
+    shared = Shared(models)
+    return [shared.given(model) for model in models]
 
-    The meshes depend on all the models that are given, not on their order. So a sweep calls it once with all its cases,
-    before these are handed out in chunks. A patch that stands alone keeps the mesh that its own run chooses.
-    """
-    out, groups = list(models), {}
-    for case, model in enumerate(models):
-        if isinstance(model, Model) and model.patch is not None and model.patch.meshes is None:
-            groups.setdefault((geometry_of(model.patch), model.accuracy.tolerance), []).append(case)
-    for (_, tolerance), cases in groups.items():
-        if len(cases) < 2:
-            continue
-        try:
-            meshes = shared_meshes([models[case].patch for case in cases], tolerance)
-        except PatchfemError:  # each case is told by its own run what is wrong
-            continue
-        for case in cases:
-            out[case] = replace(models[case], patch=replace(models[case].patch, meshes=meshes))
-    return out
+
+def _wants(model: Model | PatchfemError) -> bool:
+    return isinstance(model, Model) and model.patch is not None and model.patch.meshes is None
+
+
+def _key(model: Model) -> tuple:
+    from ..patch.shared.meshes import geometry_of
+
+    return geometry_of(model.patch), model.accuracy.tolerance

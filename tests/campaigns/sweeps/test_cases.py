@@ -77,3 +77,12 @@ def test_exact_a_case_is_the_scene_with_its_values_set():
         for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
             found, want = Asked(Path("a.toml"), text).scene(sets), loads(BENCH, "a.toml", sets)
             assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind
+
+
+def test_always_spread_cases_hold_the_ends_of_every_axis():
+    found = cases("normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s")
+    some = found.spread(100)
+    assert len(set(some)) == len(some) and 50 < len(some) <= 100 and all(0 <= one < len(found) for one in some)
+    for axis, size in enumerate(found.shape):
+        assert {0, size - 1} <= {found.places(one)[axis] for one in some}
+    assert found.spread(720) == list(range(720))

@@ -37,10 +37,11 @@ def geometry_of(asked) -> tuple:
             asked.gap.profile)
 
 
-def shared_meshes(patches, tolerance: float) -> Meshes | None:
+def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None:
     """Meshes for `PatchModel`s of one geometry, whatever their order; None where no case can be pressed.
 
-    tolerance: relative error of the static measures that all of them are to meet.
+    tolerance: relative error of the static measures that all of them are to meet; all_: there are no other cases that
+    the meshes have to serve.
     """
     asked = patches[0]
     if not asked.chosen:
@@ -48,7 +49,7 @@ def shared_meshes(patches, tolerance: float) -> Meshes | None:
     cases, every = spread(patches)
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grading.SWING]
-    layout = _layout([*cases, *swept], not every)
+    layout = _layout([*cases, *swept], not (every and all_))
     for share in START if layout is not None else ():
         levels, good = _climbed(cases, grading.grids_of(asked, layout.times(share)), tolerance, share > 1)
         if good or share == START[-1]:
