@@ -18,7 +18,8 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
     free motion is left in them (`left_over`). A release or a step is steady once it is at rest: its amplitude below the
     tolerance of the largest; else the same amplitudes decide, but a release never grows. A sweep or a recorded signal
     changes to the end: unless it leaves the interface stuck it is transient, without a steady estimate. So is an
-    interface that holds while what it holds still rises. level_cycles: of each level, 0 without levels; slowest: rate
+    interface that holds while what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`,
+    does not grow. level_cycles: of each level, 0 without levels; slowest: rate
     [1/s] at which the slowest mode decays.
     """
     if raw.outcome is Outcome.STUCK and still_loads(raw.window, drive.period, tolerance):
@@ -38,6 +39,8 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
             classify(amplitudes, tolerance, floor)
         return (Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome), measures
     outcome = classify(amplitudes, tolerance, floor)
+    if outcome is Outcome.GROWS and raw.bounded:
+        outcome = Outcome.TRANSIENT
     if outcome is Outcome.GROWS:
         return outcome, {k: replace(m, error=None) for k, m in measures.items()}
     steady, error = raw.steady

@@ -113,6 +113,12 @@ def virgin(table: Table, slide) -> Memory:
 def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
     """Stretch (a,) [m] of every element as given to `elements_of`, of the interface `face`; 0 where it carries
     nothing."""
+    out = sorted_stretches(group, memory, face)
+    return np.where(group.rank >= 0, out[group.rank], 0.0) if out.size else np.zeros(group.rank.size)
+
+
+def sorted_stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
+    """Stretch (t,) [m] of every element in the order of the yield slides, of the interface `face`."""
     out, y = np.zeros(group.yield_slide.size), group.yield_slide
     first = int(memory.slipping[face])
     out[:first] = memory.way[face] * y[:first]
@@ -120,4 +126,4 @@ def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
         end = int(memory.upto[face, k])
         out[first:end] = memory.side[face, k] * y[first:end] + memory.place[face] - memory.at[face, k]
         first = end
-    return np.where(group.rank >= 0, out[group.rank], 0.0) if y.size else np.zeros(group.rank.size)
+    return out

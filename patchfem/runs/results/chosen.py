@@ -7,11 +7,13 @@ def chosen(result) -> dict:
     """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
     behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch.
 
-    A choice that the run did not make is left out.
+    map: "events" or "yields" that a steady motion was found by. A choice that the run did not make is left out.
     """
     extra, patch, out = result.extra, result.patch, {}
     if (engine := extra.get("engine")) is not None:
         out["engine"] = engine
+    if (found := extra.get("map")) is not None:
+        out["map"] = found
     steps = extra.get("steps")
     if steps is not None:
         out["steps_per_cycle"] = int(steps)

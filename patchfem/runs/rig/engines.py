@@ -18,12 +18,13 @@ from ...response.coarser import Rung, space_rung
 from ...response.errors import change, step_error, tolerance_error
 from ...scene.rules import methods
 from ..effort import too_long
-from .pieces.costs import seconds_of_pieces, seconds_of_steps
+from .pieces.costs import pieces, seconds_of_pieces, seconds_of_steps
 from .smooth.choice import not_smooth
 
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
 LESS = 0.1  # tail of that run
+MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
 
 
 class Variant(NamedTuple):
@@ -81,6 +82,18 @@ def _met(model: Model, steady: bool = False) -> tuple:
     waveform = "" if steady or rig.kind == "free" else rig.waveform
     return (laws, model.soft, "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, waveform,
             spring)
+
+
+def steady_by(model: Model) -> str:
+    """How the steady motion of a model is found: by the map of "events" or of "yields", which are exact, or by a
+    "balance" of harmonics.
+
+    A scene that names its harmonics has its balance. So has one whose springs ring without end between yields.
+    """
+    if not no_closed_form(model, steady=True):
+        return "events"
+    named = model.accuracy.harmonics is not None
+    return "balance" if named or no_pieces(model) or pieces(model) > MOST_PIECES else "yields"
 
 
 def dearer_pieces(model: Model) -> str:
@@ -214,6 +227,12 @@ def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
     return [Rung((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
+def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
+    """Rungs of a steady motion: what it leaves open itself, and the mesh where its nodes make the elements."""
+    meshed = _pieces_in_space(model, numerics, patch, coarse, solution) if steady_by(model) == "yields" else []
+    return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
+
+
 COARSER = 30.0  # times the error of a step
 
 
@@ -229,7 +248,7 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
 EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
 PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rungs, _pieces_in_space)
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
-HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _own_errors, 0.0, None)
+HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _steady_in_space, 0.0, None)
 COMPARED = ("duhamel", "newmark", "euler")
 SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 5e-9, None)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(

@@ -8,10 +8,13 @@ from ...model.model import Model
 from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
-from .engines import no_pieces
+from .engines import no_pieces, steady_by
 from .numerics import choose, list_cost, quadrature_of
 from .pieces.costs import pieces, seconds_of_pieces, words
 from .smooth.choice import smooth_cost
+
+STEADY = {"events": "the map from event to event, exact", "yields": "the map from yield to yield, exact",
+          "balance": "harmonic balance"}
 
 
 def chain(rig) -> dict:
@@ -86,6 +89,8 @@ def sum_words(model: Model) -> list:
     if model.friction is None:
         return []
     numerics = choose(model)
+    if numerics.engine == "harmonic":
+        return [f"steady motion by {STEADY[steady_by(model)]}"]
     if not has(model.friction.law, "bonds"):
         return words(model, numerics.engine) if not no_pieces(model) else []
     found = quadrature_of(model, numerics)

@@ -4,10 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core import Measure, Outcome, Response
+from ...core import BaseSine, Measure, Outcome, Response
 from ...response.measures import harmonic
 from ...response.rows import Seen, measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
+
+POINTS = 121  # of a curve over frequency
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -21,7 +23,7 @@ class Solution:
     [m] below which a cycle sticks; own: what the run itself leaves open of its measures; errors: by measure, where the
     engine has them itself; summed: how bonds are, a Choice, None without a sum; halved: the run of levels at half the
     steps; extremes (c, 2) [m]: of the output in every cycle of the run, by which the outcome is judged, None where the
-    engine knows it; extra: for the report.
+    engine knows it; bounded: the steady amplitude is that of a motion known to exist; extra: for the report.
     """
 
     values: dict
@@ -46,6 +48,7 @@ class Solution:
     summed: object = None
     halved: object = None
     extremes: np.ndarray | None = None
+    bounded: bool = False
     extra: dict = field(default_factory=dict)
 
 
@@ -82,6 +85,20 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     return window.slide, slide, pull, work
 
 
+def drives_of(drive, count: int = POINTS) -> list:
+    """Sines of a curve: over a sweep `count` frequencies from end to end, over levels each of them."""
+    if hasattr(drive, "low"):
+        space = np.geomspace if drive.logarithmic else np.linspace
+        return [BaseSine(drive.acceleration, 2 * np.pi * f, drive.moving) for f in space(drive.low, drive.high, count)]
+    return [BaseSine(s.amplitude, s.omega, drive.moving) for s in drive.segments]
+
+
+def largest_of(amplitude) -> int:
+    """Number of the largest of amplitudes (k,) [m] that are finite."""
+    amplitude = np.asarray(amplitude, float)
+    return int(np.argmax(np.where(np.isfinite(amplitude), amplitude, -1.0)))
+
+
 def curve_measures(extra: dict) -> dict:
     """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude, to one spacing of its points.
 
@@ -90,10 +107,9 @@ def curve_measures(extra: dict) -> dict:
     curve = extra.get("curve")
     if curve is None:
         return {}
-    finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
-    k = int(np.argmax(finite))
+    k = largest_of(curve["amplitude"])
     spacing = float(np.abs(np.diff(curve["frequency"])).max(initial=0.0))
     return {"peak_frequency": Measure(float(curve["frequency"][k]), "Hz", spacing, spacing)}
 
 
-__all__ = ["Solution", "borne", "curve_measures", "measures_of", "sampled_loop", "seen"]
+__all__ = ["Solution", "borne", "curve_measures", "drives_of", "largest_of", "measures_of", "sampled_loop", "seen"]

@@ -6,20 +6,11 @@ from time import perf_counter
 import numpy as np
 
 from ...compiled import load
-from ...core import BaseSine, Outcome
+from ...core import Outcome
 from ...dynamics.events.steady_events import steady
 from ...dynamics.one_mode.steady import response
 from .exact import forces_of, run_exact
-
-POINTS = 121  # of a curve by the event map
-
-
-def drives_of(drive, count: int) -> list:
-    """Sines of a curve: over a sweep `count` frequencies from end to end, over levels each of them."""
-    if hasattr(drive, "low"):
-        space = np.geomspace if drive.logarithmic else np.linspace
-        return [BaseSine(drive.acceleration, 2 * np.pi * f, drive.moving) for f in space(drive.low, drive.high, count)]
-    return [BaseSine(s.amplitude, s.omega, drive.moving) for s in drive.segments]
+from .solution import drives_of, largest_of
 
 
 class Events:
@@ -41,21 +32,21 @@ class Events:
         here = replace(self.model.rig, drive=drive, start=found.start, levels=())
         raw = run_exact(replace(self.model, rig=here), few, self.patch)
         outcome = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}.get(found.regime, Outcome.STEADY)
-        extra = {"regime": found.regime, "multipliers": found.multipliers, "residual": found.residual}
+        extra = {"regime": found.regime, "multipliers": found.multipliers, "residual": found.residual,
+                 "map": "events"}
         raw = replace(raw, outcome=outcome, book=raw.book | {"iterations": 0.0}, seconds=perf_counter() - begin)
         return raw, {name: abs(v) * (1e-9 + found.residual) for name, v in raw.values.items()}, extra
 
     def curve(self, drive) -> tuple:
         """Curve as arrays by name, and the sine of its largest amplitude; None: the motion there is the only one."""
-        drives = drives_of(drive, POINTS)
+        drives = drives_of(drive)
         if self.modes.omega.size == 1 and len(self.modes.interfaces) == 1:
             curve = self._single(drives)
         else:
             names = ("frequency", "level", "amplitude", "regime", "multiplier")
             rows = [self._row(one) for one in drives]
             curve = {name: np.array(column) for name, column in zip(names, zip(*rows))}
-        finite = np.where(np.isfinite(curve["amplitude"]), curve["amplitude"], -1.0)
-        return curve, drives[int(np.argmax(finite))], None
+        return curve, drives[largest_of(curve["amplitude"])], None
 
     def _single(self, drives) -> dict:
         """The curve of one mode by its own map, compiled."""

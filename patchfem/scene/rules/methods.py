@@ -156,6 +156,8 @@ def _harmonic(m: Motion, method: str) -> str:
         return ""
     law = m.laws[0]
     if len(m.laws) > 1:
+        if not no_pieces([one.law for one in m.laws], m.soft, "", False, "", m.spring):
+            return ""
         return unbuilt("'harmonic' beside several interfaces where a law has no exact solution or a spring bends",
                        "march")
     if has(law.law, "set-valued") and not m.soft:

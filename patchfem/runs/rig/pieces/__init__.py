@@ -1,4 +1,5 @@
 """Rigs behind elastic-plastic elements, exactly from yield to yield.
 
-In: a Model, its Numerics and its solved patch. Out: the Solution of `run`; `costs` has where the march is cheaper.
+In: a Model, its Numerics and its solved patch. Out: the Solution of `run`; `costs` has where the march is cheaper,
+`steady` the motion that repeats, found directly.
 """

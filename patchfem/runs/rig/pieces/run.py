@@ -4,8 +4,9 @@ from time import perf_counter
 
 import numpy as np
 
-from ....core import BaseSine, Outcome
+from ....core import BaseSine, NotConverged, Outcome
 from ....dynamics.piecewise import elements, histories
+from ....dynamics.piecewise.steady import settled
 from ....dynamics.second_book import gap, sampled_work
 from ....friction.record import law_from
 from ....response import run_events
@@ -19,6 +20,8 @@ from ..exact import joined_runs, whole_cycles
 from ..interface import contact_model
 from ..solution import Solution, seen
 from .costs import refuse_endless
+
+CHANGES = 1e-2  # share of the tolerance by which windows may differ in a motion that has settled
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -35,15 +38,47 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
         done = histories.simulate(rig.modes, drive, found.groups, numerics.cycles, numerics.window, rig.travel, frames,
                                   progress, rig.start)
         levels, probe, done = (), None, whole_cycles(done)
+    return solution_of(model, numerics, patch, drive, found, done, perf_counter() - begin, levels=levels, probe=probe,
+                       prepare={"reduce": reduced, "load": loaded})
+
+
+def solution_of(model, numerics, patch, drive, found, done, seconds: float, **more) -> Solution:
+    """The Solution of a PieceRun through Interfaces `found`; more: other fields of it."""
     values = values_of(model, numerics, patch, drive, done)
-    stuck = found.holds(done)
-    rings, own = run_events.rings(done.window, rig.modes, drive, done.log)
-    outcome = done.outcome or (Outcome.STUCK if stuck else None)
-    ends = window_ends(done.amplitudes, done.phasors, numerics.window)
-    return Solution(values | rings, done.response, done.window, window_amplitudes(done.amplitudes, numerics.window),
-                    steady_of(drive, *ends), outcome, done.snapshots, done.ledger, perf_counter() - begin,
-                    found.contact, {"reduce": reduced, "load": loaded}, levels=levels, probe=probe, log=done.log,
-                    held=found.held, own=own, extremes=done.amplitudes)
+    rings, own = run_events.rings(done.window, model.rig.modes, drive, done.log)
+    outcome = done.outcome or (Outcome.STUCK if found.holds(done) else None)
+    amplitudes = window_amplitudes(done.amplitudes, numerics.window)
+    steady, bounded = None, False
+    if outcome is None and changes(amplitudes, model.accuracy.tolerance):
+        steady = settles(model.rig.modes, drive, found.groups, done)
+        bounded = steady is not None
+    if steady is None:
+        steady = steady_of(drive, *window_ends(done.amplitudes, done.phasors, numerics.window))
+    return Solution(values | rings, done.response, done.window, amplitudes, steady, outcome, done.snapshots,
+                    done.ledger, seconds, found.contact, log=done.log, held=found.held, own=own,
+                    extremes=done.amplitudes, bounded=bounded, **more)
+
+
+def changes(amplitudes, tolerance: float) -> bool:
+    """Whether amplitudes (w,) of successive windows still change by a share of the tolerance, or are too few to say."""
+    return amplitudes.size < 3 or np.ptp(amplitudes[-3:]) > CHANGES * tolerance * amplitudes[-1]
+
+
+def settles(modes, drive, groups, done) -> tuple | None:
+    """(amplitude [m], its error) of the stable motion that a run under a sine settles to, by the map of its yields.
+
+    None where the run does not end with a period of a sine, or where no such motion was found.
+    """
+    last = drive.segments[-1] if drive.segments else None
+    if last is None or not sinusoidal(drive) or last.constant != 0 or abs(done.cycles_done % 1) > 1e-9:
+        return None
+    try:
+        one = settled(modes, BaseSine(last.amplitude, last.omega, drive.moving), groups, *done.end)
+    except NotConverged:
+        return None
+    if np.abs(one.multipliers).max(initial=0.0) >= 1:
+        return None
+    return one.amplitude, one.amplitude * (1e-9 + one.residual)
 
 
 class Interfaces:

@@ -1,0 +1,190 @@
+"""Periodic motions by the map from yield to yield: closed form, long runs, finite differences, energies and limits."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import fsolve
+from test_piecewise import ONE, basis, random_rig
+
+from patchfem.core import BaseSine, NotConverged, PatchfemError, Start
+from patchfem.dynamics.piecewise.elements import elements_of
+from patchfem.dynamics.piecewise.histories import simulate
+from patchfem.dynamics.piecewise.period import PeriodMap, Point
+from patchfem.dynamics.piecewise.steady import settled, steady
+from patchfem.structure.drives import levels
+
+FACES = np.array([[1.0, 0.4], [0.3, -1.0]])
+PAIR = basis([1.0, 2.3], [0.01, 0.02], FACES[0], [1.0, 0.5], [1.0, 0.2], None, FACES)
+TWO = [elements_of([2.0, 1.0], [0.1, 0.3]), elements_of([1.5], [0.12])]
+
+
+def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
+    """Amplitude of one mode of frequency 1 behind one element, driven at `ratio` by a unit sine: the half period from
+    one turning point to the next, a stick and a slip, each by the exponential of its matrix."""
+    def moved(x, spring, force, phase, time):
+        matrix = np.zeros((5, 5))
+        matrix[0, 1], matrix[1, :2], matrix[1, 2], matrix[1, 4] = 1.0, (-1 - spring, -2 * zeta), -1.0, -force
+        matrix[2, 3], matrix[3, 2] = ratio, -ratio
+        return (expm(matrix * time) @ [*x, np.sin(phase), np.cos(phase), 1.0])[:2]
+
+    def misses(unknown):
+        top, phase, stick = unknown
+        held = moved((top, 0.0), stiffness, limit - stiffness * top, phase, stick)
+        end = moved(held, 0.0, -limit, phase + ratio * stick, np.pi / ratio - stick)
+        return held[0] - top + 2 * limit / stiffness, end[0] + top, end[1]
+
+    found = fsolve(misses, guess, xtol=1e-13)
+    assert np.abs(misses(found)).max() < 1e-13
+    return found[0]
+
+
+@pytest.mark.parametrize(("stiffness", "printed"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)])
+def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
+    found = steady(ONE, BaseSine(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])])
+    assert found.amplitude == pytest.approx(printed, abs=6e-10)
+    assert (found.regime, found.symmetric) == ("slides", True) and found.residual < 1e-13
+    assert np.abs(found.multipliers).max() < 1
+
+
+@pytest.mark.parametrize(("ratio", "limit"), [(1.0, 0.5), (1.2, 0.3), (0.7, 0.2), (1.4, 0.6)])
+def test_exact_one_element_in_closed_form(ratio, limit):
+    modes, group = basis([1.0], [0.05], [1.0], [1.0], [1.0]), [elements_of([3.0], [limit / 3])]
+    drive = BaseSine(1.0, ratio)
+    found = steady(modes, drive, group)
+    run = simulate(modes, drive, group, 1, window=1, start=found.start, memory=found.memory).response
+    top = np.argmax(run.slide)  # where a rough look has the turning point and the yield
+    stick = (run.slide[top:] > run.slide[top] - 2 * limit / 3).sum() / 400 * drive.period
+    want = jenkins_amplitude(3.0, limit, 0.05, ratio, (1.02 * found.amplitude, ratio * run.time[top] + 0.02, stick))
+    assert found.amplitude == pytest.approx(want, rel=1e-11)
+
+
+def against_march(seed, most, cycles):
+    """The motion that turns over has the amplitude of a long run; that found from its 60th cycle is the run's own."""
+    modes, drive, k, y = random_rig(seed, most)
+    group = [elements_of(k, y)]
+    found, run = steady(modes, drive, group), simulate(modes, drive, group, 60, window=1)
+    mine, long = settled(modes, drive, group, *run.end), simulate(modes, drive, group, cycles, window=1)
+    before = simulate(modes, drive, group, cycles - 1, window=1).end[0]
+    end = np.concatenate([long.end[0].z, long.end[0].v])
+    size = np.abs(end).max()
+    assert np.abs(end - np.concatenate([before.z, before.v])).max() < 1e-12 * size  # it repeats
+    assert found.amplitude == pytest.approx(long.swing, rel=1e-9)
+    assert np.abs(np.concatenate([mine.start.z, mine.start.v]) - end).max() < 1e-9 * size
+    assert max(found.residual, mine.residual) < 1e-12
+    assert np.abs(found.multipliers[0]) == pytest.approx(np.abs(mine.multipliers[0]), abs=1e-6)
+
+
+@pytest.mark.parametrize(("seed", "cycles"), [(101, 150), (109, 1050), (102, 250)])
+def test_exact_random_rigs_against_long_runs(seed, cycles):
+    against_march(seed, 200, cycles)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [seed for seed in range(112, 136) if seed != 123])  # 123 takes 30 000 cycles to repeat
+def test_exact_twenty_rigs_against_long_runs(seed):
+    against_march(seed, 200, 5000)
+
+
+def test_exact_two_interfaces_against_a_long_run():
+    found = steady(PAIR, BaseSine(1.0, 1.4), TWO)
+    long = simulate(PAIR, BaseSine(1.0, 1.4), TWO, 400, window=1)
+    assert found.amplitude == pytest.approx(long.swing, rel=1e-12)
+    again = simulate(PAIR, BaseSine(1.0, 1.4), TWO, 20, window=1, start=found.start, memory=found.memory)
+    np.testing.assert_allclose(again.end[0].z, found.start.z, rtol=1e-12)
+    np.testing.assert_allclose(again.end[0].v, found.start.v, rtol=1e-12)
+
+
+def columns(one, drive, point, half, step):
+    """Derivative of a map by central differences."""
+    out = []
+    for k in range(point.numbers.size):
+        move = step * np.eye(point.numbers.size)[k]
+        ends = [one(drive, point.moved(point.numbers + side * move), half, False).end.numbers for side in (1, -1)]
+        out.append((ends[0] - ends[1]) / (2 * step))
+    return np.array(out).T
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("rig", ["two interfaces", "elements"])
+def test_order_the_derivative_is_that_of_finite_differences(rig, half):
+    modes, drive, groups = PAIR, BaseSine(1.0, 0.7), TWO
+    if rig == "elements":
+        modes, drive, k, y = random_rig(104, 200)
+        groups = [elements_of(k, y)]
+    one, found = PeriodMap(modes, groups), steady(modes, drive, groups)
+    slope = one(drive, found.point, half).slope
+    assert slope.shape == (found.point.numbers.size,) * 2 and slope.shape[0] > 2 * modes.omega.size
+    # between two events the map is a sum of sines and exponentials: differences are of second order
+    misses = [np.abs(columns(one, drive, found.point, half, step) - slope).max() for step in (4e-6, 2e-6)]
+    assert misses[0] < 1e-6 * np.abs(slope).max()
+
+
+def test_exact_multipliers_are_those_of_a_marched_cycle():
+    """The eigenvalues of one cycle of the run itself, by differences of its end over its start."""
+    drive, groups = BaseSine(1.0, 1.4), TWO
+    found, one = steady(PAIR, drive, groups), PeriodMap(PAIR, groups)
+
+    def end(numbers):
+        point = found.point.moved(numbers)
+        done = simulate(PAIR, drive, groups, 1, window=1, start=Start(*point.motion.reshape(2, 2)),
+                        memory=one.placed(point))
+        return Point(np.concatenate([done.end[0].z, done.end[0].v]), done.end[1]).numbers
+
+    at = found.point.numbers
+    slope = np.array([(end(at + move) - end(at - move)) / 2e-6 for move in 1e-6 * np.eye(at.size)]).T
+    wanted = np.linalg.eigvals(slope)
+    wanted = wanted[np.argsort(-np.abs(wanted))]
+    np.testing.assert_allclose(np.sort_complex(wanted[:2]), np.sort_complex(found.multipliers[:2]), atol=1e-6)
+    assert np.abs(wanted[2:]).max() == pytest.approx(np.abs(found.multipliers[2:]).max(), abs=1e-5)
+
+
+@pytest.mark.parametrize("seed", [100, 105, 109])
+def test_exact_work_in_is_what_a_cycle_dissipates(seed):
+    modes, drive, k, y = random_rig(seed, 200)
+    found = steady(modes, drive, [elements_of(k, y)])
+    book = simulate(modes, drive, [elements_of(k, y)], 1, window=1, start=found.start, memory=found.memory).ledger
+    assert book["work_in"] == pytest.approx(book["viscous"] + book["friction"], abs=1e-12 * book["power"])
+    assert abs(book["stored"]) < 1e-12 * book["peak_stored"]
+
+
+def linear_amplitude(modes, drive, stiffness):
+    """Output of modes beside a spring, by the complex response."""
+    n, face = modes.omega.size, modes.slide
+    matrix = np.diag(modes.omega**2) + stiffness * np.outer(face, face) / modes.mass + \
+        1j * drive.omega * modes.dampers - drive.omega**2 * np.eye(n)
+    return drive.acceleration * abs(modes.output @ np.linalg.solve(matrix, modes.base))
+
+
+@pytest.mark.parametrize("seed", [100, 104, 112])
+@pytest.mark.parametrize("held", [True, False])
+def test_exact_limits_are_the_linear_response(seed, held):
+    """Elements that never yield are a spring, and elements without strength are nothing."""
+    modes, drive, k, y = random_rig(seed, 50)
+    found = steady(modes, drive, [elements_of(k, y * 1e6 if held else y * 0)])
+    assert found.regime == "stuck" and found.multipliers.size == 2 * modes.omega.size
+    assert found.amplitude == pytest.approx(linear_amplitude(modes, drive, k.sum() if held else 0.0), rel=1e-12)
+
+
+def test_exact_nearly_no_friction_is_a_perturbation():
+    """A limit L far below the drive: each harmonic of the square wave adds to the linear motion, first order in L."""
+    modes, drive = basis([1.0], [0.2], [1.0], [1.0], [1.0]), BaseSine(1.0, 1.3)
+    free = linear_amplitude(modes, drive, 0.0)
+    moves = [steady(modes, drive, [elements_of([1.0], [limit])]).amplitude - free for limit in (1e-8, 1e-9)]
+    assert moves[0] < 0 and moves[0] / moves[1] == pytest.approx(10.0, rel=1e-3)
+
+
+def test_always_a_point_nearby_leads_to_the_same_motion():
+    group, near = [elements_of([4.0, 2.0], [0.05, 0.2])], None
+    for ratio in np.linspace(0.8, 1.6, 9):
+        found = steady(ONE, BaseSine(1.0, ratio), group, near)
+        assert found.amplitude == pytest.approx(steady(ONE, BaseSine(1.0, ratio), group).amplitude, rel=1e-11)
+        near = found.point
+
+
+def test_refuses_what_does_not_repeat():
+    group = [elements_of([4.0], [0.05])]
+    with pytest.raises(PatchfemError, match="one sine that goes on"):
+        steady(ONE, levels([1.0, 2.0], 1.0, 5), group)
+    free = basis([1.0], [0.0], [1.0], [1.0], [1.0])
+    with pytest.raises(NotConverged, match="no periodic motion"):  # 0.7 is below pi/4
+        steady(free, BaseSine(1.0, 1.0), [elements_of([20.0], [0.7 / 20])])

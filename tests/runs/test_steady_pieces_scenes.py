@@ -1,0 +1,135 @@
+"""Scenes whose steady motion behind elastic-plastic elements is found by the map from yield to yield."""
+
+import numpy as np
+import pytest
+from support.scene_texts import COATED, DRIVE, KILOGRAM, MODE, PLASTIC, POINT, SECOND, SHEAR
+
+import patchfem as pf
+from patchfem.export.summary import summary_of
+
+RIG = POINT + PLASTIC + MODE + DRIVE
+STEADY = {"accuracy.method": "harmonic"}
+SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "6 g"\nfrom = "135 Hz"\nto = "150 Hz"\n' \
+        'rate = "80 Hz/s"\n'
+PAIR = """\
+[structure]
+masses = ["1 kg", "0.7 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "4e5 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "2e5 N/m"
+[[structure.damper]]
+between = [2, 0]
+coefficient = "40 N s/m"
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "5 um"
+load = "60 N"
+[[structure.interface]]
+between = [2, 1]
+law = "elastic-plastic"
+static = 0.2
+bond_length = "20 um"
+load = "40 N"
+[drive]
+kind = "force"
+mass = 2
+force = "30 N"
+frequency = "90 Hz"
+cycles = 25
+"""
+PHASES = ("drift_per_cycle", "energy_balance", "work_check")  # round-off
+
+
+def agree(steady, run, share=1e-8):
+    """Measures of a long run that are not those of its steady motion."""
+    return [(name, m.value, steady.measures[name].value) for name, m in run.measures.items()
+            if name in steady.measures and name not in PHASES and m.value is not None and name[:6] != "energy"
+            and m.unit != "J" and abs(m.value - steady.measures[name].value) > share * abs(m.value) + 1e-14]
+
+
+@pytest.mark.parametrize(("text", "cycles"), [(RIG, 300), (POINT + PLASTIC + MODE + SECOND + DRIVE, 300), (PAIR, 300)],
+                         ids=["one mode", "two modes", "two interfaces"])
+def test_exact_a_long_run_ends_in_the_steady_motion(text, cycles):
+    steady = pf.run(text, **STEADY)
+    run = pf.run(text, **{"accuracy.method": "exact", "drive.cycles": str(cycles)})
+    assert steady.outcome == run.outcome == "steady" and steady.extra["map"] == "yields"
+    assert agree(steady, run) == []
+    assert steady.measures["loop_area"].value == pytest.approx(run.measures["loop_area"].value, rel=1e-9)
+    assert steady.measures["relative_displacement_amplitude"].error < 1e-8 * run.measures[
+        "relative_displacement_amplitude"].value
+    assert np.abs(steady.extra["multipliers"]).max() < 1 and steady.extra["residual"] < 1e-12
+
+
+def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
+    exact, balance = pf.run(RIG, **STEADY), pf.run(RIG, **STEADY, **{"accuracy.harmonics": "31"})
+    assert "map" not in summary_of(balance)["numerics"] and balance.extra["harmonics"] == 31
+    assert summary_of(exact)["numerics"]["map"] == "yields"
+    for name in ("relative_displacement_amplitude", "slip_amplitude", "loop_area", "friction_force_peak"):
+        mine, other = exact.measures[name], balance.measures[name]
+        assert abs(mine.value - other.value) <= other.error + mine.error, name
+    first = np.abs(exact.extra["multipliers"][:2]), np.abs(balance.extra["multipliers"][:2])
+    assert first[0] == pytest.approx(first[1], rel=1e-2)
+
+
+def test_exact_a_patch_behind_its_shear_shows_its_own_stress():
+    """The frames of the steady motion are those of a long run, node by node."""
+    text, keys = COATED + SHEAR + PLASTIC + KILOGRAM + DRIVE, {"contact.element_size": "0.4 mm"}
+    keys |= {"drive.frequency": "120 Hz", "structure.mode.axial.damping": "0.05"}
+    steady, run = (pf.run(text, **keys, **more) for more in (
+        STEADY, {"accuracy.method": "exact", "drive.cycles": "120"}))
+    assert steady.extra["map"] == "yields" and agree(steady, run, 1e-7) == []
+    ours, theirs = steady.fields["shear_stress"][1:], run.fields["shear_stress"][1:]
+    np.testing.assert_allclose(ours, theirs, atol=1e-7 * np.abs(theirs).max())
+    assert steady.measures["relative_displacement_amplitude"].error > 0  # the mesh has its share
+
+
+def test_exact_a_curve_meets_the_point_at_its_peak():
+    curve = pf.run(POINT + PLASTIC + MODE + SWEEP, **STEADY)
+    found = curve.extra["curve"]
+    assert found["amplitude"].size == 121 and np.all(found["multiplier"] < 1)
+    best = int(np.argmax(found["amplitude"]))
+    assert curve.measures["peak_frequency"].value == found["frequency"][best]
+    for k in (0, best, 120):
+        keys = {"drive.frequency": f"{float(found['frequency'][k])!r} Hz", "drive.acceleration": "6 g"}
+        point = pf.run(RIG, **STEADY, **keys).measures["relative_displacement_amplitude"]
+        assert point.value == pytest.approx(found["amplitude"][k], rel=1e-9)
+
+
+def test_always_the_plan_names_the_map():
+    def said(text, **keys):
+        return " ".join(pf.plan(pf.load(text + '[accuracy]\nmethod = "harmonic"\n' + "".join(
+            f"{k} = {v}\n" for k, v in keys.items()))).verdict)
+
+    assert "steady motion by the map from yield to yield, exact" in said(RIG)
+    assert "steady motion by harmonic balance" in said(RIG, harmonics=15)
+    assert "steady motion by harmonic balance" in said(RIG.replace("1 um", "1e-8 um"))  # it rings without end
+
+
+def test_refuses_no_motion_that_grows():
+    """Below pi/4 an undamped mode at its own frequency is bounded by nothing: the balance says so."""
+    with pytest.raises(pf.NotConverged, match="undamped mode"):
+        pf.run(RIG, **STEADY, **{"structure.mode.axial.damping": "0", "drive.acceleration": "8 g"})
+
+
+@pytest.mark.parametrize("level", ["6 g", "8 g"])
+def test_exact_a_run_that_has_not_settled_tells_where_it_goes(level):
+    """Thirty cycles at resonance are far from enough, beyond the knee too: the steady amplitude is that of the map."""
+    run, steady = (pf.run(RIG, **{"drive.acceleration": level, "accuracy.method": method})
+                   for method in ("exact", "harmonic"))
+    assert run.outcome == "transient"
+    told, there = (one.measures[name] for one, name in (
+        (run, "relative_displacement_amplitude_steady"), (steady, "relative_displacement_amplitude")))
+    assert told.value == pytest.approx(there.value, rel=1e-9) and told.error < 1e-8 * told.value
+    assert run.measures["relative_displacement_amplitude"].value < 0.9 * told.value
+
+
+def test_exact_levels_tell_where_the_last_one_goes():
+    drive = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = 12\nlevels = ["3 g", "6 g"]\n'
+    run = pf.run(POINT + PLASTIC + MODE + drive, **{"accuracy.method": "exact"})
+    steady = pf.run(RIG, **STEADY, **{"drive.acceleration": "6 g"}).measures["relative_displacement_amplitude"].value
+    assert run.measures["relative_displacement_amplitude_steady"].value == pytest.approx(steady, rel=1e-9)
