@@ -21,7 +21,7 @@ Read the package in this order. A module imports its own entry of the list and t
 17. `wear`        worn depth over many cycles
 18. `runs`        patch, bench and rig: where the pillars meet
 19. `identify`    values from measurements with intervals
-20. `campaigns`   many runs: fits, error against cost
+20. `campaigns`   many runs: fits, error against cost, sweeps
 21. `export`      summary, netCDF, VTK, report
 22. `api`         load, build, plan and run from Python
 23. `commands`    the verbs of the command line
@@ -47,11 +47,13 @@ if TYPE_CHECKING:
         load,
         plan,
         run,
+        run_many,
+        sweep,
     )
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "load", "plan", "run"]
+           "SceneError", "build", "load", "plan", "run", "run_many", "sweep"]
 
 
 def __getattr__(name: str):

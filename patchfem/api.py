@@ -1,4 +1,4 @@
-"""The verbs for Python: `load` and `build` a scene, `plan` and `run` it, look at the `Result`.
+"""The verbs for Python: `load` and `build` a scene, `plan`, `run` and `sweep` it, look at the `Result`.
 
     import patchfem as pf
     result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from difflib import get_close_matches
 from pathlib import Path
@@ -22,16 +22,18 @@ from .runs.plan import plan as plan_model
 from .runs.results import result as found
 from .runs.run import run as run_plan
 from .scene.changed import Base
-from .scene.scene import Scene, SceneError, loads, with_files
+from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
-from .scene.sets import assignments
+from .scene.sets import assignments, texts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from xarray import Dataset
 
+    from .runs.many.answers import Answers
+
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "load", "plan", "run"]
+           "SceneError", "build", "load", "plan", "run", "run_many", "sweep"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
@@ -89,6 +91,53 @@ def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], Non
     what = scene if isinstance(scene, Plan) else plan(scene, **sets)
     done = run_plan(what, _on_stderr if say is None else say, progress)
     return Result(**{one.name: getattr(done, one.name) for one in fields(done)} | {"measures": Measures(done.measures)})
+
+
+def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
+          draw: int = 0, seed: int = 0, sobol: bool = False, jobs: int = 1, executor: str = "",
+          resume: bool = False) -> Dataset:
+    """Run a scene for all combinations of the values of some keys: the Dataset that sweep.nc holds.
+
+    `scene` as `load` takes it. over: key -> list of values, texts as in a scene or numbers in SI, or one text such as
+    "1e-6 rad..1e-2 rad:9"; left out, those of its table [sweep]. draw: so many cases in place of all combinations,
+    drawn with `seed` between the ends of ranges "1e-6 rad..1e-2 rad", by Sobol's sequence where asked; the cases then
+    are rows of one dimension `case`. out: the folder that `patchfem sweep -o` writes, with `resume` gone on with.
+    jobs: processes; executor: "dask" or "dask:ADDRESS". A case that is refused or fails has outcome "failed" and its
+    message; SceneError where no case is valid.
+    """
+    from .campaigns.sweeps import executors
+    from .campaigns.sweeps.ask import Request, cases_of
+    from .campaigns.sweeps.asked import Asked
+    from .export.sweeps.run import Place, sweep_into, swept
+    from .export.sweeps.tables import contents
+
+    asked = Asked(*_text_of(scene))
+    lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
+    request = Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
+    cases, by = cases_of(asked, request), executors.of(executor, jobs)
+    found = swept(asked, cases, by, _on_stderr) if out is None else \
+        sweep_into(asked, cases, Place(Path(out), resume), by, _on_stderr)
+    return contents(asked, cases, found, cases.keys(asked) if out is not None else ()).to_xarray()
+
+
+def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> Answers:
+    """Answers of many models, or of scenes as `load` takes them: a column per measure, a place per model.
+
+    Models that share work are run together, with the answers of single runs. A model that cannot run has outcome
+    "failed" and its message; SceneError for a mistake in a scene.
+    """
+    from .runs.many.many import answers
+
+    return answers([build(one) for one in models], say=_on_stderr if say is None else say)
+
+
+def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
+    """(path, text, --set strings) of a scene as `load` takes it, whether it is valid or not."""
+    if isinstance(scene, Scene):
+        return scene.path, scene.text, scene.sets
+    if isinstance(scene, str) and ("\n" in scene or "[" in scene):
+        return Path(TEXT), scene, ()
+    return Path(scene), text_of(scene), ()
 
 
 def _on_stderr(text: str) -> None:

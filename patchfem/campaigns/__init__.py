@@ -1,4 +1,4 @@
-"""Many runs of one scene: fits, error against cost, a scene before and after wear.
+"""Many runs of one scene: fits, error against cost, a scene before and after wear, sweeps.
 
 Read `cost` first.
 """

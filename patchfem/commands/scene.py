@@ -7,6 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .shared import Json, Refused, Sets, model_of, say, scene_of
+from .sweep import Over
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
@@ -31,12 +32,20 @@ def _faults(tables, folder: Path, whole: bool) -> list:
     return faults(tables, folder, whole)
 
 
-def plan(scene: Path, /, *, set_: Sets = (), json_: Json = False,
+def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
          probe: Annotated[bool, Parameter(negative=())] = False):
-    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; --probe solves the static patch."""
+    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; --probe solves the static patch.
+    With --over, or a table [sweep], of the whole sweep."""
     from ..runs.plan import plan as make
 
-    found = make(scene_of(scene, set_))
+    if what is not None and what.given():
+        _plan_sweep(scene, set_, what, json_)
+        return
+    read = scene_of(scene, set_)
+    if read.sweep:
+        _plan_sweep(scene, set_, Over(), json_)
+        return
+    found = make(read)
     answer, asked = found.as_json(), found.model.patch
     if probe and asked is not None:
         from ..runs.patch.result import probed
@@ -48,6 +57,20 @@ def plan(scene: Path, /, *, set_: Sets = (), json_: Json = False,
         print(json.dumps(answer))
         return
     _print_plan(answer, probe)
+
+
+def _plan_sweep(scene: Path, sets, what: Over, json_: bool) -> None:
+    """The plan of a sweep."""
+    from ..campaigns.sweeps.ask import asked_of
+    from ..campaigns.sweeps.estimate import estimate
+
+    answer = estimate(*asked_of(scene, sets, what.request()))
+    if json_:
+        print(json.dumps(answer))
+        return
+    _print_plan(answer, False)
+    print(f"sweep    {answer['cases']} cases of " + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
+          + f"; about {answer['seconds_per_case']:.2g} s each on one core, {answer['disk_bytes'] / 1e6:.2g} MB on disk")
 
 
 def _print_plan(answer: dict, probe: bool) -> None:

@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -18,65 +18,88 @@ FIRST = 5  # messages of failed cases that are printed
 @Parameter(name="*")
 @dataclass
 class Over:
-    """Which cases: --over table.key=v1,v2,... or table.key=low..high:n, may be repeated."""
+    """Which cases."""
 
     over: Annotated[tuple[str, ...], Parameter(name="--over", negative=(), help="table.key=v1,v2,... or "
-                                               "table.key=low unit..high unit:n (:9log, :9lin), may be repeated")] = ()
+                                               "table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated")] = ()
+    cases: Annotated[Path | None, Parameter(name="--cases", help="file.csv with a column `table.key [unit]` per key, a "
+                                            "case per row")] = None
+    random: Annotated[int, Parameter(name="--random", help="draw so many cases; a range is then 1 mm..9 mm")] = 0
+    sobol: Annotated[int, Parameter(name="--sobol", help="the same by Sobol's sequence, best in powers of 2")] = 0
+    seed: Annotated[int, Parameter(name="--seed", help="of the draws")] = 0
+
+    def given(self) -> bool:
+        """Whether any case is asked for."""
+        return bool(self.over or self.cases or self.random or self.sobol)
+
+    def request(self):
+        """The request; Refused where its parts do not stand together."""
+        from ..campaigns.sweeps.ask import Request
+
+        if self.random and self.sobol:
+            raise Refused("--random and --sobol: one of them draws the cases")
+        if min(self.random, self.sobol, self.seed) < 0:
+            raise Refused("--random, --sobol and --seed are whole numbers from 0 on")
+        if (self.random or self.sobol) and not self.over:
+            raise Refused("--random and --sobol want --over table.key=low..high to draw from")
+        return Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed)
 
 
 @Parameter(name="*")
 @dataclass
 class By:
-    """Who works: -j processes of this machine."""
+    """Who works, and on which part."""
 
-    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine; 1: this one")] = 1
+    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine")] = 1
+    executor: Annotated[str, Parameter(name="--executor", help="dask (a cluster on this machine) or dask:ADDRESS")] = ""
+    shard: Annotated[str, Parameter(name="--shard", help="i/n: the i-th of n parts only, into a folder that all "
+                                    "parts share")] = ""
+    collect: Annotated[bool, Parameter(name="--collect", negative=(), help="only write the tables of a sweep whose "
+                                       "shards are done")] = False
+
+    def part(self) -> tuple | None:
+        """(i, n) of a shard, None without one."""
+        if not self.shard:
+            return None
+        i, _, n = self.shard.partition("/")
+        if not (i.isdecimal() and n.isdecimal() and 1 <= int(i) <= int(n)):
+            raise Refused(f"--shard {self.shard}: i/n with i from 1 to n is wanted, such as 3/40")
+        return int(i), int(n)
 
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: Annotated[bool, Parameter(negative=(), help="go on with what the folder holds")] = False,
+          keep: Annotated[Literal["summaries", "results"], Parameter(help="of each case its summary.json, or its whole "
+                                                                     "results folder")] = "summaries",
           json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv and
     sweep.nc, by default in out/<scene name>-sweep."""
-    from ..export.sweeps.run import Place, sweep_into
+    from ..campaigns.sweeps import executors
+    from ..campaigns.sweeps.ask import asked_of
+    from ..export.sweeps.run import Place, collect, sweep_into
 
-    begin, talk = perf_counter(), (lambda text: None) if quiet else say
-    executor = executor_of(by or By())
-    asked, cases = asked_of(scene, set_, what or Over())
+    by = by or By()
+    begin, talk, part = perf_counter(), (lambda text: None) if quiet else say, by.part()
+    asked, cases = asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
+    if by.collect:
+        _answer(collect(asked, cases, target), target, json_, perf_counter() - begin)
+        return
     line = Progress(quiet)
     try:
-        found = sweep_into(asked, cases, Place(target, resume), executor, talk, line)
+        found = sweep_into(asked, cases, Place(target, resume, keep == "results", part),
+                           executors.of(by.executor, by.jobs), talk, line)
     except KeyboardInterrupt:
         line.end()
-        talk(f"interrupted; {line.done} of {len(cases)} cases are kept; go on with --resume: patchfem "
-             f"{shlex.join([*_words(), '--resume'])}")
+        talk(f"interrupted; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
+             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
         raise Ended(130) from None
     line.end()
+    if part is not None:
+        print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
+              f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
+        return
     _answer(found, target, json_, perf_counter() - begin)
-
-
-def asked_of(path: Path, sets, what: Over) -> tuple:
-    """(Asked, Cases) of the words of the command line; SceneError with every mistake at once."""
-    from ..campaigns.sweeps.ask import asked_of as read
-
-    return read(path, sets, what.over)
-
-
-def executor_of(by: By):
-    """Who answers the chunks."""
-    if by.jobs < 1:
-        raise Refused(f"sweep -j {by.jobs}: at least one process is wanted")
-    if by.jobs == 1:
-        from ..campaigns.sweeps.executors.here import Here
-
-        return Here()
-    from ..campaigns.sweeps.executors.pool import Pool
-
-    return Pool(by.jobs)
-
-
-def _words() -> list:
-    return [word for word in sys.argv[1:] if word != "--resume"]
 
 
 class Progress:
@@ -106,8 +129,6 @@ class Progress:
 def _answer(found, target: Path, json_: bool, seconds: float) -> None:
     from collections import Counter
 
-    from ..runs.many.answers import FAILED
-
     counts = dict(Counter(map(str, found.outcome)).most_common())
     failed = sorted(found.messages)
     if json_:
@@ -126,5 +147,5 @@ def _answer(found, target: Path, json_: bool, seconds: float) -> None:
         say("sweep.csv has the messages of all failed cases")
     if len(failed) == len(found):
         raise Refused("sweep: no case could be run")
-    if failed or FAILED in counts or "not_converged" in counts:
+    if failed or "not_converged" in counts:
         raise NotReached

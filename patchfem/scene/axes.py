@@ -253,8 +253,8 @@ def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> 
     first, last, unit = _ends(key, low, high)
     if count:
         raise ValueError(f"{low}..{high}:{count}: values are drawn between the ends; leave :{count} out")
-    if not first < last:
-        raise ValueError(f"{low}..{high}: the first end must lie below the second")
+    if first == last:
+        raise ValueError(f"{low}..{high}: both ends are the same value")
     return Span(key, float(first), float(last), unit, _is_log(first, last, how))
 
 

@@ -168,3 +168,62 @@ def test_refuses_a_second_writer(scene, tmp_path):
     (tmp_path / "a" / ".writer").write_text("1")
     answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
     assert answer.code == 4 and "another sweep (process 1)" in answer.err
+
+
+def test_exact_shards_make_the_same_files(swept, scene, tmp_path):
+    out = tmp_path / "swept"
+    for part in ("2/4", "1/4", "4/4"):
+        assert cli("sweep", scene, *OVER, "-o", out, "--shard", part).code == 0
+    early = cli("sweep", scene, *OVER, "-o", out, "--collect")
+    assert early.code == 4 and "1 of 6 cases have no answer" in early.err and not (out / "sweep.csv").exists()
+    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0
+    assert cli("sweep", scene, *OVER, "-o", out, "--collect").code == 3
+    for name in ("sweep.csv", "sweep.nc"):
+        assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
+
+
+def test_exact_whole_results_folders_are_kept(scene, tmp_path):
+    out = tmp_path / "swept"
+    over = ("--over", "friction.static=0.1,-1")
+    assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 3
+    good, bad = rows(out)
+    assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {one.name for one in
+                                                                   (out / "cases" / good["case"]).iterdir()}
+    assert [one.name for one in (out / "cases" / bad["case"]).iterdir()] == ["summary.json"]
+    before = (out / "sweep.csv").read_bytes()
+    assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "results").code == 3
+    assert (out / "sweep.csv").read_bytes() == before
+
+
+def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
+    table = tmp_path / "cases.csv"
+    table.write_text("normal.load [N],friction.static\n10,0.3\n20,0.4\n", encoding="utf-8")
+    assert cli("sweep", scene, "--cases", table, "--over", "drive.acceleration=1 g,5 g", "-o", tmp_path / "a").code == 0
+    keys = ("normal.load", "friction.static", "drive.acceleration")
+    assert [tuple(row[key] for key in keys) for row in rows(tmp_path / "a")] == \
+        [(*one, level) for one in (("10 N", "0.3"), ("20 N", "0.4")) for level in LEVELS]
+    with xr.open_dataset(tmp_path / "a" / "sweep.nc") as found:
+        assert dict(found.sizes) == {"case": 4} and found.normal_load.dims == ("case",)
+        np.testing.assert_array_equal(found.friction_static, [0.3, 0.3, 0.4, 0.4])
+
+
+@pytest.mark.parametrize("words, says", [
+    (["--random", "4"], "want --over"),
+    (["--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"], "one of them"),
+    (["--random", "4", "--over", "friction.static=0.1..0.2:3"], "leave :3 out"),
+    (["--over", "friction.static=0.1,0.2", "--shard", "5/4"], "--shard 5/4"),
+    (["--over", "friction.static=0.1,0.2", "-j", "0"], "at least one process"),
+    (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: unknown"),
+])
+def test_refuses_words_that_do_not_stand_together(scene, tmp_path, words, says):
+    answer = cli("sweep", scene, *words, "-o", tmp_path / "a")
+    assert answer.code == 2 and says in answer.err and not (tmp_path / "a").exists()
+
+
+def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):
+    told = json.loads(cli("plan", scene, *OVER, "--json").out)
+    one = json.loads(cli("plan", scene, "--json").out)
+    assert told["cases"] == 6 and told["values"] == {"normal.load": 3, "drive.acceleration": 2}
+    assert told["seconds"] == pytest.approx(6 * told["seconds_per_case"], rel=0.01)
+    assert (told["kind"], told["engine"], told["effects"]) == (one["kind"], one["engine"], one["effects"])
+    assert "6 cases of 3 normal.load, 2 drive.acceleration" in cli("plan", scene, *OVER).out

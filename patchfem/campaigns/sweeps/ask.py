@@ -3,42 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from ...scene.axes import read
+from ...scene.axes import Axis, read
 from ...scene.scene import SceneError, text_of
 from .asked import Asked
-from .cases import Cases
+from .cases import Cases, product
 
 LOOKED = 32  # cases that are read before a sweep starts, to find one that is valid
 SHOWN = 12  # mistakes that are printed
 
 
-def asked_of(path: Path, sets: Sequence[str], over: Sequence[str]) -> tuple[Asked, Cases]:
-    """The scene in a file and its cases: all combinations of `over` texts, or of the table [sweep] without any.
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Which cases are asked for.
 
-    SceneError names the mistakes of both, also where none of the cases that are looked at is a valid scene.
+    over: "table.key=values" texts; file: a table with a case per row, or None; count: cases to draw between the ends of
+    the ranges of `over`, 0 for all combinations, from Sobol's sequence or independent ones, by `seed`.
     """
+
+    over: Sequence[str] = ()
+    file: Path | None = None
+    count: int = 0
+    sobol: bool = False
+    seed: int = 0
+
+
+def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, Cases]:
+    """The scene in a file and its cases; SceneError as `cases_of`."""
     asked = Asked(Path(path), text_of(path), tuple(sets))
-    return asked, cases_of(asked, over)
+    return asked, cases_of(asked, request)
 
 
-def cases_of(asked: Asked, over: Sequence[str]) -> Cases:
-    """The cases of a scene; arguments as `asked_of`."""
-    axes, wrong = read(over)
-    if not over:
-        axes, wrong = asked.axes()
+def cases_of(asked: Asked, request: Request) -> Cases:
+    """The cases of a request: all combinations of what it names, or of the table [sweep] where it names nothing.
+
+    SceneError names the mistakes of scene and request, also where none of the cases that are looked at is valid.
+    """
+    parts, wrong = [], []
+    if request.file is not None:
+        rows, wrong = _rows(request.file)
+        parts += [rows] if rows is not None else []
+    axes, mistakes = read(request.over, request.count > 0)
+    wrong += [f"--over {one.removeprefix('--over ')}" for one in mistakes]
+    if not request.over and request.file is None:
+        axes, mistakes = asked.axes()
+        wrong += mistakes
+        if not axes and not mistakes:
+            wrong.append(f"{asked.path}: nothing to sweep over; add --over table.key=v1,v2,... or a table [sweep]")
+    twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
+    wrong += [f"--over {key}: stands in {request.file} too" for key in sorted(twice)]
     if wrong:
-        first = [f"{axis.key}={axis.texts[0]}" for axis in axes]
-        raise SceneError([*asked.mistakes(first), *(f"--over {one}" if over else one for one in wrong)])
-    if not axes:
-        raise SceneError([f"{asked.path}: nothing to sweep over; add --over table.key=v1,v2,... or a table [sweep]"])
-    cases = Cases(tuple(axes))
-    refuse_all(asked, cases)
+        first = [f"{axis.key}={axis.texts[0]}" for axis in (*axes, *(one for part in parts for one in part.axes))
+                 if isinstance(axis, Axis)]
+        raise SceneError([*asked.mistakes(first), *wrong])
+    if request.count and axes:
+        from .samples import drawn
+
+        parts.append(drawn(axes, request.count, request.sobol, request.seed))
+    elif axes:
+        parts.append(Cases(tuple(axes)))
+    cases = product(parts)
+    _refuse_all(asked, cases)
     return cases
 
 
-def refuse_all(asked: Asked, cases: Cases) -> None:
+def _rows(path: Path) -> tuple:
+    from .table import read as read_rows
+
+    return read_rows(path)
+
+
+def _refuse_all(asked: Asked, cases: Cases) -> None:
     """SceneError with the mistakes of cases spread over the sweep where none of these is a valid scene."""
     found, step = {}, max(1, len(cases) // LOOKED)
     for number in range(0, len(cases), step):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from math import prod
 
-from ...scene.axes import Axis, values_of
+from ...scene.axes import Axis
 from .asked import Asked
 
 
@@ -94,18 +94,3 @@ def product(parts: Sequence[Cases]) -> Cases:
                              tuple(axis.values[one[at]] for one in picked), axis.unit))
     return Cases(tuple(axes), True)
 
-
-def rows_of(columns: dict) -> Cases:
-    """Cases of rows: key -> a text per case; ValueError, a line per mistake, names key and value."""
-    axes, wrong = [], []
-    for key, texts in columns.items():
-        try:
-            unlike = values_of(key, dict.fromkeys(texts), distinct=False)
-        except ValueError as error:
-            wrong += [f"{key}: {line}" for line in str(error).split("\n")]
-            continue
-        known = dict(zip(unlike.texts, unlike.values))
-        axes.append(Axis(key, tuple(texts), tuple(known[text] for text in texts), unlike.unit))
-    if wrong:
-        raise ValueError("\n".join(wrong))
-    return Cases(tuple(axes), True)

@@ -83,13 +83,17 @@ class Chunks:
         self.deaths: dict[int, int] = {}
         self.each = SPAN  # seconds of a case, by the last chunk
 
-    def take(self) -> list | None:
-        """The next chunk; None where nothing is left for now."""
-        if self.alone:
-            return [self.alone.popleft()]
+    def take(self, idle: bool = True) -> list | None:
+        """The next chunk; None where nothing is left for now.
+
+        idle: whether a case that died with its chunk may be handed out, alone and after all others; not while cases are
+        on their way of which nobody could tell which one killed a worker.
+        """
+        if not self.left:
+            return [self.alone.popleft()] if self.alone and idle else None
         fair = -(-len(self.left) // (2 * self.workers))  # so that the last chunks end together
         count = max(1, min(int(SPAN / max(self.each, 1e-9)), MOST, fair))
-        return [self.left.popleft() for _ in range(min(count, len(self.left)))] or None
+        return [self.left.popleft() for _ in range(min(count, len(self.left)))]
 
     def done(self, numbers: Sequence[int], seconds: float) -> None:
         """Note how long a chunk took."""

@@ -61,6 +61,15 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
     return total
 
 
+def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None) -> Answers:
+    """Answers of the cases in memory alone."""
+    total = Answers.blank(len(cases))
+    for numbers, found, _ in solved(Work(asked, cases), range(len(cases)), executor, say):
+        _columns_only(found)
+        total.place(numbers, found)
+    return total
+
+
 def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
     """The tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
     keys = cases.keys(asked)

@@ -1,5 +1,6 @@
 """The cases of a sweep: which there are, in which order, under which names."""
 
+from dataclasses import replace
 from itertools import product as combinations
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 from scene_texts import BENCH
 
 from patchfem.campaigns.sweeps.asked import Asked
-from patchfem.campaigns.sweeps.cases import Cases, product, rows_of
+from patchfem.campaigns.sweeps.cases import Cases, product
 from patchfem.scene.axes import read
 from patchfem.scene.scene import loads
 
@@ -33,13 +34,11 @@ def test_exact_a_product_of_products_is_the_product():
 
 
 def test_exact_rows_beside_lists():
-    rows = rows_of({"normal.load": ["1 N", "2 N"], "friction.static": ["0.3", "0.3"]})
+    rows = replace(cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), rows=True)
     found = product([rows, cases("slide.speed=1 mm/s,2 mm/s")])
     assert found.rows and found.shape == (4,)
     assert [found.texts(number) for number in range(4)] == [
-        ("1 N", "0.3", "1 mm/s"), ("1 N", "0.3", "2 mm/s"), ("2 N", "0.3", "1 mm/s"), ("2 N", "0.3", "2 mm/s")]
-    with pytest.raises(ValueError, match=r"normal.load: .*'lbf'.*\nfriction.static: "):
-        rows_of({"normal.load": ["1 lb"], "friction.static": ["a"]})
+        ("1 N", "0.3", "1 mm/s"), ("1 N", "0.3", "2 mm/s"), ("2 N", "0.4", "1 mm/s"), ("2 N", "0.4", "2 mm/s")]
 
 
 def test_exact_a_name_says_what_is_computed():

@@ -13,11 +13,14 @@ from command_line import cli
 from deadly_cases import Deadly
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
+from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.here import Here
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Work, solved
+from patchfem.core import Missing, PatchfemError
 from patchfem.runs.many.answers import FAILED, Answers, joined
 from patchfem.scene.axes import read
 
@@ -51,11 +54,23 @@ def importable(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(SUPPORT), os.environ.get("PYTHONPATH", "")]))
 
 
-@pytest.mark.parametrize("once", [True, False], ids=["once", "always"])
+@pytest.mark.parametrize("once", [pytest.param(True, marks=pytest.mark.slow), False], ids=["once", "always"])
 def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, once):
+    one_case_only(tmp_path, once, Pool(2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("once", [True, False], ids=["once", "always"])
+def test_exact_a_killed_worker_of_a_cluster_costs_its_own_case_only(tmp_path, importable, once):
+    pytest.importorskip("distributed")
+    one_case_only(tmp_path, once, executors.of("dask", 2))
+
+
+def one_case_only(tmp_path: Path, once: bool, executor) -> None:
+    """Of cases that kill their worker, once or always, all others are as if nothing had died."""
     deadly = (3, 5) if once else (3,)
     asked = work(tell=Deadly(deadly, tmp_path, once))
-    found, told = all_of(asked, Pool(2))
+    found, told = all_of(asked, executor)
     want, _ = all_of(work(), Here())
     lost = [] if once else [3]
     rest = [number for number in range(8) if number not in lost]
@@ -64,7 +79,7 @@ def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, onc
     for number in deadly:
         assert len((tmp_path / str(number)).read_text()) == (1 if once else TRIES)
     for number in lost:
-        assert found.outcome[number] == FAILED and "killed" in found.messages[number]
+        assert found.outcome[number] == FAILED and "died" in found.messages[number]
 
 
 def test_exact_chunks_hand_out_every_case_once():
@@ -82,20 +97,43 @@ def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
     assert len(chunks.take()) == 50  # of a second
     chunks.done([0], 1e-6)
     assert len(chunks.take()) == 238  # a quarter of what is left, for two workers
-    assert chunks.died([5, 6]) == [] and chunks.take() == [5] and chunks.take() == [6]
-    assert chunks.died([5]) == [] and chunks.died([5]) == [5]
+
+
+def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
+    chunks = Chunks(range(3), 1)
+    assert chunks.take() == [0] and chunks.died([0]) == [] and chunks.take() == [1]
+    chunks.take()
+    assert chunks.take(idle=False) is None and chunks.take() == [0] and chunks.take() is None
+    assert chunks.died([0]) == [] and chunks.take() == [0] and chunks.died([0]) == [0] and chunks.take() is None
+
+
+def test_exact_a_cluster_answers_as_this_process_does():
+    pytest.importorskip("distributed")
+    found, _ = all_of(work(), Cluster("", 1))
+    want, _ = all_of(work(), Here())
+    same(found, want, range(8))
+
+
+def test_refuses_executors_that_are_not_there(monkeypatch):
+    with pytest.raises(PatchfemError, match="--executor slurm: unknown; dask or dask:ADDRESS"):
+        executors.of("slurm")
+    with pytest.raises(PatchfemError, match="-j 0: at least one"):
+        executors.of("", 0)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(Missing, match=r'pip install "patchfem\[cluster\]"'):
+        executors.of("dask")
 
 
 KILLED = """\
 import os, signal, sys
 from pathlib import Path
-from patchfem.campaigns.sweeps.ask import asked_of
+from patchfem.campaigns.sweeps.ask import Request, asked_of
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.export.sweeps.run import Place, sweep_into
 def told(done, total):
     if done > 3:
         os.kill(os.getpid(), signal.SIGKILL)
-sweep_into(*asked_of(Path(sys.argv[1]), (), sys.argv[3:]), Place(Path(sys.argv[2])), Pool(2), told=told)
+sweep_into(*asked_of(Path(sys.argv[1]), (), Request(sys.argv[3:])), Place(Path(sys.argv[2])), Pool(2), told=told)
 """
 
 

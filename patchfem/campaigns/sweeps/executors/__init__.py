@@ -1,5 +1,31 @@
 """Ways to work on the chunks of a sweep: in this process, in others beside it, on a Dask cluster.
 
 Each has `workers` and `run(work, take, say)`, which gives (chunk, seconds, answer or Died) of every chunk that `take`
-hands out. Read `here` first.
+hands out. `of` finds one by its name; read `here` first.
 """
+
+from ....core import PatchfemError
+
+
+def of(name: str = "", jobs: int = 1):
+    """The executor of a name: "" for `jobs` processes of this machine, this one alone where it is 1; "dask" for a Dask
+    cluster of `jobs` processes here (one per core where it is 1), "dask:ADDRESS" for that of a scheduler.
+
+    PatchfemError for another name or less than one process, Missing where Dask is not there.
+    """
+    if jobs < 1:
+        raise PatchfemError(f"-j {jobs}: at least one process is wanted")
+    kind, _, address = name.partition(":")
+    if kind == "dask":
+        from .cluster import Cluster
+
+        return Cluster(address, jobs if jobs > 1 else 0)
+    if name:
+        raise PatchfemError(f"--executor {name}: unknown; dask or dask:ADDRESS is wanted, or -j N without it")
+    if jobs == 1:
+        from .here import Here
+
+        return Here()
+    from .pool import Pool
+
+    return Pool(jobs)

@@ -1,0 +1,34 @@
+"""What a sweep would take, from the plans of a few of its cases; nothing is run."""
+
+from __future__ import annotations
+
+from ...core import PatchfemError
+from ...runs.plan import plan
+from .asked import Asked
+from .cases import Cases
+
+LOOKED = 9  # cases that are planned, spread over the sweep
+PAGE = 1.5  # seconds of a plan that go into files and the page of a run, which a case has not
+DISK = 6000  # bytes of a case in its folder and in the tables
+
+
+def estimate(asked: Asked, cases: Cases) -> dict:
+    """The plan of a sweep: that of its first valid case, with seconds of all cases on one core, the bytes that a case
+    needs at most, how many cases there are, how many values of each key, and bytes on disk.
+
+    PatchfemError where none of the planned cases can run.
+    """
+    plans, wrong = [], None
+    for number in range(0, len(cases), -(-len(cases) // LOOKED)):
+        try:
+            plans.append(plan(asked.model(cases.sets(number))))
+        except PatchfemError as error:
+            wrong = wrong or error
+    if not plans:
+        raise wrong
+    each = sum(max(one.seconds - PAGE, 0.0) for one in plans) / len(plans)
+    return plans[0].as_json() | {"seconds": round(each * len(cases), 2), "seconds_per_case": round(each, 4),
+                            "bytes": max(one.bytes for one in plans), "disk_bytes": DISK * len(cases),
+                            "cases": len(cases),
+                            "values": {axis.key: len(set(axis.texts)) for axis in cases.axes}}
+

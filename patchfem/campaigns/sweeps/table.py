@@ -1,0 +1,65 @@
+"""Cases from a comma-separated file: a column per key, with its unit in the header or in the cells, a case per row."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+from ...scene.axes import Axis, values_of
+from .cases import Cases
+
+_HEAD = re.compile(r"\s*([^\[\]]+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
+
+
+def read(path: Path) -> tuple[Cases | None, list[str]]:
+    """(cases, mistakes) of a file; every mistake names file, line and key."""
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            lines = [(number, [cell.strip() for cell in row]) for number, row in enumerate(csv.reader(file), 1)
+                     if any(cell.strip() for cell in row)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        return None, [f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"]
+    if len(lines) < 2:
+        return None, [f"{path}: a header like `{HEADER}` is wanted, and a row for each case below it"]
+    heads = [_HEAD.fullmatch(cell) for cell in lines[0][1]]
+    if not all(heads):
+        return None, [f"{path}:{lines[0][0]}: a header like `{HEADER}` is wanted, not '{','.join(lines[0][1])[:80]}'"]
+    wrong = [f"{path}:{number}: {len(heads)} cells are wanted, not {len(row)}" for number, row in lines[1:]
+             if len(row) != len(heads)]
+    keys = [head[1] for head in heads]
+    wrong += [f"{path}:{lines[0][0]}: {key}: stands twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    if wrong:
+        return None, wrong
+    axes = []
+    for place, (key, unit) in enumerate(head.groups() for head in heads):
+        axis, mistakes = _column(key, unit, [(number, row[place]) for number, row in lines[1:]])
+        axes.append(axis)
+        wrong += [f"{path}:{number or lines[0][0]}: {key}: {text}" for number, text in mistakes]
+    return (None, wrong) if wrong else (Cases(tuple(axes), True), [])
+
+
+def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
+    """The axis of a column of (line, cell), and its mistakes as (line or 0, text)."""
+    known, wrong = {}, []
+    for number, cell in cells:
+        if cell in known:
+            continue
+        if unit is not None and not _NUMBER.fullmatch(cell):
+            wrong.append((number, f"'{cell[:60]}' is no number; its unit stands in the header"))
+            continue
+        try:
+            known[cell] = values_of(key, [f"{cell} {unit}" if unit else cell])
+        except ValueError as error:
+            wrong.append((number, str(error)))
+            if str(error).startswith("not a key"):
+                return None, [(0, str(error))]
+    if wrong:
+        return None, wrong
+    parts = [known[cell] for _, cell in cells]
+    numbers = all(part.unit for part in parts)
+    texts = tuple(part.texts[0] for part in parts)
+    return Axis(key, texts, tuple(part.values[0] for part in parts) if numbers else texts,
+                parts[0].unit if numbers else ""), []

@@ -1,0 +1,37 @@
+"""Cases from a file: a column per key, a case per row."""
+
+import pytest
+
+from patchfem.campaigns.sweeps.table import read
+
+
+def written(tmp_path, text):
+    path = tmp_path / "cases.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
+    cases, wrong = read(written(tmp_path, "contact.load [lbf], contact.tilt.angle,friction.static,friction.law\n"
+                                          "26,1 mrad,0.3,coulomb\n\n10,2e-3 rad,0.3,tanh\n"))
+    assert wrong == [] and cases.rows and len(cases) == 2
+    assert cases.texts(0) == ("26 lbf", "1 mrad", "0.3", "coulomb")
+    load, tilt, static, law = cases.axes
+    assert load.values == (115.653761996773, 44.482216152605) and load.unit == "N"
+    assert tilt.values == (1e-3, 2e-3) and static.values == (0.3, 0.3) and law.values == ("coulomb", "tanh")
+
+
+@pytest.mark.parametrize("text, says", [
+    ("contact.load [lb]\n1\n2\n", ["cases.csv:2: contact.load: 'lb' is ambiguous", "cases.csv:3: contact.load"]),
+    ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' is no number",
+                                                        "cases.csv:3: friction.static: a plain number"]),
+    ("contact.lod [N]\n1\n2\n", ["cases.csv:1: contact.lod: not a key of a scene; did you mean 'load'"]),
+    ("contact.load [N],contact.load\n1,2 N\n", ["cases.csv:1: contact.load: stands twice"]),
+    ("contact.load [N]\n1,2\n", ["cases.csv:2: 1 cells are wanted, not 2"]),
+    ("contact.load [N]\n", ["a header like"]),
+])
+def test_refuses_each_mistake_with_its_line(tmp_path, text, says):
+    cases, wrong = read(written(tmp_path, text))
+    assert cases is None and len(wrong) == len(says)
+    for line, want in zip(wrong, says):
+        assert want in line

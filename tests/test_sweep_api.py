@@ -1,0 +1,78 @@
+"""pf.sweep and pf.run_many: many runs from Python, each as a single run."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scene_texts import BENCH, COULOMB, POINT, SHORT
+
+import patchfem as pf
+
+RIG = POINT + COULOMB + SHORT
+OVER = {"friction.static": [0.1, 0.3], "drive.acceleration": ["1 g", "5 g"]}
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return pf.sweep(RIG, OVER)
+
+
+def test_exact_each_place_is_a_single_run(swept):
+    assert dict(swept.sizes) == {"friction_static": 2, "drive_acceleration": 2}
+    for i, static in enumerate(OVER["friction.static"]):
+        for j, level in enumerate(OVER["drive.acceleration"]):
+            here = swept.isel(friction_static=i, drive_acceleration=j)
+            single = pf.run(RIG, **{"friction.static": static, "drive.acceleration": level})
+            assert here.outcome == single.outcome
+            for name, one in single.measures.items():
+                np.testing.assert_array_equal(here[name], np.nan if one.value is None else one.value)
+                np.testing.assert_array_equal(here[f"{name}_error"], np.nan if one.error is None else one.error)
+                assert here[name].units == one.unit
+
+
+def test_exact_numbers_texts_ranges_and_the_table_say_the_same(swept):
+    table = '[sweep]\n"friction.static" = "0.1,0.3"\n"drive.acceleration" = "1 g..5 g:2"\n'
+    numbers = {"friction.static": np.array([0.1, 0.3]), "drive.acceleration": swept.drive_acceleration.values}
+    for found in (pf.sweep(pf.load(RIG), numbers), pf.sweep(RIG + table)):
+        xr.testing.assert_equal(found, swept)
+
+
+def test_exact_a_folder_holds_the_same(swept, tmp_path):
+    found = pf.sweep(RIG, OVER, out=tmp_path / "a")
+    xr.testing.assert_equal(found.drop_vars("folder"), swept)
+    with xr.open_dataset(tmp_path / "a" / "sweep.nc") as kept:
+        xr.testing.assert_equal(kept, found)
+    xr.testing.assert_equal(pf.sweep(RIG, OVER, out=tmp_path / "a", resume=True), found)
+
+
+def test_exact_drawn_cases_lie_in_their_ranges_and_come_again():
+    ranges = {"friction.static": "0.1..0.5", "normal.load": "1 N..1 kN", "slide.speed": ["1 mm/s", "2 mm/s"]}
+    found = [pf.sweep(BENCH, ranges, draw=8, seed=seed, sobol=sobol) for seed, sobol in
+             ((1, True), (1, True), (2, True), (1, False))]
+    first = found[0]
+    assert dict(first.sizes) == {"case": 8}
+    assert ((0.1 <= first.friction_static) & (first.friction_static <= 0.5)).all()
+    assert set(first.slide_speed.values) == {1e-3, 2e-3}
+    xr.testing.assert_equal(first, found[1])
+    assert not (first.friction_static == found[2].friction_static).any()
+    assert not (first.friction_static == found[3].friction_static).any()
+    # eight points of Sobol's sequence have one value in each eighth of every range, the load in its logarithm
+    eighths = np.floor(8 * np.log(first.normal_load) / np.log(1e3)).astype(int)
+    assert sorted(eighths.values) == list(range(8))
+    assert sorted(np.floor(8 * (first.friction_static.values - 0.1) / 0.4).astype(int)) == list(range(8))
+    np.testing.assert_allclose(first.friction_force_peak, first.friction_static * first.normal_load, rtol=1e-12)
+
+
+def test_refuses_what_is_no_sweep():
+    with pytest.raises(pf.SceneError, match="nothing to sweep over"):
+        pf.sweep(RIG)
+    with pytest.raises(pf.SceneError, match=r"--over normal.load: .*'lbf'"):
+        pf.sweep(RIG, {"normal.load": ["1 lb"]})
+
+
+def test_exact_many_models_are_single_runs():
+    found = pf.run_many([RIG, pf.build(BENCH)])
+    for case, text in enumerate((RIG, BENCH)):
+        single = pf.run(text)
+        assert found.outcome[case] == single.outcome
+        assert all(found.values[name][case] == one.value for name, one in single.measures.items()
+                   if one.value is not None)
