@@ -63,6 +63,13 @@ class Asked:
         return sha256(json.dumps([__version__, tables, self.sets, files], sort_keys=True,
                                  default=str).encode()).hexdigest()
 
+    def meshed(self, keys: Sequence[str]) -> bool:
+        """Whether the cases have patches whose mesh is chosen, for all of them together; keys: those that change."""
+        tables = tomllib.loads(self.text)
+        given = {f"{table}.{key}" for table, held in tables.items() if isinstance(held, dict) for key in held}
+        given |= {one.partition("=")[0].strip() for one in self.sets} | set(keys)
+        return any(key.startswith("contact.") for key in given) and not {"contact.element_size", "contact.mesh"} & given
+
     def content(self, text: str) -> str:
         """Sign of the content of the file that a text names; "" where it names none."""
         path = self.path.parent / text

@@ -69,16 +69,18 @@ class Cases:
         return numbers
 
     def keys(self, asked: Asked) -> list[str]:
-        """Name of every case, made of what it computes: the same values in other units or another order, or as part of
-        another sweep of the same scene, have the same name."""
-        shared = asked.digest()
+        """Name of every case, made of what it computes: the same values in other units or another order have the same
+        name, and also as part of another sweep of the same scene, unless all cases of a sweep share a mesh that is
+        chosen for them.
+        """
         marks = [[json.dumps([axis.key, value, asked.content(value) if isinstance(value, str) else ""])
                   for value in axis.values] for axis in self.axes]
-        out = []
-        for number in range(len(self)):
-            own = sorted(mark[place] for mark, place in zip(marks, self.places(number)))
-            out.append(sha256("\n".join([shared, *own]).encode()).hexdigest()[:16])
-        return out
+        owns = ["\n".join(sorted(mark[place] for mark, place in zip(marks, self.places(number))))
+                for number in range(len(self))]
+        shared = asked.digest()
+        if asked.meshed([axis.key for axis in self.axes]):
+            shared = sha256("\n\n".join([shared, *sorted(owns)]).encode()).hexdigest()
+        return [sha256(f"{shared}\n{own}".encode()).hexdigest()[:16] for own in owns]
 
 
 def product(parts: Sequence[Cases]) -> Cases:

@@ -13,7 +13,7 @@ from ...core import Missing
 from ...runs.many.answers import Answers
 from .. import netcdf
 from .folder import Folder, Summaries, Whole
-from .tables import columns, contents, write_csv
+from .tables import contents, write_csv
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
 
 def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder) -> None:
     """Write sweep.csv and sweep.nc of all cases, and drop the cases of other sweeps from the folder."""
-    write_csv(columns(cases, found, folder.keys), folder.target / "sweep.csv")
+    write_csv(cases, found, folder.keys, folder.target / "sweep.csv")
     netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
     folder.drop_others()
 

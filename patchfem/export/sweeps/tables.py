@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from ...scene.reader import owner_of
 from .. import netcdf
 from ..summary import versions
 
+BLOCK = 1000  # cases whose texts are made at once
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 
 
@@ -30,26 +31,32 @@ def names_of(found: Answers) -> list[str]:
     return sorted(found.values, key=lambda name: (ORDER.get(rows.of_first(name), len(ORDER)), name))
 
 
-def columns(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> dict[str, list]:
-    """Columns of sweep.csv by name: the swept keys as written, outcome, every measure in SI, then the message of a
-    failed case and the name of its folder. "" stands for what a case has not.
-    """
-    texts = list(zip(*(cases.texts(number) for number in range(len(cases)))))
-    out = {axis.key: list(column) for axis, column in zip(cases.axes, texts)}
-    out["outcome"] = [str(one) for one in found.outcome]
-    for name in names_of(found):
-        out[name] = ["" if value != value else repr(value) for value in found.values[name].tolist()]
-    out["message"] = [found.messages.get(number, "") for number in range(len(cases))]
-    return out | ({"case": list(keys)} if keys else {})
+def head(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> list[str]:
+    """Names of the columns of `lines`."""
+    measures = [text for name in names_of(found) for text in (name, f"{name}_error")]
+    return [*(axis.key for axis in cases.axes), "outcome", *measures, "message", *(["case"] if keys else [])]
 
 
-def write_csv(table: dict[str, list], path: Path) -> Path:
-    """Write columns to `path`, whole beside it first and then renamed."""
+def lines(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> Iterator[list[str]]:
+    """A line of sweep.csv per case: the swept keys as written, outcome, every measure with its error in SI, then the
+    message of a failed case and the name of its folder where `keys` are given. "" stands for what a case has not."""
+    names = names_of(found)
+    for first in range(0, len(cases), BLOCK):  # the texts of all cases would fill the memory
+        numbers = range(first, min(first + BLOCK, len(cases)))
+        block = [["" if value != value else repr(value) for value in part[name][first:numbers.stop].tolist()]
+                 for name in names for part in (found.values, found.errors)]
+        for number, *cells in zip(numbers, *block):
+            yield [*cases.texts(number), str(found.outcome[number]), *cells, found.messages.get(number, ""),
+                   *([keys[number]] if keys else [])]
+
+
+def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> Path:
+    """Write sweep.csv to `path`, whole beside it first and then renamed."""
     partial = path.with_name(path.name + ".partial")
     with open(partial, "w", newline="", encoding="utf-8") as file:
         out = csv.writer(file)
-        out.writerow(table)
-        out.writerows(zip(*table.values()))
+        out.writerow(head(cases, found, keys))
+        out.writerows(lines(cases, found, keys))
     partial.replace(path)
     return path
 
@@ -78,7 +85,7 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
     if keys:
         texts["folder"] = (keys, "folder of the case below cases/")
     for name, (values, text) in texts.items():
-        data[name] = (dims, np.asarray(values, object).astype(str).reshape(cases.shape), {"long_name": text})
+        data[name] = (dims, np.array(values, object).reshape(cases.shape), {"long_name": text})
     return netcdf.Contents(data, coordinates, {
         "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
         "source": f"patchfem {__version__}", "scene": asked.text, "sets": json.dumps(list(asked.sets)),

@@ -5,7 +5,7 @@ from itertools import product as combinations
 from pathlib import Path
 
 import pytest
-from scene_texts import BENCH
+from scene_texts import BENCH, PATCH, SMALL_PATCH
 
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases, product
@@ -50,6 +50,15 @@ def test_exact_a_name_says_what_is_computed():
     assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").keys(asked)) & set(one) == set(one[:2])
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
     assert cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").keys(Asked(Path("a.toml"), swept)) == one
+
+
+def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
+    pinned, chosen = Asked(Path("a.toml"), SMALL_PATCH), Asked(Path("a.toml"), PATCH)
+    one, two = cases("contact.load=1 N,2 N"), cases("contact.load=1 N,3 N")
+    assert one.keys(pinned)[0] == two.keys(pinned)[0] and one.keys(chosen)[0] != two.keys(chosen)[0]
+    assert one.keys(chosen) == cases("contact.load=2 N,1e-3 kN").keys(chosen)[::-1]
+    sets = Asked(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
+    assert one.keys(sets)[0] == two.keys(sets)[0]
 
 
 @pytest.mark.parametrize("other", [Asked(Path("a.toml"), BENCH.replace("5 mm/s", "6 mm/s")),
