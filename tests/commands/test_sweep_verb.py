@@ -46,7 +46,7 @@ def test_exact_every_case_is_a_single_run(swept, scene):
         assert row["outcome"] == single.outcome and row["message"] == ""
         for name, one in single.measures.items():
             assert row[name] == ("" if one.value is None else repr(one.value)), name
-            assert row[f"{name}_error"] == ("" if one.error is None else repr(one.error)), name
+            assert row[f"{name}_error"] == ("" if one.error is None else repr(float(one.error))), name
         kept = json.loads((out / "cases" / row["case"] / "summary.json").read_text())
         assert kept["case"] == sets and kept["kind"] == "rig" and kept["outcome"] == single.outcome
         assert kept["warnings"] == single.warnings and kept["notes"] == single.notes
