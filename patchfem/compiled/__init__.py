@@ -4,8 +4,8 @@ Numba's own cache notices only a change of the file that holds the function, not
 is handed another one as an argument is never cached at all, so a loop that should run with any law is a text of its own
 per law: `instance` writes it beside the compiled code, with the import of the law exchanged.
 
-`load` and `instance` give `Kernels`, which import the module of compiled code, and with it numba, only where a function
-of it is called whose machine code is not kept yet (`machine`).
+`inner` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
+and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`).
 """
 
 import ast
@@ -19,18 +19,19 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import version
 from importlib.util import module_from_spec, spec_from_file_location
+from operator import add, mul, neg, pos, sub, truediv
 from pathlib import Path
 
 from . import machine
 
 HERE = Path(__file__).parents[1]  # the package
-PLAIN = (ast.Constant, ast.Name, ast.Load, ast.Tuple, ast.BinOp, ast.UnaryOp, ast.operator, ast.unaryop)  # arithmetic
+ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
 
 def kernel_key() -> str:
-    """Hash of every *kernels.py of the package, the numba version, the kind of CPU and what it can do."""
+    """Hash of every *kernels.py of the package, how they are compiled, the kind of CPU and what it can do."""
     digest = hashlib.sha256()
-    for source in sorted(HERE.rglob("*kernels.py")):
+    for source in (HERE / "compiled" / "inner.py", *sorted(HERE.rglob("*kernels.py"))):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
     made_by = f"{version('numba')} {version('llvmlite')} {sys.version_info[:2]}"
     digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())
@@ -133,14 +134,30 @@ def _constants(path: Path) -> dict:
     out = {}
     for line in ast.parse(path.read_text("utf-8")).body:
         if isinstance(line, ast.Assign) and len(line.targets) == 1:
-            if any((isinstance(part, ast.Name) and part.id not in out) or not isinstance(part, PLAIN)
-                   for part in ast.walk(line.value)):
+            try:
+                value, target = _value(line.value, out), line.targets[0]
+            except KeyError:
                 continue
-            value, target = eval(compile(ast.Expression(line.value), str(path), "eval"), {}, out), line.targets[0]
             names = target.elts if isinstance(target, ast.Tuple) else [target]
             values = value if isinstance(target, ast.Tuple) else [value]
             out |= {name.id: one for name, one in zip(names, values) if isinstance(name, ast.Name)}
     return out
+
+
+def _value(node: ast.expr, names: dict):
+    """What an expression stands for: constants and these names with arithmetic between them; KeyError for others."""
+    match node:
+        case ast.Constant():
+            return node.value
+        case ast.Name():
+            return names[node.id]
+        case ast.Tuple():
+            return tuple(_value(one, names) for one in node.elts)
+        case ast.UnaryOp():
+            return ARITHMETIC[type(node.op)](_value(node.operand, names))
+        case ast.BinOp():
+            return ARITHMETIC[type(node.op)](_value(node.left, names), _value(node.right, names))
+    raise KeyError(ast.unparse(node))
 
 
 @cache

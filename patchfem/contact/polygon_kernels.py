@@ -5,8 +5,9 @@ polygon that they enclose. `sets` is a `press_kernels.SetArrays`.
 """
 
 import numpy as np
-from numba import njit
 from numba.core.options import DefaultOptions
+
+from ..compiled.inner import njit
 
 LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 NOISE = 1e-13  # of the largest term: what counts as nothing

@@ -12,8 +12,8 @@ definite C (Murty, Opsearch 11, 1974). NumPy twin: `contact_sets.ContactSets`.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..compiled.inner import njit
 from .polygon_kernels import LEAN, NOISE, outline, within
 
 FAST = {"reassoc", "contract", "arcp"}

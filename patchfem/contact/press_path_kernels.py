@@ -1,8 +1,8 @@
 """Compiled mean of the contact forces along a straight increment of the holder's motion, from set to set."""
 
 import numpy as np
-from numba import njit
 
+from ..compiled.inner import njit
 from .polygon_kernels import LEAN, way_out, within
 from .press_kernels import LEAST, holds, locate, pull
 

@@ -1,8 +1,8 @@
 """Small dense systems of the step solves, compiled: Cholesky factors of symmetric ones, elimination of others."""
 
 import numpy as np
-from numba import njit
 
+from ..compiled.inner import njit
 from ..friction.flags_kernels import FAST, LEAN
 
 

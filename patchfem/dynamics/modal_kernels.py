@@ -5,8 +5,8 @@ modal accelerations that are constant over the step.
 """
 
 import numpy as np
-from numba import njit
 
+from ..compiled.inner import njit
 from ..friction.flags_kernels import FAST, LEAN
 
 

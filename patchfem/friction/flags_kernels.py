@@ -3,8 +3,9 @@
 Fast-math is limited to what keeps NaN and infinity meaningful.
 """
 
-from numba import njit
 from numba.core.options import DefaultOptions
+
+from ..compiled.inner import njit
 
 # no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
 LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}

@@ -5,8 +5,8 @@ speed; or 1, limit, 0, whether as printed, and the numbers of its law. The text 
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import tanh_kernels as law
 from ..modal_kernels import narrowed

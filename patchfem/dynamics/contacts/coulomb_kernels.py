@@ -4,8 +4,7 @@ The functions are those that `march.loop_kernels` asks of every contact. eps[0] 
 at the end of a step that slides there [N].
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import coulomb_kernels as law
 from .stop_kernels import through

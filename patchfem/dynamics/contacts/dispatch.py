@@ -12,7 +12,7 @@ SIGNATURES = {"closed": "num, mem, e, free, beta", "middle": "num, mem, e, v, dt
 MARCHED = ("closed", "middle", "mean", "commit", "state")  # what a march asks of a law
 HEAD = '''"""Laws side by side: num[e, 0] says which one is meant. Written by patchfem.dynamics.contacts.dispatch."""
 
-from numba import njit
+from patchfem.compiled.inner import njit
 
 {imports}
 from patchfem.friction.flags_kernels import LEAN

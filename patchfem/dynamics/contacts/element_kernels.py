@@ -4,8 +4,7 @@ Such are elements side by side, a law of the speed, points that slide alike. The
 `march.loop_kernels` asks of every contact.
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from . import element_solve_kernels as solver

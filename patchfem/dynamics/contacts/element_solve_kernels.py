@@ -1,7 +1,6 @@
 """Slide of one element over a step: its law against what the modes give, in closed form or for any law with a slope."""
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from ..modal_kernels import narrowed

@@ -4,8 +4,8 @@ The functions are those that `march.loop_kernels` asks of every contact.
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.bonds.list_kernels import list_mean, list_slope, list_step
 from ...friction.bonds.list_sum_kernels import MOMENTS, POWER
 from ...friction.flags_kernels import LEAN

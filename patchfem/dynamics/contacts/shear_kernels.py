@@ -3,8 +3,7 @@
 The functions are those that `march.loop_kernels` asks of every contact.
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.bonds.point_kernels import bond_step, grow, loose_step
 from ...friction.flags_kernels import LEAN
 from .shear_points_kernels import DENSITY, LOAD, MOVED, PLAY, POINTS, SLIDE, SQUARE, STRETCH

@@ -4,8 +4,7 @@ The points are bonds of the stretch reading with p = 1, or elastic-plastic. A st
 the load in the row LOAD; at its `ending` they are those after the slide.
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.bonds.point_kernels import bond_mean, loose_mean, shape
 from ...friction.flags_kernels import FAST, LEAN
 

@@ -8,8 +8,8 @@ the slope along the step finds them. c: `arrays.Sheared`, or a tuple with its fi
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.bonds.point_kernels import grow
 from ...friction.flags_kernels import FAST, LEAN
 from ..dense_kernels import factor, solve

@@ -10,8 +10,7 @@ never gives energy: where it would, it is solved by the mean force alone, which 
 
 from math import sqrt
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws.coulomb_kernels import stick
 

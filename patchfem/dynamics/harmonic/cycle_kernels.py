@@ -6,8 +6,8 @@ elements. Plain twins are in the tests.
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 
 

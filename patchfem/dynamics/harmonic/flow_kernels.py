@@ -3,8 +3,7 @@
 Between two samples the slide moves straight, at the speed of the step; forces are those at the samples, at their speed.
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import stretch_kernels as law
 

@@ -1,7 +1,6 @@
 """A compiled law without memory along the samples of a cycle; the text runs with any law of the speed."""
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import tanh_kernels as law
 

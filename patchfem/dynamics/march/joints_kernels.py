@@ -8,8 +8,8 @@ with any patch and any laws: `joints` makes an instance per set of them.
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws.coulomb_kernels import stick

@@ -1,7 +1,6 @@
 """`joints_stops_kernels` of a loop in which no law is set-valued: nothing to do, and nothing to compile."""
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 
 

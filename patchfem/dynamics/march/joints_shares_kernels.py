@@ -6,8 +6,8 @@ others hold it carries its static friction. Read `joints_stops_kernels` first, w
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ..dense_kernels import factor, solve
 

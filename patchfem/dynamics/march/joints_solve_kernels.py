@@ -7,8 +7,8 @@ elements that depend on each other, however many there are.
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ...friction.laws import elastic_plastic_kernels as law
 from ..dense_kernels import eliminate, factor, solve

@@ -7,8 +7,8 @@ takes in all; the loop steps by the mean forces alone where it would give some.
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ..contacts.stop_kernels import stops
 from .joints_shares_kernels import (

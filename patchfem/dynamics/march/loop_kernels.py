@@ -8,8 +8,7 @@ an instance per contact, of a module with solve, passed, given, commit, state an
 
 from math import inf
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ..contacts import element_kernels as contact
 from ..modal_kernels import (

@@ -6,8 +6,7 @@ num: k_3 [N/m3] of stiffening, k [N/m] and wavelength lambda [m] of interlocking
 
 from math import cos, pi, sin
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN, closed, middle
 
 __all__ = ["closed", "commit", "mean", "middle", "state"]

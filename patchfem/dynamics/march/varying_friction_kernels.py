@@ -10,8 +10,8 @@ every step; so a step ends with the pieces springing back while the holder stand
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.bonds.point_kernels import bond_step, grow
 from ...friction.flags_kernels import LEAN
 from ..contacts.shear_points_kernels import DENSITY, LOAD, PLASTIC, POINTS, SLIDE, SLOPE, SQUARE, STRETCH, respond

@@ -11,8 +11,8 @@ of all energies never rises by itself.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...contact.press_kernels import locate, press_state, pull
 from ...contact.press_path_kernels import path_mean
 from ...friction.flags_kernels import LEAN

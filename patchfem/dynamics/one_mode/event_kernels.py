@@ -4,8 +4,8 @@
 from types import FunctionType
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from . import keep_kernels, sdof_kernels, slip_kernels
 

@@ -1,8 +1,8 @@
 """Compiled periodic motion of one mode with one Coulomb interface: the arithmetic of `orbit_kernels`."""
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from . import orbit_kernels as plain
 from .event_kernels import COMPILED, compiled_copy
 

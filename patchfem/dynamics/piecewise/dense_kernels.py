@@ -1,7 +1,6 @@
 """Compiled reading of a run's rows: the motion at any time in a piece, and the largest absolute acceleration."""
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series
 from .march_kernels import EACH, HEAD, moved, speed_series

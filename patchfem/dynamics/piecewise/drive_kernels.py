@@ -7,8 +7,7 @@ fastest rate [1/s].
 
 from math import cos, exp, expm1, pi, sin
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .series_kernels import TWICE
 

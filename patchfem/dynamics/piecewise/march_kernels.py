@@ -7,8 +7,7 @@ of a monotone function: no event can be missed.
 
 from math import cos, pi, sin
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series, phase_of
 from .memory_kernels import carried, give_way, tangent, threshold, turn

@@ -7,8 +7,7 @@ all at once where the slide comes back to `at`. A group that slips as a whole is
 same, whatever the number of elements. Twin: elements one by one, in the tests.
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 
 

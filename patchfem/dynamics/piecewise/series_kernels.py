@@ -9,8 +9,8 @@ that there is exactly one (Descartes).
 from math import comb, factorial, sqrt
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 
 REACH = 2.0  # longest piece times the fastest rate

@@ -8,8 +8,8 @@ exact as the step itself and needs no extension.
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import INNER, LEAN
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps

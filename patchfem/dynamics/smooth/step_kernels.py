@@ -8,8 +8,8 @@ with any law that offers its rates (`friction.protocol`).
 from math import sin, sqrt
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, INNER
 from ...friction.laws import stretch_kernels as law
 from .tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD

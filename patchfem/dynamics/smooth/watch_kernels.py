@@ -3,8 +3,8 @@
 from math import cos, pi, sin
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ...friction.flags_kernels import INNER
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps

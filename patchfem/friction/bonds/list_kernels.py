@@ -14,8 +14,8 @@ per step, strips merged although their places differ, largest length, energy owe
 from math import ceil, exp, expm1
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ..flags_kernels import LEAN
 from .list_math_kernels import fexp, flog, share
 from .list_merge_kernels import merge

@@ -6,7 +6,8 @@ Nothing here branches inside `fexp` and `flog`: a loop that calls them costs 0.5
 from math import exp, lgamma, log
 
 import numpy as np
-from numba import njit
+
+from ...compiled.inner import njit
 
 FAST = {"reassoc", "contract", "arcp"}
 

@@ -3,8 +3,7 @@ long the run, small the strokes or fine the steps. First moments stay, the error
 
 from math import exp
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ..flags_kernels import LEAN
 from .list_math_kernels import fexp, flog
 from .list_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length

@@ -13,8 +13,9 @@ its end. Scaled: times exp(clock - ref), so that ageing multiplies the whole sum
 from math import exp
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 
+from ...compiled.inner import njit
 from ..flags_kernels import LEAN
 from .list_math_kernels import FAST, fexp, flog, share, tabled
 

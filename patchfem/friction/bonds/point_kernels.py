@@ -5,8 +5,7 @@ Flags: only fast-math that keeps NaN and infinity meaningful. All arrays are C-o
 
 from math import exp, log
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ..flags_kernels import FAST, LEAN
 
 

@@ -8,8 +8,8 @@ are turned around by Newton's method on x as an integral over y or w, by a Gauss
 from math import exp, expm1, inf, log, log1p, nan
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ..flags_kernels import LEAN, closed, knee, middle
 
 __all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]

@@ -4,8 +4,8 @@ Twin: `coulomb.Coulomb`. num: static, kinetic force [N]; mem: the last force [N]
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ..flags_kernels import LEAN, closed, middle
 
 __all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]

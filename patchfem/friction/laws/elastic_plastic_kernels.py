@@ -6,8 +6,7 @@ stretch [m] averaged with stiffness * yield slide, then the stretch (t,) of ever
 
 from math import sqrt
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ..flags_kernels import FAST, LEAN, middle
 
 __all__ = ["at_end", "closed", "commit", "mean", "middle", "state"]

@@ -6,8 +6,7 @@ constant speed of a step z relaxes towards +-g/stiffness over that length of pat
 
 from math import exp, inf, nan
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ..bonds.point_kernels import shape
 from ..flags_kernels import LEAN, closed, knee, middle
 

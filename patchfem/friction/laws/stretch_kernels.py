@@ -9,8 +9,7 @@ exponentials of the slide, and (eps, m, z, s2) where it grows.
 
 from math import exp, expm1, inf, nan
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
 from ..flags_kernels import LEAN, closed
 

@@ -7,8 +7,8 @@ mean of the pressures at the ends of its way; where none is left the bonds are l
 """
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
 from ..flags_kernels import FAST, LEAN
 from .stretch_kernels import FREE, GROWTH, WEIGHT, closed, middle

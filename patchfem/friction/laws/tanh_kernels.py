@@ -5,8 +5,7 @@ num: limit [N], v_0 [m/s]; no memory.
 
 from math import inf, nan, tanh
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ..flags_kernels import LEAN, closed, knee, middle
 
 __all__ = ["at_end", "begin", "closed", "commit", "finish", "knee", "mean", "middle", "rate", "shown", "state"]

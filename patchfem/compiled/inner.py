@@ -1,0 +1,69 @@
+"""`njit` of all compiled code: a function that others call becomes machine code together with them, not before.
+
+Numba optimises every function for itself, makes it callable from Python and from C and turns it into machine code, then
+does most of that again in each function that calls it: a loop is compiled about as often as it is deep. Here a function
+that is not kept on disk gets none of that. Its code goes as it was written into the functions that call it, where all
+is optimised once. A call of it from Python compiles it for itself.
+"""
+
+from types import SimpleNamespace
+
+import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.options import DefaultOptions
+from numba.core.registry import CPUDispatcher
+
+NO_C, NO_PYTHON = ({flag: True} if hasattr(DefaultOptions, flag) else {}
+                   for flag in ("no_cfunc_wrapper", "no_cpython_wrapper"))  # who does not call it
+HOOKS = ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals", "get_pointer_to_function")
+
+
+def njit(cache: bool = False, **options):
+    """numba.njit for functions kept on disk, cache=True; for others one that compiles them inside their callers alone.
+
+    options: those of numba.njit. Where numba's compiler is not the one this was written for, it is numba.njit.
+    """
+    if cache or not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
+        return numba.njit(cache=cache, **NO_C, **options)
+    return lambda function: Inner(function, {}, {"nopython": True, "boundscheck": None, **options}, Inside)
+
+
+class Inner(CPUDispatcher):
+    """A function for other compiled functions."""
+
+    def __init__(self, function, names, options, compiler):
+        super().__init__(function, names, options | NO_C | NO_PYTHON, compiler)
+        self._alone = CPUDispatcher(function, names, options | NO_C)
+
+    def __call__(self, *arguments):
+        return self._alone(*arguments)
+
+    def enable_caching(self):
+        """Keep on disk what calls from Python compile."""
+        self._alone.enable_caching()
+
+
+class Inside(Compiler):
+    """Numba's compiler up to the code that others take in."""
+
+    def define_pipelines(self):
+        self.state.library = Part(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+class Part(JITCodeLibrary):
+    """Code of a function that is not optimised yet and has no address."""
+
+    codegen = SimpleNamespace(set_env=lambda name, environment: None)  # there is no machine code that could look it up
+
+    def _optimize_final_module(self):
+        pass
+
+    def _finalize_final_module(self):
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name):
+        self._ensure_finalized()
+        return 0
