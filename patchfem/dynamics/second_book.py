@@ -24,11 +24,16 @@ def sampled_work(slide, force, after=None) -> np.ndarray:
     return ends * move / 2
 
 
-def gap(sampled: float, booked: float, passed: float, energy: float = 0.0) -> float:
+def gap(sampled, booked, passed, energy=0.0):
     """Relative gap [1] of the two books: |sampled - booked| over the work that went to and fro; 0 where none did.
 
     sampled, booked: friction work [J]; passed: sum of its sizes [J]; energy [J] that passed through the whole run, of
-    which ROUND counts besides, so that a stuck interface shows no round-off.
+    which ROUND counts besides, so that a stuck interface shows no round-off. Numbers of one run, or (n,) of many.
     """
-    scale = passed + ROUND * energy
-    return float(abs(sampled - booked) / scale) if scale > 0 else 0.0
+    return share(np.abs(sampled - booked), passed + ROUND * energy)
+
+
+def share(part, whole):
+    """part/whole, 0 where nothing is the whole; numbers or (n,)."""
+    some = np.asarray(whole) > 0
+    return (part / np.where(some, whole, 1.0) * some)[()]

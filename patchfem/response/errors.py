@@ -90,15 +90,23 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
 
     A measure that a coarser run does not have is as uncertain as it is large.
     """
-    out = {}
+    out, size = {}, values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():
-        known = [part.get(name, abs(value)) for part in errors]
-        error = float(sum(known) + abs(value) * least)
-        if name == "slip_start_phase":
-            error = min(error, np.pi / 2)  # a phase modulo pi cannot be farther off
-        elif name in GAPS:  # 0 but for what is missing, which is an error itself
-            error = max(error, abs(value))
-        elif name == "drift_per_cycle":  # a difference of means
-            error += max(LAST, least) * abs(values.get("relative_displacement_amplitude", 0.0))
-        out[name] = Measure(float(value), row_of(name).unit, error, row_of(name).floor)
+        error = total_error(name, value, [part.get(name, abs(value)) for part in errors], least, size)
+        out[name] = Measure(float(value), row_of(name).unit, float(error), row_of(name).floor)
     return out
+
+
+def total_error(name: str, value, parts, least: float, size):
+    """Error of a measure of one run, or (n,) of many, from its `parts` of as many and `least` of the value.
+
+    size [m]: amplitude of the output.
+    """
+    error = sum(parts) + np.abs(value) * least
+    if name == "slip_start_phase":  # a phase modulo pi cannot be farther off
+        return np.minimum(error, np.pi / 2)
+    if name in GAPS:  # 0 but for what is missing, which is an error itself
+        return np.maximum(error, np.abs(value))
+    if name == "drift_per_cycle":  # a difference of means
+        return error + max(LAST, least) * np.abs(size)
+    return error

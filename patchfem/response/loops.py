@@ -95,12 +95,17 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
     W, friction work per cycle [J]; stiffness K = moving_mass omega_1^2, 0 leaves the damping out. The part of the force
     in phase with the slide is taken over the slide's own first harmonic, as a balance of first harmonics does.
     """
-    out = {"loop_area": float(work)}
-    if amplitude > 0 and abs(q) > 0:
-        out["equivalent_stiffness"] = float((f / q).real)
-        if stiffness > 0:
-            out["equivalent_damping"] = float(work / (2 * np.pi * stiffness * amplitude**2))
-    return out
+    found = interface_loops(amplitude, q, f, work, stiffness)
+    return {name: float(value) for name, value in found.items() if not np.isnan(value)}
+
+
+def interface_loops(amplitude, q, f, work, stiffness) -> dict:
+    """What `interface_loop` gives of one loop, numbers or (n,) of many; NaN where there is no value."""
+    moves = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
+    whole = 2 * np.pi * stiffness * np.square(amplitude)
+    held = moves & (np.asarray(stiffness) > 0)
+    return {"loop_area": work, "equivalent_stiffness": np.where(moves, (f / np.where(moves, q, 1.0)).real, np.nan),
+            "equivalent_damping": np.where(held, work / np.where(held, whole, 1.0), np.nan)}
 
 
 def drift(time, slide, rate, period: float) -> float:

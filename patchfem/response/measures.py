@@ -6,20 +6,19 @@ Everything works on samples: values of an exact run and of a march differ only i
 import numpy as np
 
 from ..core import Response
-from ..dynamics.second_book import gap, sampled_work
+from ..dynamics.second_book import gap, sampled_work, share
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
 
 
-def energy_balance(book: dict) -> float:
-    """Relative gap of the energy balance of a run [1]; 0 for a run without energy.
+def energy_balance(book: dict):
+    """Relative gap of the energy balance [1] of a run, or (n,) of many; 0 for a run without energy.
 
-    |work in - stored - dissipated| / (integral |power in| + peak stored).
+    |work in - stored - dissipated| / (integral |power in| + peak stored). book: energies [J] by name.
     """
-    scale = book["power"] + book["peak_stored"]
     miss = book["work_in"] - book["stored"] - book["friction"] - book["viscous"]
-    return abs(miss) / scale if scale > 0 else 0.0
+    return share(np.abs(miss), book["power"] + book["peak_stored"])
 
 
 def harmonic(time, weight, values, omega) -> complex:

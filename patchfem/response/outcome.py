@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import Measure, Outcome
 from ..structure.drive_sizes import largest, omega_of, sinusoidal
-from .settling import classify, left_over, mean_amplitude, steady_amplitude
+from .settling import CLASSES, GROWS, classes, classify, left_over, mean_amplitudes, steady_amplitude
 
 SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
 
@@ -38,22 +38,42 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         outcome = Outcome.STEADY if amplitudes[-1] <= tolerance * amplitudes.max() else \
             classify(amplitudes, tolerance, floor)
         return (Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant else outcome), measures
-    outcome = classify(amplitudes, tolerance, floor)
-    if outcome is Outcome.GROWS and raw.bounded:
-        outcome = Outcome.TRANSIENT
+    number, steady, error = (one[0] for one in settled(
+        np.asarray(amplitudes, float)[None], None if extremes is None else np.asarray(extremes)[None], window,
+        [np.array([np.nan if one is None else one]) for one in raw.steady],
+        (tolerance, floor, slowest * window * drive.period), raw.bounded))
+    outcome = CLASSES[number]
     if outcome is Outcome.GROWS:
         return outcome, {k: replace(m, error=None) for k, m in measures.items()}
-    steady, error = raw.steady
-    if extremes is not None:
-        if left_over(extremes, window, slowest * window * drive.period) > tolerance * amplitudes[-1] + floor:
-            outcome = Outcome.TRANSIENT
-        if steady is None:
-            steady, error = mean_amplitude(extremes, window)
-    if outcome is Outcome.TRANSIENT and steady is not None:
+    if outcome is Outcome.TRANSIENT and not np.isnan(steady):
         base = measures["relative_displacement_amplitude"]
-        total = error + (base.error or 0.0) * steady / max(abs(base.value), 1e-300)
-        measures = measures | {"relative_displacement_amplitude_steady": Measure(steady, "m", float(total), base.floor)}
+        total = steady_error(steady, error, base.value, base.error or 0.0)
+        measures = measures | {"relative_displacement_amplitude_steady":
+                               Measure(float(steady), "m", float(total), base.floor)}
     return outcome, measures
+
+
+def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=False) -> tuple:
+    """How motions under sines ended: (numbers of CLASSES, steady amplitudes [m], their errors [m]), (n,) each.
+
+    amplitudes (n, w) [m] of successive windows of `window` cycles; extremes (n, c, 2) [m] of the output per cycle, None
+    where they are not known; steady: (values, errors), (n,) [m], of `steady_amplitudes`, NaN for none; limits:
+    (tolerance, floor [m], decay of the slowest mode over a window [1]), numbers or (n,); bounded: as in a Solution.
+    """
+    (tolerance, floor, decay), (value, error) = limits, steady
+    found = classes(amplitudes, tolerance, floor)
+    found = np.where((found == GROWS) & bounded, 0, found)
+    if extremes is not None:
+        left = left_over(extremes, window, decay)
+        found = np.where((found != GROWS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found)
+        none, (mean, about) = np.isnan(value), mean_amplitudes(extremes, window)
+        value, error = np.where(none, mean, value), np.where(none, about, error)
+    return found, value, error
+
+
+def steady_error(steady, error, amplitude, own):
+    """Error of a steady estimate [m]: its own and, in proportion, that of the amplitude of the last cycles."""
+    return error + own * steady / np.maximum(np.abs(amplitude), 1e-300)
 
 
 def still_loads(window, period: float, tolerance: float) -> bool:
@@ -68,7 +88,8 @@ def still_loads(window, period: float, tolerance: float) -> bool:
         size = np.abs(forces)
         rises = np.all(np.diff(size, axis=0) >= -1e-9 * largest_force, axis=0)
         return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
-    first, last = time <= time[0] + period, time >= time[-1] - period
+    near = period * (1 + 1e-9)  # round-off at its end would leave out a step
+    first, last = time <= time[0] + near, time >= time[-1] - near
     means = [np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)]
     return bool(np.any(means[1] - means[0] > tolerance * largest_force))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+ROUND = 1e-12  # of the largest acceleration of the drive
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
@@ -42,6 +43,15 @@ def distortion(window, drive) -> float | None:
     if drive.moving:  # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return float(abs(third) / abs(first)) if abs(first) > 0 else None
+
+
+def distorted(first, third, size):
+    """Third over first harmonic of an acceleration (3.4); NaN where the first is round-off beside the drive's `size`.
+
+    first, third: sizes of the harmonics [m s-2]; all of them numbers or (n,).
+    """
+    there = np.asarray(first) > ROUND * size
+    return np.where(there, third / np.where(there, first, 1.0), np.nan)[()]
 
 
 def friction_harmonic(window, modes, drive) -> complex:

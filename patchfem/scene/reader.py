@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from functools import cache, lru_cache
 from typing import Any, Literal, get_args, get_origin
@@ -13,6 +14,7 @@ from .keys.contact import Material
 from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
 
+_PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # a text in quotes without escapes
 _LAST = 10**9  # sorts the mistakes of --set behind those of the file
 
 
@@ -40,10 +42,12 @@ class Draft:
         """Value that was written at a dotted key; None where nothing was."""
         value: Any = self.raw
         for part in key.split("."):
-            if isinstance(value, list):
-                value = value[int(part)] if part.isdecimal() and int(part) < len(value) else None
+            if isinstance(value, dict):
+                value = value.get(part)
+            elif isinstance(value, list) and part.isdecimal() and int(part) < len(value):
+                value = value[int(part)]
             else:
-                value = value.get(part) if isinstance(value, dict) else None
+                return None
         return value
 
     def say(self, key: str, message: str) -> None:
@@ -140,6 +144,8 @@ def _item(draft: Draft, items: list[Any], wanted: str, key: str) -> str:
 def _set_value(path: str, text: str) -> Any:
     model, name = owner_of(path)
     plain_text = model is not None and str in (model.model_fields[name].annotation, *_types(model, name))
+    if _PLAIN_TEXT.fullmatch(text):
+        return text[1:-1]
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
@@ -154,10 +160,12 @@ def _set_value(path: str, text: str) -> Any:
 
 def _ends_in_comment(text: str) -> bool:
     """Whether TOML takes the end of a valid value's text as a comment: it then swallows a bracket behind it."""
+    if "#" not in text:
+        return False
     try:
         tomllib.loads(f"value = [{text}]")
     except (ValueError, RecursionError):
-        return "#" in text
+        return True
     return False
 
 

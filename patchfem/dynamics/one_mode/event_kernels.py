@@ -32,7 +32,8 @@ _SLIP = compiled_copy(slip_kernels, SLIP, ())
 _EVENTS = compiled_copy(sdof_kernels, INNER, ("enter", "march"), {name: _SLIP[name] for name in SLIP})
 _KEEP = compiled_copy(keep_kernels, ("by_parts", "wave", "by_points", "add_phasors", "listed_event"), ("keep",),
                       {name: _SLIP[name] for name in SLIP})
-COMPILED = {name: _SLIP[name] for name in SLIP} | {name: _EVENTS[name] for name in INNER}
+COMPILED = {name: _SLIP[name] for name in SLIP} | {name: _EVENTS[name] for name in INNER} | \
+    {"add_phasors": _KEEP["add_phasors"]}
 march, enter, keep = _EVENTS["march"], _EVENTS["enter"], _KEEP["keep"]
 
 

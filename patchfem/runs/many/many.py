@@ -35,7 +35,8 @@ def _batch(name: str, *kinds: str) -> Batch:
                  of("solve"))
 
 
-BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"),)  # the first that does not refuse a model takes it
+# the first that does not refuse a model takes it
+BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lumped", "rig"))
 
 
 def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,

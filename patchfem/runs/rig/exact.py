@@ -15,7 +15,8 @@ from ...response.levels import Level
 from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
-from ...structure.drive_sizes import omega_of, sinusoidal, whole
+from ...response.spectrum import distorted
+from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
 from ..bench.averaged import limit_share
 from . import levels as rig_levels
 from .solution import Solution, borne, seen
@@ -100,16 +101,17 @@ def _values(model, numerics, patch, drive, done) -> tuple:
         known["absolute_acceleration_peak"] = done.acceleration
     if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
         known["relative_displacement_amplitude"] = swing(window)
-    if done.waves is not None and sinusoidal(drive) and whole(span, drive) and done.waves[0] != 0:
-        known["acceleration_distortion"] = float(abs(done.waves[1]) / abs(done.waves[0]))
-    cycles = span / drive.period
+    if done.waves is not None and sinusoidal(drive) and whole(span, drive):
+        found = distorted(*np.abs(done.waves), largest(drive))
+        known["acceleration_distortion"] = None if np.isnan(found) else float(found)
+    cycles, holds = span / drive.period, done.stick >= span * (1 - 1e-12)
     if done.means is not None and not apart and cycles >= 1.5:
         known["drift_per_cycle"] = (done.means[1] - done.means[0]) / (cycles - 1)
     if model.friction is not None:
         lost, starts = done.ledger["friction"], done.starts
         ledger = np.array([[lost], [0.0], [lost], [0.0]])
         known |= {"slip_amplitude": float(window.slip.max() - window.slip.min()) / 2,
-                  "stick_fraction": min(done.stick / span, 1.0),
+                  "stick_fraction": 1.0 if holds else done.stick / span,
                   "slip_start_phase": circular_mean(starts) if starts.size and sinusoidal(drive) else None}
         loop = _loop(done, drive, span, apart)
         if not apart:  # the loop of strips is that of their samples
@@ -122,7 +124,7 @@ def _values(model, numerics, patch, drive, done) -> tuple:
         values |= other_measures(window, drive, 400, done.log)
         values |= {f"friction_force_peak{f'_{k + 1}' * (k > 0)}": float(f) for k, f in enumerate(done.force_peaks)}
     others = any(run_events.moving(window, drive, done.log)[1:])
-    return values, done.stick >= span * (1 - 1e-12) and not others
+    return values, holds and not others
 
 
 def _work_check(done) -> float:

@@ -12,6 +12,12 @@ from patchfem.runs.many.answers import FAILED, Answers, joined
 RIG = POINT + COULOMB + SHORT
 
 
+@pytest.fixture(autouse=True)
+def one_by_one_alone(monkeypatch):
+    """Every case by itself: the batches have tests of their own."""
+    monkeypatch.setattr(many, "BATCHES", ())
+
+
 def same(found: Answers, case: int, single) -> None:
     """The case has the outcome, measures, errors, floors and reasons of a single run, to the last bit."""
     assert found.outcome[case] == single.outcome

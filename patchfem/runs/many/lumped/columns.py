@@ -1,0 +1,108 @@
+"""Measures of many runs as columns, with errors, outcome and reasons: what `runs.rig.rig` makes of one Solution."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+
+from ....core import Outcome
+from ....response.errors import total_error
+from ....response.measures import energy_balance
+from ....response.outcome import SMALL, settled, steady_error
+from ....response.reasons import CYCLIC, without_value
+from ....response.rows import TABLE
+from ....response.settling import CLASSES, steady_amplitudes, windows_of
+from ....structure.drive_sizes import largest, omega_of, slowest
+from ...results.notes import BOOKS
+from ..answers import Answers
+
+MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Runs:
+    """What an engine found of n runs of `cycles` cycles each, the last `window` of which are read.
+
+    values: measure -> (n,), NaN where a run has none; book: energies of the run [J], (n,) each; extremes: (n, c, 2) [m]
+    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of every window; stuck, lost: (n,)
+    whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of its
+    value; closes: gap of the energy balance beyond which a run has not converged.
+    """
+
+    cycles: int
+    window: int
+    values: dict
+    book: dict
+    extremes: np.ndarray
+    phasors: np.ndarray
+    stuck: np.ndarray
+    lost: np.ndarray
+    errors: dict
+    least: float
+    closes: float
+
+
+def answered(models, runs: Runs, numerics: dict) -> tuple:
+    """(Answers of the models, (n,) whether a case must be run by itself, for a warning that needs its whole result).
+
+    numerics: as `results.chosen` has it.
+    """
+    n, values = len(models), dict(runs.values)
+    values[MAIN] = (runs.extremes[:, -runs.window:, 1].max(axis=1) - runs.extremes[:, -runs.window:, 0].min(axis=1)) / 2
+    values["energy_balance"] = energy_balance(runs.book)
+    nothing = np.zeros(n)
+    errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
+              for name, value in values.items()}
+    tolerance = np.array([model.accuracy.tolerance for model in models])
+    outcome, (steady, error) = _outcome(models, runs, tolerance)
+    found = Answers.blank(n)
+    found.outcome[:] = [str(one) for one in outcome]
+    alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
+    grows = np.array([one is Outcome.GROWS for one in outcome])
+    still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
+    values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
+    errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
+    for name, value in values.items():
+        there = ~np.isnan(value)
+        if not there.any():
+            continue
+        row = TABLE[name]
+        alone |= there & ~grows & (errors[name] > tolerance * np.abs(value) + row.floor)
+        found.units[name], found.values[name] = row.unit, value
+        found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
+        found.floors[name] = np.where(there, row.floor, np.nan)
+    _reasons(models, runs, found)
+    for case, model in enumerate(models):
+        found.numerics[case] = numerics
+        if said := [*model.source.remarks, *model.rig.notes]:
+            found.warnings[case] = said
+    return found, alone
+
+
+def _outcome(models, runs: Runs, tolerance) -> tuple:
+    """Outcomes (n), and the steady amplitudes and their errors, (n,) [m] each."""
+    pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
+    ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
+    floor = SMALL * np.array([largest(m.rig.drive) / omega_of(m.rig.drive)**2 for m in models])
+    decay = np.array([slowest(m.rig.modes) * runs.window * m.rig.drive.period for m in models])
+    with np.errstate(all="ignore"):
+        number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window,
+                                  steady_amplitudes(ends, runs.phasors), (tolerance, floor, decay))
+    return [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)], steady
+
+
+def _reasons(models, runs: Runs, found: Answers) -> None:
+    """Why cases have no value of a measure that such runs can have."""
+    names = [*CYCLIC, PHASE]
+    for name in names:
+        found.measure(name, TABLE[name].unit)
+    lacking = np.array([np.isnan(found.values[name]) for name in names])
+    for case in np.flatnonzero(lacking.any(axis=0)).tolist():
+        drive = models[case].rig.drive
+        here = {name: values[case] for name, values in found.values.items() if not np.isnan(values[case])}
+        window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]))
+        for name, measure in without_value(here, window, drive, True).items():
+            found.reasons.setdefault(name, {})[case] = measure.reason
+            found.floors[name][case] = measure.floor
+
+

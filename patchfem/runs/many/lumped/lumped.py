@@ -1,0 +1,64 @@
+"""The batch of lumped cases: which models it takes, which stand together, and their answers."""
+
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+
+from ....core import BaseSine
+from ....model.model import Model
+from .. import one_by_one
+from ..answers import Answers
+from . import coulomb
+from .columns import answered
+
+KINDS = {"exact": coulomb}
+TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
+
+
+def refuses(model: Model) -> str:
+    """Why the batch does not take a model; "" where it does."""
+    rig = model.rig
+    if model.kind != "rig" or model.patch is not None or model.wear is not None or model.measured is not None:
+        return "it is not one lumped contact"
+    if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
+            or not model.point.load > 0:
+        return "its interface is not one point under a constant load"
+    if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels or np.isfinite(rig.travel):
+        return "it is not one mode under one sine"
+    if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
+        return "it has no whole cycles, or no push, slide or output"
+    return coulomb.refuses(model)
+
+
+def group(model: Model) -> tuple:
+    """Equal for models of one compiled call."""
+    return (int(model.rig.cycles),)
+
+
+def solve(models: Sequence[Model], say=None) -> Answers:
+    """Answers of models of one group; a case that needs it is run by itself."""
+    found = Answers.blank(len(models))
+    for first in range(0, len(models), TOGETHER):
+        part = models[first:first + TOGETHER]
+        found.place(range(first, first + len(part)), _solved(part, say))
+    return found
+
+
+def _solved(models, say) -> Answers:
+    begin, cycles = perf_counter(), int(models[0].rig.cycles)
+    window = min(10, cycles // 10)
+    runs = coulomb.runs_of(models, cycles, window, say)
+    found, alone = answered(models, runs, coulomb.NUMERICS | {"window_cycles": window})
+    found.seconds[:] = (perf_counter() - begin) / len(models)
+    again = np.flatnonzero(alone).tolist()
+    if not again:
+        return found
+    for case in again:  # nothing of them is kept
+        for columns in (found.values, found.errors, found.floors):
+            for column in columns.values():
+                column[case] = np.nan
+        for kept in (found.warnings, found.notes, found.numerics, *found.reasons.values()):
+            kept.pop(case, None)
+    found.place(again, one_by_one.solve([models[case] for case in again], say))
+    return found

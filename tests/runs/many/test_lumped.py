@@ -1,0 +1,105 @@
+"""Lumped cases in one compiled call, beside the same cases run one by one."""
+
+import numpy as np
+import pytest
+
+from patchfem.api import base_of, build, load
+from patchfem.runs.many import one_by_one
+from patchfem.runs.many.lumped import lumped
+from patchfem.scene.sets import assignments
+
+SCENE = """
+[normal]
+load = "30 N"
+[friction]
+{law}
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "{kind}"
+{kind_size}
+frequency = "140 Hz"
+cycles = 40
+"""
+LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2'}
+SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
+DIFFERENCES = ("drift_per_cycle", "energy_balance", "work_check")  # of larger terms: known to their round-off
+
+
+def models(law: str, seed: int, count: int) -> list:
+    """Random cases of a law: sizes that stick, that stop and that slide all the time, near resonance and away."""
+    r, out = np.random.default_rng(seed), []
+    for _ in range(count):
+        kind = str(r.choice(["base", "base", "force"]))
+        push, mode = 10 ** r.uniform(0.3, 2), "structure.mode.axial"
+        sets = {"normal.load": r.uniform(2, 1.5 * push), "drive.frequency": r.uniform(60, 250),
+                f"{mode}.damping": float(r.choice([0, 0.003, 0.05, 0.3, 1.0, 1.4])),
+                f"{mode}.slide": float(r.choice([1, -0.7])), f"{mode}.output": float(r.choice([1, -1.3, 0.5])),
+                "drive.cycles": int(r.choice([20, 47])), "accuracy.tolerance": float(r.choice([1e-3, 1e-5]))}
+        sets |= {"drive.acceleration": push, f"{mode}.base": r.uniform(0.4, 1)} if kind == "base" else \
+            {"drive.force": push}
+        if r.random() < 0.2:
+            sets["structure.start.velocity"] = [0.05]
+        scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
+        out.append(build(base_of(scene).changed(assignments(sets))))
+    return out
+
+
+def batch(cases):
+    """Answers of the batch, group by group."""
+    from patchfem.runs.many.answers import Answers
+
+    found, groups = Answers.blank(len(cases)), {}
+    for case, model in enumerate(cases):
+        assert lumped.refuses(model) == ""
+        groups.setdefault(lumped.group(model), []).append(case)
+    for places in groups.values():
+        found.place(places, lumped.solve([cases[case] for case in places]))
+    return found
+
+
+def conditioned(found, case: int) -> float:
+    """How much round-off of the coordinate counts in the slip: static displacement of the drive over the slip."""
+    slip = found.values["slip_amplitude"][case]
+    return max(1.0, 1e-6 / slip) if slip > 0 else 1.0
+
+
+def held_against(cases, ones, many) -> None:
+    """Assert that a batch gave what single runs give: values and bars to 1e-12, all words the same."""
+    assert list(many.outcome) == list(ones.outcome)
+    assert many.warnings == ones.warnings and many.notes == ones.notes and many.numerics == ones.numerics
+    for case in range(len(cases)):
+        for name in {*ones.values, *many.values}:
+            assert many.has(name, case) == (name in ones.values and ones.has(name, case)), (case, name)
+            assert many.reasons.get(name, {}).get(case) == ones.reasons.get(name, {}).get(case), (case, name)
+            if not ones.has(name, case):
+                continue
+            value, bar = ones.values[name][case], ones.errors[name][case]
+            near = 1e-12 * conditioned(ones, case) * abs(value)
+            if name in DIFFERENCES:
+                near += max(bar, 1e-14) if np.isfinite(bar) else 1e-12
+            elif name == "acceleration_distortion":
+                near += 1e-13  # of the first harmonic: round-off of the phase omega t
+            assert many.floors[name][case] == ones.floors[name][case]
+            assert many.values[name][case] == pytest.approx(value, rel=0, abs=near, nan_ok=True), (case, name)
+            if name not in DIFFERENCES:
+                same = pytest.approx(bar, rel=1e-11, abs=1e-9 * near, nan_ok=True)
+                assert many.errors[name][case] == same, (case, name)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_exact_batch_is_the_single_runs(law):
+    cases = models(law, 1, 20)
+    held_against(cases, one_by_one.solve(cases), batch(cases))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", LAWS)
+def test_exact_batch_is_the_single_runs_many(law):
+    cases = models(law, 2, 180)
+    held_against(cases, one_by_one.solve(cases), batch(cases))
