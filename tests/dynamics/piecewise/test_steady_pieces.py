@@ -58,25 +58,30 @@ def test_exact_one_element_in_closed_form(ratio, limit):
     assert found.amplitude == pytest.approx(want, rel=1e-11)
 
 
-def against_march(seed, most, cycles):
-    """The motion that turns over has the amplitude of a long run; that found from its 60th cycle is the run's own."""
+def against_march(seed, most, cycles, early=60):
+    """The motion that turns over has the amplitude of a long run, and so has that found from an early cycle.
+
+    Its rates are the run's own too. Where elements slip for the last time after that cycle the slide rests elsewhere.
+    """
     modes, drive, k, y = random_rig(seed, most)
     group = [elements_of(k, y)]
-    found, run = steady(modes, drive, group), simulate(modes, drive, group, 60, window=1)
+    found, run = steady(modes, drive, group), simulate(modes, drive, group, early, window=1)
     mine, long = settled(modes, drive, group, *run.end), simulate(modes, drive, group, cycles, window=1)
     before = simulate(modes, drive, group, cycles - 1, window=1).end[0]
     end = np.concatenate([long.end[0].z, long.end[0].v])
     size = np.abs(end).max()
-    assert np.abs(end - np.concatenate([before.z, before.v])).max() < 1e-12 * size  # it repeats
+    rest = 1 - np.abs(found.multipliers).max()
+    assert np.abs(end - np.concatenate([before.z, before.v])).max() < 5e-10 * size * rest  # it repeats
     assert found.amplitude == pytest.approx(long.swing, rel=1e-9)
-    assert np.abs(np.concatenate([mine.start.z, mine.start.v]) - end).max() < 1e-9 * size
+    assert np.abs(mine.start.v - long.end[0].v).max() < 1e-9 * size * drive.omega
     assert max(found.residual, mine.residual) < 1e-12
     assert np.abs(found.multipliers[0]) == pytest.approx(np.abs(mine.multipliers[0]), abs=1e-6)
+    return np.abs(mine.start.z - long.end[0].z).max() / size
 
 
 @pytest.mark.parametrize(("seed", "cycles"), [(101, 150), (109, 1050), (102, 250)])
 def test_exact_random_rigs_against_long_runs(seed, cycles):
-    against_march(seed, 200, cycles)
+    assert against_march(seed, 200, cycles) < 1e-9
 
 
 @pytest.mark.slow
