@@ -144,6 +144,7 @@ def value_and_slope(poly, low, top, u):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def polish(poly, low, top, left, right, u):
     """The root in [left, right] of a polynomial that falls there from above zero to below, by guarded Newton from u."""
+    last = right - left
     for _ in range(100):
         here, slope = value_and_slope(poly, low, top, u)
         if here > 0:
@@ -155,25 +156,24 @@ def polish(poly, low, top, left, right, u):
         new = u - here / slope if slope < 0 else left
         if not left < new < right:
             new = 0.5 * (left + right)
-        if abs(new - u) <= 2 * EPS * u:
+        step = abs(new - u)
+        # steps shrink with their squares, so the next one would be step (step/last)^2
+        if step <= 2 * EPS * u or (step < 0.01 * last and step * (step / last)**2 <= 0.1 * EPS * u):
             return new
-        u = new
+        u, last = new, step
     return u
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def bernstein(poly, low, top, hull):
     """Fill hull (top - low + 1,) with the Bernstein coefficients of poly[low] ... poly[top] on [0, 1]."""
-    degree = top - low
-    for i in range(0, degree + 1, 4):  # four sums in registers, not a loop over memory
-        a = b = c = d = poly[low]
-        for k in range(1, degree + 1):
-            part = poly[low + k]
-            a += part * _HULL[degree, k, i]
-            b += part * _HULL[degree, k, i + 1]
-            c += part * _HULL[degree, k, i + 2]
-            d += part * _HULL[degree, k, i + 3]
-        hull[i], hull[i + 1], hull[i + 2], hull[i + 3] = a, b, c, d
+    degree, wide = top - low, (top - low) // 4 * 4 + 4  # whole registers
+    for i in range(wide):
+        hull[i] = poly[low]
+    for k in range(1, degree + 1):
+        part = poly[low + k]
+        for i in range(wide):
+            hull[i] += part * _HULL[degree, k, i]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
