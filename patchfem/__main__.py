@@ -13,7 +13,7 @@ from cyclopts import App, CycloptsError  # noqa: E402
 
 from . import __version__  # noqa: E402
 from .commands.compare import compare  # noqa: E402
-from .commands.look import export, view  # noqa: E402
+from .commands.look import export, report, view  # noqa: E402
 from .commands.profile import profile  # noqa: E402
 from .commands.run import run  # noqa: E402
 from .commands.scene import check, mesh, plan  # noqa: E402
@@ -23,8 +23,8 @@ from .commands.sweep import sweep  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-VERBS = (check, plan, run, sweep, profile, compare, cost, fit, mesh, export, view)
-NOT_BUILT = ("report", "import", "demo", "new", "schema", "doctor", "cite")
+VERBS = (check, plan, run, sweep, profile, compare, cost, fit, mesh, export, view, report)
+NOT_BUILT = ("import", "demo", "new", "schema", "doctor", "cite")
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Out, say
+from .shared import Out, Refused, say
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
@@ -22,3 +22,13 @@ def view(folder: Path, /, *, out: Out = None,
     from ..export.drawing.view import view as show
 
     show(folder, out, frame, magnify, say)
+
+
+def report(*folders: Path, out: Out = None):
+    """Lay the results folders of several runs, or of several sweeps over the same keys, side by side on one page for a
+    browser (-o PAGE.html, by default report.html here); of one sweep its own page is made again."""
+    from ..export.reports import report_of
+
+    if not folders:
+        raise Refused("report: name at least one results folder")
+    print(report_of(list(folders), out))

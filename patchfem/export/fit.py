@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .drawing.pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
+from .drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
+from .scales import axis_unit
 
 LABEL = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
 

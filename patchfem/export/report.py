@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import rounded
+from . import scales
 from .drawing import curves, pictures
 from .pages import charts
 from .pages.document import Section, document
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
-WORKSHOP = {  # as pictures.LADDERS
+WORKSHOP = {  # as scales.LADDERS
     "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)), "m3": (("in^3", INCH**-3),), "rad": (DEG,),
     "N": (("lbf", 1 / LBF),), "N m": (("lbf in", 1 / LBF / INCH),), "J": (("in lbf", 1 / LBF / INCH),),
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
@@ -44,8 +45,8 @@ def units(name: str, value: float, unit: str) -> list:
         return [DEG]
     if unit == "m s-2":
         return [("g", 1 / G)]
-    ladders = [table[unit] for table in (pictures.LADDERS, WORKSHOP) if unit in table]
-    return [pictures.step_of(ladder, value) for ladder in ladders]
+    ladders = [table[unit] for table in (scales.LADDERS, WORKSHOP) if unit in table]
+    return [scales.step_of(ladder, value) for ladder in ladders]
 
 
 def pair(name: str, measure: dict) -> str:
@@ -202,7 +203,7 @@ def _interface(data: dict) -> Picture | None:
         span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
         caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
     if pictures.part_in_contact(data["x"], fields["normal_stress"][0]):
-        length, scale = pictures.axis_unit(data["x"], "m")
+        length, scale = scales.axis_unit(data["x"], "m")
         caption += f". Shown is the part in contact, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length} in all"
     return Picture(pictures.interface, (data["x"], fields), caption + ".")
 
@@ -216,7 +217,7 @@ def _bodies(data: dict) -> Picture | None:
     alone = "" if data["summary"]["kind"] == "patch" else " alone, before any slide"
     mises = data["bodies"]["mises"]
     largest = max(float(np.max(part)) for part in mises)
-    unit, scale = pictures.axis_unit([largest], "Pa")
+    unit, scale = scales.axis_unit([largest], "Pa")
     return Picture(pictures.bodies, (data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
                    f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} {unit}.")
 
@@ -251,7 +252,7 @@ def _histories(data: dict) -> Picture | None:
     if kept:
         what = "reversals were kept: a band from the lowest to the highest of each cycle." \
             if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
-        unit, scale = pictures.axis_unit(history["time"], "s")
+        unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     return Picture(pictures.histories, (history, window, period, title), caption)
 

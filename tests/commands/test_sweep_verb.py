@@ -84,7 +84,7 @@ def test_exact_the_dataset_has_a_dimension_per_key(swept):
 
 def test_exact_nothing_unfinished_is_left(swept):
     out, _ = swept
-    assert sorted(one.name for one in out.iterdir()) == ["cases", "sweep.csv", "sweep.nc"]
+    assert sorted(one.name for one in out.iterdir()) == ["cases", "report.html", "sweep.csv", "sweep.nc"]
     assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(row["case"] for row in rows(out))
 
 

@@ -16,7 +16,7 @@ from page_data import charts_of, data_of, own_part
 
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
-from patchfem.export import report
+from patchfem.export import report, scales
 from patchfem.export.drawing import pictures
 from patchfem.export.pages import charts
 from patchfem.scene.keys.quantities import KINDS
@@ -262,7 +262,7 @@ def test_exact_units_follow_the_size(name, value, unit, error, text):
 
 
 def test_exact_units_are_those_of_the_unit_table():
-    for table in (pictures.LADDERS, report.WORKSHOP):
+    for table in (scales.LADDERS, report.WORKSHOP):
         for unit, ladder in table.items():
             known = KINDS.get(KIND.get(unit), {})
             for name, scale in ladder:
@@ -271,10 +271,10 @@ def test_exact_units_are_those_of_the_unit_table():
             assert [s for _, s in ladder] == sorted((s for _, s in ladder), reverse=True)
 
 
-@given(st.sampled_from(sorted(pictures.LADDERS)), st.floats(1e-12, 1e12))
+@given(st.sampled_from(sorted(scales.LADDERS)), st.floats(1e-12, 1e12))
 def test_always_a_unit_is_the_smallest_below_a_thousand(unit, size):
-    ladder = pictures.LADDERS[unit]
-    name, scale = pictures.step_of(ladder, size)
+    ladder = scales.LADDERS[unit]
+    name, scale = scales.step_of(ladder, size)
     smaller = [s for _, s in ladder if s > scale]
     assert size * scale < 1000 or (name, scale) == ladder[-1]
     assert all(size * s >= 1000 for s in smaller)

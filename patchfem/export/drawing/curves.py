@@ -4,7 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from .pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
+from ..scales import axis_unit
+from .pictures import BLUE, GREY, ORANGE, drawing, styled
 
 G = 9.80665
 STYLES = {"stable": "-", "stuck": "-", "unstable": "--", "unbounded": ":"}

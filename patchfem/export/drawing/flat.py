@@ -6,8 +6,9 @@ import matplotlib
 import numpy as np
 
 from ..fields.series import Frame
+from ..scales import axis_unit
 from .panels import Panel, borders, curves, panels
-from .pictures import BLUE, ORANGE, STYLE, axis_unit
+from .pictures import BLUE, ORANGE, STYLE
 
 
 def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:

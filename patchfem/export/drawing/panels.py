@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fields.series import Frame
-from .pictures import axis_unit
+from ..scales import axis_unit
 
 CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way
 ROUND_OFF = 1e-5  # of the largest motion: what is kept is in single precision, a slide is a difference of two

@@ -6,42 +6,16 @@ from functools import partial, wraps
 
 import numpy as np
 
+from ..scales import axis_unit
+
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
 WIDTH = 9.6  # inches; the page stretches a picture to its text column
 STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 10,
          "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e3e3e3",
          "axes.axisbelow": True, "axes.titlesize": 11, "axes.formatter.useoffset": False, "legend.frameon": False,
          "legend.fontsize": 9, "figure.constrained_layout.use": True, "lines.linewidth": 1.4}
-LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
-    "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
-    "s": (("us", 1e6), ("ms", 1e3), ("s", 1.0)),
-    "rad": (("urad", 1e6), ("mrad", 1e3), ("rad", 1.0)),
-    "Pa": (("Pa", 1.0), ("kPa", 1e-3), ("MPa", 1e-6), ("GPa", 1e-9)),
-    "N": (("uN", 1e6), ("mN", 1e3), ("N", 1.0), ("kN", 1e-3)),
-    "J": (("nJ", 1e9), ("uJ", 1e6), ("mJ", 1e3), ("J", 1.0)),
-    "N m": (("uN m", 1e6), ("mN m", 1e3), ("N m", 1.0)),
-    "N m-1": (("N/m", 1.0), ("N/mm", 1e-3), ("N/um", 1e-6)),
-    "m3": (("um^3", 1e18), ("mm^3", 1e9)),
-}
 SPARSE = 20  # kept samples per cycle below which a line through them would not be the motion
 DOTS, BANDS = 800, 1500
-
-
-def step_of(ladder: tuple, size: float) -> tuple:
-    """Unit (name, scale) of a ladder of LADDERS: the smallest in which `size` [SI] stays below 1000."""
-    for name, scale in ladder:
-        if abs(size) * scale < 1000:
-            return name, scale
-    return ladder[-1]
-
-
-def axis_unit(values, unit: str) -> tuple:
-    """Unit (name, scale) of an axis that shows `values` [SI]: finite values times scale are in that unit.
-
-    unit: a key of LADDERS.
-    """
-    values = np.asarray(values)
-    return step_of(LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def envelope(time, value, period: float) -> tuple:

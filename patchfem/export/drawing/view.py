@@ -13,8 +13,8 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ..fields.series import Frame, Series
+from ..scales import axis_unit
 from .panels import Panel, borders, curves, panels
-from .pictures import axis_unit
 
 ENDINGS = (".png", ".svg", ".pdf")
 SECONDS = 60  # for the child

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
+from ..scales import axis_unit
+from .pictures import BLUE, GREY, ORANGE, drawing, styled
 
 SHOWN = 6  # profiles along the patch
 MEASURES = {"pressure_peak": ("peak pressure", BLUE, "-"), "contact_fraction": ("contact fraction", ORANGE, "-"),

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..drawing.pictures import LADDERS, axis_unit
 from ..report import pair, units
+from ..scales import LADDERS, axis_unit
 from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import NUMBER, label
@@ -74,7 +74,7 @@ def _arrays(path: Path) -> dict:
 
 def page(runs: list) -> str:
     """The whole HTML page of several `Run`s, in their order; differences are from the first."""
-    names = _distinct([run.name for run in runs])
+    names = distinct([run.name for run in runs])
     charts = [one for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS)) if one]
     outcomes = "; ".join(f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs))
     sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
@@ -87,7 +87,7 @@ def page(runs: list) -> str:
                     ("figures.js", "curves.js") if charts else ())
 
 
-def _distinct(names: list) -> list:
+def distinct(names: list) -> list:
     """The names, numbered where several are the same."""
     return [name if names.count(name) == 1 else f"{name} ({number})" for number, name in enumerate(names, 1)]
 

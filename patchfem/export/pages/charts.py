@@ -11,8 +11,9 @@ import numpy as np
 
 from ...core import G_N
 from ..drawing import curves
-from ..drawing.pictures import axis_unit, closer, envelope, part_in_contact, whole_from
+from ..drawing.pictures import closer, envelope, part_in_contact, whole_from
 from ..drawing.wear import MEASURES, SHOWN
+from ..scales import axis_unit
 
 LINE, FRAMES = 6000, 40  # points of a line, frames of the shear stress behind the largest one
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}

@@ -3,10 +3,11 @@
 import re
 from collections import Counter
 from html import escape
+from math import isfinite
 
 import numpy as np
 
-from ..drawing.pictures import LADDERS, axis_unit
+from ..scales import LADDERS, axis_unit
 from .document import Section, document
 
 SETTLED = ("steady", "stuck", "done", "no_contact")
@@ -18,11 +19,11 @@ NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z
 def page(table: dict) -> str:
     """The whole HTML page of a sweep.
 
-    table: `title`, `version`, `command` (the line that made it), `scene` (its text), `seconds`; `grid`: whether the
-    cases are all combinations of the keys' values; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as
-    written, `log`}]; `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,)}}, NaN where a case has none;
-    `outcome` (n,); `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or
-    None.
+    table: `title`, `version`, `command` (the line that made it), `scene` (its text), `seconds` of work (NaN: unknown);
+    `grid`: whether the cases are all combinations of the keys' values; `keys`: [{`name`, `unit`, `values` (n,) in SI,
+    `texts` (n,) as written, `log`}]; `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,)}}, NaN where a
+    case has none; `outcome` (n,); `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside
+    the page, or None; `own`: False where sweep.csv does not lie beside the page.
     """
     outcome, number = list(table["outcome"]), len(table["outcome"])
     drawn = _spread(number, DRAWN)
@@ -112,7 +113,8 @@ def _lead(table: dict) -> str:
         shown = Counter(failed.values()).most_common(5)
         fault = "<div class='verdict warn'>" + "".join(
             f"<p>{count} case{'s' if count > 1 else ''} failed: {escape(why)}</p>" for why, count in shown) + "</div>"
-    return (f"<p class=soft>patchfem {escape(table['version'])} &middot; {table['seconds']:.2f} s</p>"
+    took = f" &middot; {table['seconds']:.2f} s" if isfinite(table["seconds"]) else ""
+    return (f"<p class=soft>patchfem {escape(table['version'])}{took}</p>"
             f"<p class=verdict>{text}</p>{fault}")
 
 
@@ -135,8 +137,9 @@ def _cases(table: dict) -> str:
         rows.append(f"<tr{'' if outcome in SETTLED else ' class=bad'}>{cells}</tr>")
     number = len(table["outcome"])
     more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
-    return (f"<p class=soft>Every case with every measure and its error: <a href=sweep.csv>sweep.csv</a>, "
-            f"<a href=sweep.nc>sweep.nc</a>.</p><div class=wide><table><thead><tr>{head}</tr></thead>"
+    files = ("<p class=soft>Every case with every measure and its error: <a href=sweep.csv>sweep.csv</a>, "
+             "<a href=sweep.nc>sweep.nc</a>.</p>") if table.get("own", True) else ""
+    return (f"{files}<div class=wide><table><thead><tr>{head}</tr></thead>"
             f"<tbody>{''.join(rows)}</tbody></table></div>{more}")
 
 

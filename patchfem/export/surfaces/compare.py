@@ -17,8 +17,8 @@ from ...surface.roughness.filter import even
 from ...surface.roughness.parameters import Heights
 from ...surface.roughness.spectrum import BAND
 from ..drawing.inline import CSS, placed
-from ..drawing.pictures import LADDERS, step_of
 from ..report import pair
+from ..scales import LADDERS, step_of
 from . import compare_pictures as pictures
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",

@@ -4,7 +4,8 @@ import numpy as np
 
 from ...surface.profile import level
 from ...surface.roughness.filter import even
-from ..drawing.pictures import BLUE, GREY, ORANGE, axis_unit, drawing, styled
+from ..drawing.pictures import BLUE, GREY, ORANGE, drawing, styled
+from ..scales import axis_unit
 from .pictures import thinned
 
 CURVE = 400

@@ -7,7 +7,7 @@ from ... import __version__
 from ...surface.profile import say
 from ...surface.roughness.report import RoughnessReport, Value
 from ..drawing.inline import CSS
-from ..drawing.pictures import LADDERS, step_of
+from ..scales import LADDERS, step_of
 from . import pictures
 
 AREAL = ("Interval: 5 to 95 %, of the mean over all scans of this size on a surface with Gaussian heights and the "

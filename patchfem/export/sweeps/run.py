@@ -13,6 +13,7 @@ from ...core import Missing
 from ...runs.many.answers import Answers
 from .. import netcdf
 from .folder import Folder, Summaries, Whole
+from .page import write_page
 from .tables import contents, write_csv
 
 
@@ -83,9 +84,10 @@ def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
 
 
 def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder) -> None:
-    """Write sweep.csv and sweep.nc of all cases, and drop the cases of other sweeps from the folder."""
+    """Write sweep.csv, sweep.nc and report.html of all cases, and drop the cases of other sweeps from the folder."""
     write_csv(cases, found, folder.keys, folder.target / "sweep.csv")
     netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
+    write_page(asked, cases, found, folder.keys, folder.target)
     folder.drop_others()
 
 

@@ -88,7 +88,8 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
         data[name] = (dims, np.array(values, object).reshape(cases.shape), {"long_name": text})
     return netcdf.Contents(data, coordinates, {
         "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
-        "source": f"patchfem {__version__}", "scene": asked.text, "sets": json.dumps(list(asked.sets)),
+        "source": f"patchfem {__version__}", "scene": asked.text, "scene_file": asked.path.name,
+        "sets": json.dumps(list(asked.sets)),
         "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(), "versions": json.dumps(versions())})
 
 

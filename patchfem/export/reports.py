@@ -1,0 +1,39 @@
+"""One page over finished runs, or over finished sweeps, made from their folders."""
+
+from pathlib import Path
+
+from ..core import Missing, PatchfemError
+from .pages import beside, sweep
+from .sweeps import page as sweeps
+
+PAGE = "report.html"
+
+
+def report_of(folders: list, out: Path | None = None) -> Path:
+    """Write the page of these results folders and return its path.
+
+    Several runs, or several sweeps over the same keys, are laid side by side; of one sweep its own page is made again.
+    out: the page; unless given, report.html in the folder of one sweep, else in this folder. PatchfemError for a folder
+    that is neither a run nor a sweep, and for runs beside sweeps; Missing where the page cannot be written.
+    """
+    many = [(folder / "sweep.csv").is_file() for folder in folders]
+    if len(set(many)) > 1:
+        raise PatchfemError(f"runs and sweeps cannot be laid side by side: {folders[many.index(True)]} is a sweep, "
+                            f"{folders[many.index(False)]} is not")
+    out = out if out is not None else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
+    if not many[0]:
+        return _written(beside.page([beside.read(folder) for folder in folders]), out)
+    tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
+    names = beside.distinct([folder.resolve().name for folder in folders])
+    return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)
+
+
+def _written(text: str, out: Path) -> Path:
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        partial = out.with_name(out.name + ".partial")
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(out)
+    except OSError as fault:
+        raise Missing(f"{out}: cannot be written: {fault.strerror or fault}") from None
+    return out

@@ -1,0 +1,166 @@
+"""report.html of a sweep: its table as the page takes it, from the answers or from the files of its folder."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from ... import __version__
+from ...campaigns.sweeps.asked import Asked
+from ...campaigns.sweeps.cases import Cases
+from ...core import PatchfemError
+from ...runs.many.answers import Answers
+from ...runs.results.result import meaning
+from ..pages import sweep
+from .tables import names_of
+
+WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
+
+
+def write_page(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> None:
+    """Write the page of all cases beside their tables, whole beside its place first and then renamed."""
+    partial = folder / "report.html.partial"
+    partial.write_text(sweep.page(table_of(asked, cases, found, keys, folder)), encoding="utf-8")
+    partial.replace(folder / "report.html")
+
+
+def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> dict:
+    """The table of `pages.sweep.page` from the answers of the cases."""
+    number = range(len(cases))
+    places = np.array([cases.places(one) for one in number], int).reshape(len(cases), len(cases.axes))
+    columns = [{"name": axis.key, "unit": axis.unit or "1", "texts": [axis.texts[k] for k in place],
+                "values": numbers([axis.values[k] for k in place]), "log": wide(axis.values)}
+               for axis, place in zip(cases.axes, places.T)]
+    measures = {name: {"unit": found.units[name], "means": meaning(name), "values": found.values[name],
+                       "errors": found.errors[name]}
+                for name in names_of(found) if name not in [axis.name for axis in cases.axes]}
+    return {"title": f"Sweep: {tomllib.loads(asked.text).get('title') or asked.path.stem}", "version": __version__,
+            "command": command(asked, cases), "scene": asked.text, "seconds": float(np.sum(found.seconds)),
+            "grid": not cases.rows, "keys": columns, "measures": measures,
+            "outcome": [str(one) for one in found.outcome],
+            "messages": found.messages, "folders": [opened(folder, key) for key in keys]}
+
+
+def opened(folder: Path, key: str) -> str:
+    """What a click on a case opens, as it is seen from the page."""
+    return f"cases/{key}/{WHOLE if (folder / 'cases' / key / WHOLE).is_file() else SHORT}"
+
+
+def numbers(values) -> np.ndarray:
+    """Values along an axis: numbers as they are, words numbered in the order they come."""
+    if all(isinstance(one, int | float) for one in values):
+        return np.asarray(values, float)
+    order = {one: place for place, one in enumerate(dict.fromkeys(values))}
+    return np.array([order[one] for one in values], float)
+
+
+def wide(values) -> bool:
+    """Whether an axis of these values is better logarithmic: all > 0 and the largest ten times the smallest or more."""
+    return all(isinstance(one, int | float) and one > 0 for one in values) and max(values) >= 10 * min(values)
+
+
+def command(asked: Asked, cases: Cases) -> str:
+    """The line that answers the same cases again."""
+    words = ["patchfem", "sweep", asked.path.name, *(word for one in asked.sets for word in ("--set", one))]
+    if cases.rows:
+        return shlex.join(words) + "  # with the cases of sweep.csv"
+    return shlex.join([*words, *(word for axis in cases.axes for word in
+                                 ("--over", f"{axis.key}={','.join(axis.texts)}"))])
+
+
+def read_table(folder: Path) -> dict:
+    """The table of a sweep from sweep.csv (values as written) and sweep.nc (numbers) of its folder.
+
+    PatchfemError where one of them is missing or cannot be read.
+    """
+    import h5netcdf
+
+    folder = Path(folder)
+    try:
+        with open(folder / "sweep.csv", newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        with h5netcdf.File(folder / "sweep.nc", "r") as file:
+            return _table(folder, [dict(zip(head, row)) for row in rows], head[:head.index("outcome")], file)
+    except FileNotFoundError as fault:
+        name = Path(fault.filename).name if fault.filename else "sweep.nc"
+        raise PatchfemError(f"{folder}: no folder of a sweep: it has no {name}") from None
+    except (OSError, ValueError, KeyError) as fault:
+        raise PatchfemError(f"{folder}: its sweep cannot be read: {fault}") from None
+
+
+def _table(folder: Path, rows: list, keys: list, file) -> dict:
+    columns = []
+    for key in keys:
+        held = file[re.sub(r"\W", "_", key)]
+        texts = [row[key] for row in rows]
+        along = np.asarray(held[...])
+        places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
+        values = along if along.size == len(rows) and "case" in file.dimensions else along[[places[t] for t in texts]]
+        values = numbers(values.tolist())
+        columns.append({"name": key, "unit": str(held.attrs.get("units", "1")), "texts": texts, "values": values,
+                        "log": wide(values.tolist())})
+    measures = {name: {"unit": str(file[name].attrs["units"]), "means": str(file[name].attrs["long_name"]),
+                       "values": np.asarray(file[name][...], float).ravel(),
+                       "errors": np.asarray(file[f"{name}_error"][...], float).ravel()}
+                for name in file.variables if f"{name}_error" in file.variables}
+    text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
+    overs = [] if "case" in file.dimensions else [word for one in columns for word in
+                                                  ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
+    return {"title": f"Sweep: {tomllib.loads(text).get('title') or folder.resolve().name}",
+            "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text, "seconds": float("nan"),
+            "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),
+                                   *(word for one in sets for word in ("--set", one)), *overs]),
+            "grid": "case" not in file.dimensions, "keys": columns, "measures": measures,
+            "outcome": [row["outcome"] for row in rows],
+            "messages": {number: row["message"] for number, row in enumerate(rows) if row["message"]},
+            "folders": [opened(folder, row["case"]) for row in rows] if rows and "case" in rows[0] else None}
+
+
+def joined(tables: list, names: list) -> dict:
+    """One table of several sweeps, told apart by a key `sweep` that has their names for values.
+
+    PatchfemError where they were not made over the same keys.
+    """
+    keys = [[one["name"] for one in table["keys"]] for table in tables]
+    if any(sorted(one) != sorted(keys[0]) for one in keys):
+        raise PatchfemError("sweeps over other keys cannot be laid side by side: " + "; ".join(
+            f"{name}: {', '.join(one)}" for name, one in zip(names, keys)))
+    counts = [len(table["outcome"]) for table in tables]
+    columns = [{"name": "sweep", "unit": "1", "log": False, "values": np.repeat(np.arange(len(tables)), counts) * 1.0,
+                "texts": [name for name, count in zip(names, counts) for _ in range(count)]}]
+    for key in keys[0]:
+        own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
+        columns.append({"name": key, "unit": own[0]["unit"], "log": own[0]["log"],
+                        "texts": [text for one in own for text in one["texts"]],
+                        "values": np.concatenate([one["values"] for one in own])})
+    measures, shift = {}, np.cumsum([0, *counts])
+    for name in dict.fromkeys(name for table in tables for name in table["measures"]):
+        own = [table["measures"].get(name) for table in tables]
+        first = next(one for one in own if one is not None)
+        measures[name] = {"unit": first["unit"], "means": first["means"]} | {
+            part: np.concatenate([np.full(count, np.nan) if one is None else one[part]
+                                  for one, count in zip(own, counts)]) for part in ("values", "errors")}
+    return {"title": " and ".join(names), "own": False, "version": tables[0]["version"], "seconds": float("nan"),
+            "command": "\n".join(table["command"] for table in tables), "scene": "\n".join(
+                f"# {name}\n{table['scene']}" for name, table in zip(names, tables)),
+            "grid": all(table["grid"] for table in tables), "keys": columns, "measures": measures,
+            "outcome": [one for table in tables for one in table["outcome"]],
+            "messages": {number + start: why for table, start in zip(tables, shift.tolist())
+                         for number, why in table["messages"].items()},
+            "folders": [one for table in tables for one in table["folders"]]
+            if all(table["folders"] is not None for table in tables) else None}
+
+
+def seen_from(table: dict, folder: Path, page: Path) -> dict:
+    """The table with the links of its cases as they are seen from a page elsewhere."""
+    if table["folders"] is None:
+        return table
+    way = os.path.relpath(folder, page.parent)
+    return table | {"own": way == ".", "folders": [Path(way, one).as_posix() for one in table["folders"]]}
