@@ -62,7 +62,7 @@ def test_exact_a_refused_case_is_a_row_with_its_message(swept):
         assert row["loop_area"] == ""
         assert json.loads((out / "cases" / row["case"] / "summary.json").read_text())["message"] == row["message"]
     assert "6 cases:" in answer.out and "2 failed" in answer.out
-    assert "case 5 and 1 more: --set: normal.load: must be >= 0" in answer.err
+    assert "case 5 and 1 more: normal.load: must be >= 0" in answer.err
 
 
 def test_exact_the_dataset_has_a_dimension_per_key(swept):

@@ -39,14 +39,18 @@ class Asked:
         try:
             return build(self.scene(sets))
         except SceneError as error:
-            raise PatchfemError("; ".join(error.mistakes)) from None
+            raise PatchfemError("; ".join(_of_case(error))) from None
+        except PatchfemError:
+            raise
+        except Exception as error:  # a defect of one case must not cost the answers of a thousand others
+            raise PatchfemError(f"internal fault, please report it: {type(error).__name__}: {error}") from error
 
     def mistakes(self, sets: Sequence[str]) -> list[str]:
         """Every mistake of the scene of a case; none where it is valid."""
         try:
             self.scene(sets)
         except SceneError as error:
-            return error.mistakes
+            return _of_case(error)
         return []
 
     def axes(self) -> tuple[list, list[str]]:
@@ -83,6 +87,11 @@ def _base(asked: Asked) -> Base | None:
         return Base(asked._read(()))
     except SceneError:
         return None
+
+
+def _of_case(error: SceneError) -> list[str]:
+    """The mistakes of a case; one in a value that was set has no place but its key."""
+    return [text.removeprefix("--set: ") for text in error.mistakes]
 
 
 def _texts(value: Any) -> Iterator[str]:

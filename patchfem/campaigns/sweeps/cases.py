@@ -11,6 +11,9 @@ from math import prod
 from ...scene.axes import Axis
 from .asked import Asked
 
+PIECES = tuple(f"contact.{name}" for name in ("length", "width", "height", "pairs", "plane", "substrate", "coating",
+                                              "upper", "lower", "mesh", "element_size", "step", "profile"))
+
 
 @dataclass(frozen=True, slots=True)
 class Cases:
@@ -67,6 +70,19 @@ class Cases:
         for size, some in zip(self.shape, places):
             numbers = [number * size + place for number in numbers for place in some]
         return numbers
+
+    def neighbours(self, numbers: Sequence[int]) -> list[int]:
+        """The cases in an order in which those with the same pieces follow each other, for they share most work."""
+        slow = [k for k, axis in enumerate(self.axes) if axis.key.startswith(PIECES)]
+        if not slow:
+            return list(numbers)
+        alike = [{value: place for place, value in reversed(list(enumerate(axis.values)))} for axis in self.axes]
+
+        def pieces(number: int) -> list:
+            places = self.places(number)
+            return [alike[k][self.axes[k].values[places[k]]] for k in slow]
+
+        return sorted(numbers, key=pieces)
 
     def keys(self, asked: Asked) -> list[str]:
         """Name of every case, made of what it computes: the same values in other units or another order have the same

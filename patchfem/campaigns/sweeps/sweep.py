@@ -114,7 +114,8 @@ def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = 
     executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
     every chunk that `take` hands out until it hands out none.
     """
-    work, chunks = with_meshes(work) if len(numbers) else work, Chunks(numbers, executor.workers)
+    work = with_meshes(work) if len(numbers) else work
+    chunks = Chunks(work.cases.neighbours(numbers), executor.workers)
     for chunk, seconds, found in executor.run(work, chunks.take, say):
         if isinstance(found, Died):
             lost = chunks.died(chunk)

@@ -52,6 +52,14 @@ def test_exact_a_name_says_what_is_computed():
     assert cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").keys(Asked(Path("a.toml"), swept)) == one
 
 
+def test_exact_cases_of_the_same_pieces_follow_each_other():
+    found = cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
+    assert found.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
+    assert cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [0, 1, 2, 3]
+    assert cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
+    assert replace(cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours([2, 0, 1]) == [0, 1, 2]
+
+
 def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     pinned, chosen = Asked(Path("a.toml"), SMALL_PATCH), Asked(Path("a.toml"), PATCH)
     one, two = cases("contact.load=1 N,2 N"), cases("contact.load=1 N,3 N")
