@@ -50,7 +50,7 @@ class Steady:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curve:
-    """A frequency response, arrays (k,) with the meanings of Steady.
+    """Steady motions under many sines, arrays of one shape with the meanings of Steady.
 
     omega [rad/s] of the drive; regime: of Regime; stops; amplitude [m]; stick_fraction; multiplier: the larger one;
     condition; residual.
@@ -112,14 +112,35 @@ def _steady(row, found, phases, output: float) -> Steady:
 
 def response(modes: ModalBasis, drives, static: float, kinetic: float, patience: int = 4000) -> Curve:
     """Steady motions under each of `drives` from rest, compiled."""
-    rows, output = zip(*(_row(modes, drive, static, kinetic, None) for drive in drives))
-    table, found = np.array(rows, float), np.zeros((len(rows), 12))
-    phases = np.full((len(rows), orbit_kernels.PHASES), np.nan)
+    sines = [(abs(row[4]) / max(abs(float(modes.base[0])), 1e-300), row[5]) for row, _ in
+             (_row(modes, drive, static, kinetic, None) for drive in drives)]
+    level, omega = np.array(sines, float).T
+    return motions(modes, level, omega, static, kinetic, patience)
+
+
+def motions(modes: ModalBasis, level, omega, static, kinetic=None, patience: int = 4000) -> Curve:
+    """Steady motions from rest, compiled, as `point` finds them one by one: a map over level, frequency and load.
+
+    level >= 0 [m s-2]: amplitude of the drive, an acceleration or a force over the modal mass; omega > 0 [rad/s];
+    static, kinetic >= 0 [N], kinetic = static without it. Each is a number or an array, broadcast together; the Curve
+    has their shape. PatchfemError for other sizes, and as `sdof.scene_of`.
+    """
+    level, omega, static, kinetic = np.broadcast_arrays(level, omega, static, static if kinetic is None else kinetic)
+    size, share = level.size, abs(float(modes.slide[0])) / modes.mass
+    if modes.omega.size != 1 or modes.interfaces.shape[0] != 1 or (share == 0 and np.any(static > 0)):
+        raise PatchfemError("structure: a map of steady motions is of one mode that moves one interface")
+    if not (np.all(level >= 0) and np.all(omega > 0) and np.all(kinetic >= 0) and np.all(kinetic <= static)):
+        raise PatchfemError("friction.kinetic: a map of steady motions wants levels >= 0, frequencies > 0 and "
+                            "0 <= kinetic <= static friction")
+    table, found, phases = np.zeros((size, 8)), np.zeros((size, 12)), np.full((1, orbit_kernels.PHASES), np.nan)
+    w, decay, output = float(modes.omega[0]), float(modes.dampers[0, 0]) / 2, abs(float(modes.output[0]))
+    for place, column in enumerate((w, decay, static * share, kinetic * share, -float(modes.base[0]) * level, omega)):
+        table[:, place] = np.ravel(column)
     load("dynamics.one_mode.steady_kernels").points(table, patience, found, phases)
-    condition = np.array([_condition(*case) for case in zip(rows, found, output)])
-    regime = np.array([REGIMES[int(k)] for k in found[:, 0]])
-    return Curve(table[:, 5].copy(), regime, found[:, 1], found[:, 2] * output[0], found[:, 4],
-                 found[:, 5] + 1j * found[:, 6], condition, found[:, 9])
+    columns = (found[:, 1], found[:, 2] * output, found[:, 4], found[:, 5] + 1j * found[:, 6],
+               found[:, 3] * output * (w**2 if w > 0 else table[:, 5]**2), found[:, 9])
+    regime = np.array(REGIMES)[found[:, 0].astype(int)]
+    return Curve(omega.copy(), regime.reshape(omega.shape), *(one.reshape(omega.shape) for one in columns))
 
 
 def jenkins_point(modes: ModalBasis, drive, limit: float, stiffness: float) -> tuple:

@@ -12,9 +12,10 @@ point = compiled_copy(plain, ("impulse", "flow", "newton", "sliding_guess", "set
 
 @njit(error_model="numpy", cache=True)
 def points(table, patience, found, phases):
-    """Steady motion of many cases. table (n, 8): w, decay, static, kinetic, B, om and z, v at phase 0, forces over the
-    mass; found (n, 12) and phases (n, 16) as in `point`."""
-    out = np.empty(24)
+    """Steady motion of many cases, in one call. table (n, 8): w, decay, static, kinetic, B, om and z, v at phase
+    0, forces over the mass; found (n, 12) and phases (n, 16) as in `point`; phases (1, 16) are written over by
+    every case."""
+    out, last = np.empty(24), phases.shape[0] - 1
     for n in range(table.shape[0]):
         w, decay, static, kinetic, b, om, z, v = table[n]
-        point(w, decay, static, kinetic, b, om, z, v, patience, out, phases[n], found[n])
+        point(w, decay, static, kinetic, b, om, z, v, patience, out, phases[min(n, last)], found[n])

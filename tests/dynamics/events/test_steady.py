@@ -13,7 +13,7 @@ from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
 from patchfem.dynamics.one_mode import orbit_kernels, sdof_kernels, slip_kernels
-from patchfem.dynamics.one_mode.steady import Regime, jenkins_point, point, response
+from patchfem.dynamics.one_mode.steady import Regime, jenkins_point, motions, point, response
 from patchfem.structure.drives import levels
 
 
@@ -290,3 +290,27 @@ def test_exact_a_start_chooses_between_two_motions():
     assert rest.regime == Regime.STUCK
     going = steady(1.1, 0.003, 1.0, 0.5, start=Start(np.array([0.0]), np.array([-50.0])))
     assert going.regime == Regime.SLIDING and going.amplitude == pytest.approx(60.5632260810004979, rel=1e-12)
+
+
+def test_exact_map_is_point_by_point():
+    """Levels, frequencies and loads that stick, stop, slide and grow; weakening friction among them."""
+    own = modes_of(3.0, 0.01, slide=-0.7, base=0.8, output=1.3, mass=2.0)
+    level, omega = np.array([0.5, 3.0])[:, None, None], np.array([1.5, 3.0, 4.0])[:, None]
+    load = np.array([0.2, 1.0, 9.0])
+    found = motions(own, level, omega, 0.3 * load, 0.2 * load)
+    assert found.amplitude.shape == (2, 3, 3) and set(found.regime.ravel()) >= {"stuck", "stops"}
+    for i, j, k in np.ndindex(2, 3, 3):
+        one = point(own, BaseSine(level[i, 0, 0], omega[j, 0]), 0.3 * load[k], 0.2 * load[k])
+        here = (i, j, k)
+        assert found.regime[here] == one.regime and found.omega[here] == omega[j, 0]
+        got = [getattr(found, name)[here] for name in ("stops", "amplitude", "stick_fraction", "condition")]
+        want = [one.stops, one.amplitude, one.stick_fraction, one.condition]
+        np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-12)
+        assert abs(found.multiplier[here]) == pytest.approx(abs(one.multipliers[0]), rel=1e-6, abs=1e-9)
+
+
+def test_refuses_a_map_of_more_kinetic_than_static_friction():
+    with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
+        motions(modes_of(), 1.0, 1.0, 0.2, 0.3)
+    with pytest.raises(PatchfemError, match="structure"):
+        motions(modes_of(slide=0.0), 1.0, 1.0, 0.2)
