@@ -9,7 +9,8 @@ of pieces that give way, "joints" (several interfaces, springs that bend, strips
 "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events, "pieces" of it (elements that
 stick or slip, exact from yield to yield). Traits: "set-valued" (it holds
 without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
-"timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds).
+"timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds),
+"cells" (a density cut into elements).
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
 drive is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its
@@ -90,7 +91,7 @@ EFFECTS = {
                                      "(Oden, Pires)", ("bond_length", "order spread"), "exact",
                                      "averaged set-valued timeless memoryless"),
     "friction.law=iwan": _law("laws.iwan", "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max)"
-                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic pieces", "timeless"),
+                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic pieces", "timeless cells"),
     "friction.law=bouc-wen": _law("laws.bouc_wen", "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
                                   ("stiffness", "exponent shape"), "joints harmonic", "timeless"),
     "friction.law=lugre": _law("laws.lugre", "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "

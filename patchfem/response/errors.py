@@ -22,10 +22,15 @@ SURE = 2.2  # times the error that follows from the order: 95 % of these are bel
 LOOSE = 1.3  # times the larger change: 95 % of the errors of irregular measures lie below 0.4 to 1.1 of it
 GROWS = 1.5  # times that where the later change is the larger one: nothing converges yet
 # of measures that hang on few steps, or are small differences
-LOOSER = {"slip_amplitude": 1.4, "stick_fraction": 1.5, "slip_start_phase": 1.4, "drift_per_cycle": 2.0,
-          "equivalent_damping": 1.3, "secant_stiffness": 1.3}
+LOOSER = {"slip_amplitude": 1.4, "stick_fraction": 1.7, "slip_start_phase": 1.4, "drift_per_cycle": 2.0,
+          "equivalent_damping": 1.3, "equivalent_stiffness": 1.2, "secant_stiffness": 1.3, "friction_force_peak": 1.7,
+          "loop_area": 1.1, "friction_work": 1.5, "energy_dissipated": 1.5, "energy_stored": 1.5}
+BETWEEN = {"slip_start_phase": 1.0, "stick_fraction": 0.3}  # over the steps per cycle: where a law is set-valued, what
+# the place of a release between two samples leaves open
 SHARE, LEAST = 0.4, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.15, 0.1  # of runs that a tolerance tells apart
+OF_CELLS = 0.3  # of runs whose cells are half as many
+OF_FLOOR = 0.1  # of the floor of a measure: a march without an order claims no more digits
 ROUND = 1e-12  # of a value, the last digits of a long sum
 GAPS = ("energy_balance", "work_check")
 LAST = 1e-13  # of the amplitude, the last digits of a mean over it
@@ -54,10 +59,10 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
     """
     last, before = signed(fine, half), signed(half, quarter)
     sizes = {name: max(abs(gap), abs(before.get(name, 0.0)) / 4) for name, gap in last.items()}
-    typical = median([sizes[name] / abs(fine[name]) for name in MAIN if sizes.get(name) and fine[name]] or [0.0])
+    typical = typical_change(fine, sizes)
     out = {}
     for name, gap in last.items():
-        earlier, value = before.get(name, 0.0), abs(fine[name])
+        earlier, value = before.get(name, 0.0), _size(fine, name)
         if sizes[name] <= ROUND * value:  # a limit or a given load: it does not hang on the step
             out[name] = sizes[name]
         elif gap and ORDERS[0] <= earlier / gap <= ORDERS[1]:
@@ -66,8 +71,21 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
             kind, grows = of_first(name), GROWS if abs(earlier) < abs(gap) else 1.0
             least = 0.0 if kind in APART else SHARE * typical * value
             out[name] = grows * LOOSE * LOOSER.get(kind, 1.0) * max(sizes[name], least)
+        if sizes[name] > ROUND * value:
+            out[name] = max(out[name], OF_FLOOR * row_of(name).floor)
         out[name] += row_of(name).grain / steps
     return out
+
+
+def _size(values: dict, name: str) -> float:
+    """What a share of a measure is a share of: its value, and of the stiffness that of the whole first harmonic.
+
+    The part of the force against the slide, W/(pi A^2) over the slide, is often many times the part with it.
+    """
+    value, reach = abs(values[name]), values.get("slip_amplitude", 0.0)
+    if name == "equivalent_stiffness" and reach:
+        return float(np.hypot(value, values.get("loop_area", 0.0) / (np.pi * reach**2)))
+    return value
 
 
 def tolerance_error(fine: dict, coarse: dict) -> dict:
@@ -79,10 +97,33 @@ def tolerance_error(fine: dict, coarse: dict) -> dict:
     scene in 82 %, at a median of four to twelve times the error of most measures.
     """
     gaps = change(fine, coarse)
-    typical = median([gaps[name] / abs(fine[name]) for name in MAIN if gaps.get(name) and fine[name]] or [0.0])
+    typical = typical_change(fine, gaps)
     size = abs(fine.get("relative_displacement_amplitude", 0.0))
     return {name: max(OF_CHANGE * gap, OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])))
             for name, gap in gaps.items()}
+
+
+def jumps_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
+    """`step_error` of a set-valued law, whose releases lie between samples."""
+    found = step_error(fine, half, quarter, steps)
+    return {name: error + BETWEEN.get(of_first(name), 0.0) / steps for name, error in found.items()}
+
+
+def cells_error(fine: dict, coarse: dict) -> dict:
+    """Error by name of a run whose law is a density cut into cells, from one with half as many.
+
+    The error falls with the square of the cells, so it is a third of the change; three times that counts, and a share
+    of what the main measures of the run typically change by.
+    """
+    gaps = change(fine, coarse)
+    typical = typical_change(fine, gaps)
+    return {name: gap if of_first(name) in APART else max(gap, OF_CELLS * typical * abs(fine[name]))
+            for name, gap in gaps.items()}
+
+
+def typical_change(fine: dict, sizes: dict) -> float:
+    """Median relative change [1] of the main measures of a run, 0 where none changes."""
+    return median([sizes[name] / abs(fine[name]) for name in MAIN if sizes.get(name) and fine[name]] or [0.0])
 
 
 def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:

@@ -10,6 +10,7 @@ from ..dynamics.second_book import gap, sampled_work, share
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
+JUMP = 4.0  # times the change on the other side of a sample, beyond which it is no smooth peak
 
 
 def energy_balance(book: dict):
@@ -113,6 +114,26 @@ def acceleration_peak(window: Response) -> float:
     bend = left - 2 * mid + right
     gain = -(right - left)**2 / (8 * bend) if bend < 0 else 0.0
     return float(mid + (gain if gain < 0.01 * mid else 0.0))  # a larger gain is a jump, not a smooth peak
+
+
+def peaks_between(window: Response) -> dict:
+    """What sampled peaks may lie above their samples, by name, beside what fewer steps show.
+
+    Where the acceleration jumps at its largest sample, its change over a step on the smooth side; of a normal load that
+    changes, an eighth of its second difference at either end of its range.
+    """
+    size, out = np.abs(window.acceleration), {}
+    top = int(np.argmax(size))
+    if 0 < top < len(size) - 1:
+        left, right = abs(size[top] - size[top - 1]), abs(size[top] - size[top + 1])
+        if max(left, right) > JUMP * max(min(left, right), 1e-300):
+            out["absolute_acceleration_peak"] = float(min(left, right))
+    load = window.extra.get("normal_load")
+    if load is not None and len(load) > 2:
+        for name, at in (("normal_load_least", int(np.argmin(load))), ("normal_load_peak", int(np.argmax(load)))):
+            at = min(max(at, 1), len(load) - 2)
+            out[name] = abs(float(load[at - 1] - 2 * load[at] + load[at + 1])) / 8
+    return out
 
 
 def swing(window: Response) -> float:

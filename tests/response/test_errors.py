@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.model.model import build
-from patchfem.response.errors import MAIN, SURE, change, step_error, with_errors
+from patchfem.response.errors import BETWEEN, MAIN, SURE, cells_error, change, jumps_error, step_error, with_errors
 from patchfem.runs.rig import march as rig_march
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
@@ -108,3 +108,34 @@ def test_always_a_measure_that_hardly_changes_knows_what_the_others_do():
     half, quarter = ({name: 3.0 * (1 + gap) for name in MAIN} for gap in (1e-3, -1e-3))
     half["loop_area"] = quarter["loop_area"] = 3.0 + 1e-9
     assert step_error(values, half, quarter, 400)["loop_area"] >= 0.2 * 3e-3
+
+
+def test_exact_the_stiffness_of_a_slipping_contact_knows_its_whole_harmonic():
+    """Against the slide the force is a hundred times the part with it: an angle that changes by 1e-3 changes the
+    stiffness by a tenth, and a bar that is a share of its value alone would be a hundredth of that."""
+    values = {name: 1.0 for name in MAIN} | {"equivalent_stiffness": 1.0, "loop_area": 100 * np.pi}
+    half, quarter = ({name: v * (1 + gap) for name, v in values.items()} for gap in (1e-3, -1e-3))
+    half["equivalent_stiffness"] = quarter["equivalent_stiffness"] = 1.0 + 1e-6
+    assert step_error(values, half, quarter, 400)["equivalent_stiffness"] >= 0.4e-3 * np.hypot(100, 1)
+
+
+def test_always_a_march_claims_no_digit_far_below_the_floor():
+    """Three runs that agree by chance to 1e-14 m: a tenth of the floor of 1e-10 m stays."""
+    values = {NAME: 1e-9}
+    assert step_error(values, {NAME: 1e-9 + 1e-14}, {NAME: 1e-9 + 4e-14}, 400)[NAME] == pytest.approx(1e-11)
+
+
+def test_exact_a_release_lies_between_two_samples():
+    """Runs of Coulomb friction that agree still leave the release open by a share of their step."""
+    same = {"slip_start_phase": 0.6, NAME: 1.0}
+    found = jumps_error(same, same, same, 128)
+    assert found["slip_start_phase"] == pytest.approx(BETWEEN["slip_start_phase"] / 128)
+    assert found[NAME] == step_error(same, same, same, 128)[NAME]
+
+
+def test_always_runs_with_half_the_cells_hold_an_error_of_second_order():
+    """v(N) = v + c/N^2: three times the error, and where one measure stayed by chance a share of what others show."""
+    values = {name: 1.0 for name in MAIN}
+    coarse = {name: 1.0 + 3e-6 for name in MAIN} | {"loop_area": 1.0}
+    found = cells_error(values, coarse)
+    assert found[NAME] == pytest.approx(3e-6) and found["loop_area"] >= 0.5e-6

@@ -10,59 +10,101 @@ import sys
 import tempfile
 from collections import defaultdict
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 from motion_read import measures
-from motion_reference import Motion
+from motion_reference import Motion, TooLong
 from motion_scenes import spec, written
+from motion_steady import periodic
 
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.model.model import build
+from patchfem.response.errors import change
 from patchfem.response.rows import TABLE, of_first
+from patchfem.runs.rig.engines import no_pieces
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, load
 
 FINER = 16  # times the steps of the run that stands for the truth
 LONGEST = 240  # seconds of a scene
-MOST_STEPS = 8000  # of DOP853, some three seconds
+MOST_STEPS = 12000  # of DOP853, some six seconds
+SURE = 5.0  # times the change at the last halving of the steps, what the finer run may be off
+ROUGH, FINE = (0.04, 1e-10), (0.025, 1e-12)  # longest step over the shortest period and relative error of a step
+SHARPEST = ("exact", "piecewise", "smooth")  # engines whose bars ask for both
 LEFT_OUT = ("energy_balance", "work_check", "normal_load", "energy_created", "jump_level", "level_hysteresis",
             "relative_displacement_amplitude_steady")
 SHARP = 1e-8  # of the value: a bar that is narrower is as sharp as anybody can use
 
 
-def referable(s: dict, end: float) -> bool:
-    """Whether the independent program has the equations of a spec, and the time for a run to end [s]."""
+def referable(s: dict) -> bool:
+    """Whether the independent program has the equations of a spec."""
     if s["law"] in ("order", "report") or "load_amplitude" in s or (s["patch"] or {}).get("shear"):
         return False
-    if (s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"):
-        return False
-    return end / Motion(s).step() < MOST_STEPS
+    return not ((s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"))
 
 
 def truth_of(s: dict, path, result) -> tuple:
     """(truth by name, what it is itself uncertain by, its kind) of a scene and its Result."""
-    model, extra = build(load(path)), result.extra
-    numerics, rig = choose(model), model.rig
-    end = numerics.cycles * rig.drive.period
-    if referable(s, end) and s.get("method") != "harmonic":
-        motion = Motion(s)
-        stretches = motion.run(end, 1e-10)
-        found = measures(motion, stretches, rig.drive.period, numerics.cycles, numerics.window)
-        return found, doubts(found), "reference"
+    model = build(load(path))
+    if referable(s):
+        try:
+            return _steady(s, model) if s.get("method") == "harmonic" else _moved(s, model)
+        except TooLong:
+            pass
+    return _finer(s, path, model, result.extra)
+
+
+def _moved(s: dict, model) -> tuple:
+    """Truth by the independent program; what a second, more careful run of it changes is what it does not know."""
+    numerics, period, runs = choose(model), model.rig.drive.period, []
+    for share, rtol in (ROUGH, FINE) if numerics.engine in SHARPEST else (ROUGH,):
+        motion = Motion(s, share)
+        stretches = motion.run(numerics.cycles * period, rtol, most=MOST_STEPS)
+        runs.append(measures(motion, stretches, period, numerics.cycles, numerics.window))
+    return runs[-1], doubts(*runs), "reference"
+
+
+def _steady(s: dict, model) -> tuple:
+    """Truth of a steady motion by the independent program: its periodic state, or a run that has settled."""
+    period, motion = model.rig.drive.period, Motion(s)
+    start = periodic(motion, period)
+    if start is not None:
+        return measures(motion, motion.run(period, 1e-11, start), period, 1.0, 1), {}, "reference"
+    motion = Motion(s)
+    each = 25 * max(1.0, motion.plant.fastest / s["frequency"])
+    cycles = next((k for k in (320, 160, 80) if k * each < MOST_STEPS), 40)
+    stretches = motion.run(cycles * period, 1e-10, most=MOST_STEPS)
+    runs = [measures(motion, stretches, period, cycles, 1)]
+    before = Motion(s)
+    runs.append(measures(before, before.run(cycles / 2 * period, 1e-10), period, cycles / 2, 1))
+    return runs[0], doubts(*runs[::-1]), "reference"
+
+
+def _finer(s: dict, path, model, extra: dict) -> tuple:
+    """Truth by the program itself: elements from yield to yield where it marched, else many more steps."""
     sets = [f"accuracy.tolerance={model.accuracy.tolerance / 10:g}"]
     if s.get("method") == "harmonic":
         return _values(load(path, [*sets, "accuracy.harmonics=129"])), {}, "harmonics"
+    if extra["engine"] == "march" and not no_pieces(model):
+        return _values(load(path, [*sets, "accuracy.method=exact"])), {}, "pieces"
     steps = extra.get("steps_per_cycle") or 400
     runs = [_values(load(path, [*sets, "accuracy.method=march", f"accuracy.steps_per_cycle={share * steps}"]))
-            for share in ((FINER,) if "steps_per_cycle" in extra else (FINER // 2, FINER))]
-    doubt = {name: abs(value - runs[0][name]) for name, value in runs[-1].items() if name in runs[0]}
+            for share in (FINER // 2, FINER)]
+    doubt = {name: SURE * gap for name, gap in change(*runs[::-1]).items()}
     return runs[-1], doubt, "finer"
 
 
-def doubts(found: dict) -> dict:
-    """What the independent program leaves open itself: a drift is a difference of means of the motion."""
-    return {"drift_per_cycle": 1e-9 * found["relative_displacement_amplitude"]}
+def doubts(rough: dict, fine: dict | None = None) -> dict:
+    """What the independent program leaves open itself: a drift is a difference of means of the motion.
+
+    rough, fine: measures of one run, or of a second one that is more careful.
+    """
+    out = {} if fine is None else change(fine, rough)
+    least = 1e-9 if fine is None else 1e-14
+    return out | {"drift_per_cycle": out.get("drift_per_cycle", 0.0)
+                  + least * rough["relative_displacement_amplitude"]}
 
 
 def _values(scene) -> dict:
@@ -75,15 +117,18 @@ def compared(seed: int, folder: Path) -> dict:
     s = spec(seed)
     path = written(s, folder)
     out = {"seed": seed, "law": s["law"], "drive": s["drive"], "rows": []}
+    begin = process_time()
     try:
         result = run(load(path))
     except (PatchfemError, SceneError, Missing, NotConverged) as error:
         return out | {"refused": str(error)}
     out |= {"engine": result.extra["engine"], "outcome": str(result.outcome),
-            "steps": result.extra.get("steps_per_cycle")}
+            "steps": result.extra.get("steps_per_cycle"), "seconds": process_time() - begin}
     if str(result.outcome) in ("grows", "not_converged"):
         return out
+    begin = process_time()
     truth, doubt, out["truth"] = truth_of(s, path, result)
+    out["truth_seconds"] = process_time() - begin
     for name, m in result.measures.items():
         if m.value is None or m.error is None or name not in truth or of_first(name) not in TABLE or name in LEFT_OUT:
             continue

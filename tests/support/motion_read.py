@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 from motion_reference import Motion
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
+NEAR, MOST = 1e-4, 12  # peaks that are refined: how near the largest node, and how many
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
@@ -63,18 +64,22 @@ class Window:
     def top(self, values, of, where=None) -> float:
         """Largest value over the window: that of the nodes, refined in the steps where it lies; of(t, y) -> value.
 
-        where: mask of the nodes that count, all unless given.
+        where: mask of the nodes that count, all unless given; a step lies inside it or outside.
         """
         values, each = values if where is None else np.where(where, values, -np.inf), NODES.size + 2
         best = float(values.max())
-        for k in np.unique(np.flatnonzero(values >= best - 1e-12 * abs(best))[:4]):
+        beside = np.concatenate([[-np.inf], values, [-np.inf]])
+        peaks = np.flatnonzero((values >= beside[:-2]) & (values >= beside[2:]) & (values >= best - NEAR * abs(best)))
+        for k in peaks[np.argsort(-values[peaks])[:MOST]]:
             for part in {k // each, min((k + 1) // each, len(self.parts) - 1), max((k - 1) // each, 0)}:
                 one, t = self.parts[part]
+                if where is not None and not where[part * each + 1:part * each + each - 1].all():
+                    continue  # the next cycle begins here, it may go farther
                 inside = min(max(k - part * each, 0), each - 1)
                 self.restore(one)
                 found = minimize_scalar(lambda x, one=one: -of(x, one.solution(x)), method="bounded",
                                         bounds=(t[max(inside - 1, 0)], t[min(inside + 1, each - 1)]),
-                                        options={"xatol": 1e-9 * (t[-1] - t[0])})
+                                        options={"xatol": 1e-7 * (t[-1] - t[0])})
                 best = max(best, float(-found.fun))
         return best
 
@@ -92,8 +97,10 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     for k, law in enumerate(motion.laws):
         tail = f"_{k + 1}" if k else ""
         out[f"friction_force_peak{tail}"] = w.top(np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k]))
-        slip = w.q[:, k] - w.back[:, k]
-        out[f"slip_amplitude{tail}"] = (slip.max() - slip.min()) / 2
+        slip, part, face = w.q[:, k] - w.back[:, k], motion.parts[k], p.faces[k]
+        ends = [w.top(sign * slip, lambda t, y, law=law, part=part, face=face, sign=sign:
+                      sign * (face @ y[:n] - law.reversible(y[part]))) for sign in (1, -1)]
+        out[f"slip_amplitude{tail}"] = sum(ends) / 2
         out[f"loop_area{tail}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
         out[f"stick_fraction{tail}"], starts = _stuck(w, law, k)
         if k == 0 and sine and starts.size:
@@ -125,14 +132,38 @@ def _stuck(w: Window, law, k: int) -> tuple:
         return share, w.t[1:][stuck[:-1] & ~stuck[1:]]
     if law.size == 0:
         return 0.0, np.empty(0)
+    motion, part, face = w.motion, w.motion.parts[k], w.motion.plant.faces[k]
+
+    def above(t, y):
+        v = face @ y[motion.n:2 * motion.n]
+        return abs(law.split(y[part], v, t) / v) - 0.5 if v else -0.5
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        above = np.where(w.v[:, k] == 0, -0.5, np.abs(w.split[:, k] / w.v[:, k]) - 0.5)
-    step, before, after = np.diff(w.t), above[:-1], above[1:]
-    down, up = np.minimum(before, after), np.maximum(before, after)
-    below = np.where(up < 0, 1.0, np.where(down >= 0, 0.0, -down / np.where(up > down, up - down, 1.0)))
-    rises = (before < 0) & (after >= 0)
-    starts = w.t[:-1][rises] - before[rises] / (after - before)[rises] * step[rises]
-    return float(below @ step) / (w.end - w.begin), starts
+        values = np.where(w.v[:, k] == 0, -0.5, np.abs(w.split[:, k] / w.v[:, k]) - 0.5)
+    below, starts = 0.0, []
+    for number, (one, t) in enumerate(w.parts):
+        row = values[number * t.size:(number + 1) * t.size]
+        w.restore(one)
+        turns = [brentq(lambda x, one=one: above(x, one.solution(x)), t[j], t[j + 1], xtol=1e-16)
+                 if row[j] and row[j + 1] else t[j + (row[j + 1] == 0)]
+                 for j in np.flatnonzero((row[:-1] < 0) != (row[1:] < 0))]
+        sides = np.array([t[0], *turns, t[-1]])
+        below += float(np.diff(sides)[int(row[0] >= 0)::2].sum())
+        starts += turns[int(row[0] >= 0)::2]
+        if number and values[number * t.size - 1] < 0 <= row[0]:  # at an event
+            starts.append(t[0])
+    return below / (w.end - w.begin), np.array(starts)
+
+
+def _secant(w: Window, motion: Motion, period: float, window: int) -> float:
+    """Force at the largest slide of a cycle less that at the smallest over their distance, the mean over the cycles; of
+    laws whose force does not jump."""
+    out = []
+    for c in range(window):
+        mine = np.flatnonzero((w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period))
+        low, high = mine[np.argmin(w.q[mine, 0])], mine[np.argmax(w.q[mine, 0])]
+        out.append((w.f[high, 0] - w.f[low, 0]) / (w.q[high, 0] - w.q[low, 0]))
+    return float(np.mean(out))
 
 
 def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
@@ -147,6 +178,8 @@ def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
     if np.ptp(q) == 0:
         return out
     out["equivalent_stiffness"] = float((part(f) / first).real)
+    if not motion.laws[0].set_valued and motion.s["law"] != "tanh":  # its force changes by much where the slide turns
+        out["secant_stiffness"] = _secant(w, motion, period, window)
     if motion.plant.first > 0:
         each, face = [], motion.plant.faces[0]
         for c in range(window):

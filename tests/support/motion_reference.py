@@ -10,7 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 from motion_laws import LAWS
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, OdeSolution
+from scipy.optimize import brentq
+
+LOOKS = 4  # at the guards in a step of the integrator
 
 
 class Plant(NamedTuple):
@@ -87,6 +90,37 @@ def drive_of(s: dict):
     return (lambda t: size * np.sin(omega * t)), [], kind != "force"
 
 
+class TooLong(Exception):
+    """A motion takes more steps than it is worth."""
+
+
+def stretched(motion, t: float, y, stop: float, guards, rtol: float, atol) -> tuple:
+    """(dense solution from t [s] to the first guard that falls through zero or to stop [s], that guard or None).
+
+    Guards are looked at LOOKS times in every step, on its dense output: what falls and rises between two looks is not
+    seen.
+    """
+    first = motion.longest(y, motion.slope(t, y))
+    solver = DOP853(motion.slope, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t))
+    times, parts, before = [t], [], np.array([guard[2](t, y) for guard in guards])
+    while solver.status == "running":
+        solver.max_step = motion.longest(solver.y, solver.f)
+        assert solver.step() is None, "the integrator gave up"
+        part, begin = solver.dense_output(), solver.t_old
+        parts.append(part)
+        for at in np.linspace(begin, solver.t, LOOKS + 1)[1:]:
+            after = np.array([guard[2](at, part(at)) for guard in guards])
+            fell = np.flatnonzero((before >= 0) & (after <= 0))
+            if fell.size:
+                roots = [brentq(lambda x, g=guards[k][2], y=part: g(x, y(x)), begin, at, xtol=4e-16, rtol=4e-15)
+                         if before[k] > 0 else begin for k in fell]
+                hit = max(min(roots), np.nextafter(times[-1], np.inf))
+                return OdeSolution([*times, hit], parts), guards[fell[int(np.argmin(roots))]]
+            before, begin = after, at
+        times.append(solver.t)
+    return OdeSolution(times, parts), None
+
+
 class Stretch(NamedTuple):
     """One stretch between events: modes of the laws, turns of their paths, dense solution, times of its steps."""
 
@@ -97,10 +131,11 @@ class Stretch(NamedTuple):
 
 
 class Motion:
-    """The equations of a spec: state (x, x', states of the laws, friction work, work in)."""
+    """The equations of a spec: state (x, x', states of the laws, friction work); share: longest step over the shortest
+    period."""
 
-    def __init__(self, s: dict):
-        self.s, self.plant = s, plant_of(s)
+    def __init__(self, s: dict, share: float = 0.04):
+        self.s, self.plant, self.share = s, plant_of(s), share
         self.drive, self.breaks, self.moving = drive_of(s)
         loads = s["masses"]["loads"] if s["several"] else [s["load"]]
         self.laws = [LAWS[s["law"]](s["keys"]["static"] * load, **s["keys"]) for load in loads]
@@ -166,8 +201,6 @@ class Motion:
                 for g in range(count):
                     out.append((k, g, lambda t, y, face=face, part=part, law=law, g=g:
                                 law.guards(y[part], face @ y[self.n:2 * self.n], t)[g]))
-        for _, _, f in out:
-            f.terminal, f.direction = True, -1
         return out
 
     def choose(self, t, y, active) -> None:
@@ -183,21 +216,25 @@ class Motion:
                 return
         raise AssertionError("no choice")
 
-    def step(self) -> float:
-        """Longest step [s] of the integrator: a part of the shortest period, and of the slide over which a law
-        relaxes, beyond which dense output is no better than 1e-4."""
-        # a release and a stop within a step are not seen: under sweeps and records 0.04 missed some
-        out = (0.01 if self.laws[0].split_by_mode else 0.04) / max(self.plant.fastest, self.s["frequency"])
+    def longest(self, y, slope) -> float:
+        """Longest step [s] of the integrator from a state y with its slope: a share of the shortest period, and what
+        slides by, or changes the speed by, no more than that over which a law relaxes: beyond it dense output is no
+        better than 1e-4."""
+        out, n = self.share / max(self.plant.fastest, self.s["frequency"]), self.n
+        speed = np.abs(self.plant.faces @ y[n:2 * n]).max()
+        gain = np.abs(self.plant.faces @ slope[n:2 * n]).max() + 1e-300
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre"):
-            speed = 3 * self.s["size"] / self.s["seeded"]
-            out = min(out, 0.5 * min(law.scale() for law in self.laws) / speed)
+            way = 30 * self.share * min(law.scale() for law in self.laws)  # |v| h + |a| h^2/2
+            out = min(out, 2 * way / (speed + np.sqrt(speed**2 + 2 * gain * way)))
         elif self.s["law"] == "tanh":
-            out = min(out, 3 * self.s["keys"]["reference_speed"] / self.s["size"])
+            unit = self.s["keys"]["reference_speed"]
+            out = min(out, max(speed - 5 * unit, 12 * self.share * unit) / gain)
         return out
 
-    def run(self, end: float, rtol: float) -> list:
-        """Stretches of the motion from 0 to end [s]."""
-        t, y, out, n = 0.0, self.start(), [], self.n
+    def run(self, end: float, rtol: float, start=None, most: float = np.inf) -> list:
+        """Stretches of the motion from 0 to end [s]; start: another state than that of the scene. TooLong beyond
+        `most` steps."""
+        t, y, out, n = 0.0, self.start() if start is None else np.append(start, 0.0), [], self.n
         stops = [b for b in self.breaks if 0 < b < end * (1 - 1e-12)] + [end]
         reach = self.s["size"] / self.s["seeded"]**2
         atol = np.full(y.size, rtol * 1e-3 * reach)
@@ -213,22 +250,23 @@ class Motion:
                 law.begin(v, a)
         else:
             self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
-        step = self.step()
-        same = 0
+        same = count = 0
         for stop in stops:
             while t < stop:
                 guards = self.guards()
                 modes = tuple((law.mode, law.side) for law in self.laws)
                 state = [list(law.turns) for law in self.laws if hasattr(law, "turns")]
-                done = solve_ivp(self.slope, (t, stop), y, "DOP853", events=[g[2] for g in guards], rtol=rtol,
-                                 atol=atol, max_step=step, dense_output=True, first_step=min(step / 50, stop - t))
-                out.append(Stretch(modes, state, done.sol, done.t))
-                same = same + 1 if done.t[-1] - t < 1e-9 / self.s["frequency"] else 0
+                done, hit = stretched(self, t, y, stop, guards, rtol, atol)
+                out.append(Stretch(modes, state, done, done.ts))
+                count += done.ts.size
+                if count > most:
+                    raise TooLong
+                same = same + 1 if done.t_max - t < 1e-9 / self.s["frequency"] else 0
                 assert same < 50, "events without end"
-                t, y = float(done.t[-1]), done.y[:, -1].copy()
-                if done.status == 1:
-                    hit = next(i for i, times in enumerate(done.t_events) if times.size)
-                    self.turn(t, y, *guards[hit][:2])
+                t = float(done.t_max)
+                y = done(t)
+                if hit is not None:
+                    self.turn(t, y, *hit[:2])
                 elif self.laws[0].set_valued and t < end:
                     self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
         return out

@@ -47,6 +47,17 @@ def elements_of(stiffness, yield_slide) -> Elements:
     return Elements(frozen_array(stiff), frozen_array(y[order][first]), frozen_array(rank, np.int64))
 
 
+def paired(parts: Elements) -> Elements:
+    """Half as many elements: each two that yield one after the other as one of their stiffness and limit together; an
+    odd last one stays."""
+    k, limit = parts.stiffness, parts.stiffness * parts.yield_slide
+    first = np.arange(0, k.size, 2)
+    if not first.size:
+        return parts
+    stiff = np.add.reduceat(k, first)
+    return elements_of(stiff, np.add.reduceat(limit, first) / stiff)
+
+
 class Table(NamedTuple):
     """Elements of all interfaces (i) as the compiled loop takes them, t of the longest list.
 

@@ -27,6 +27,7 @@ TIME, STEP, TURNED, PACE, MASS, KIND, PIECE, MOVES = 0, 1, 2, 7, *range(10, 14)
 # of Kept.tally
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST = range(6)
 WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PLACE, WANTED, PERIOD = 6, *range(10, 20)
+HELD, START, STARTS, SIDE = 20, 21, 23, 24
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
 
 
@@ -36,7 +37,8 @@ class Fine:
 
     acceleration: largest |absolute acceleration| [m s-2], force: largest |force| [N], slip and swing: half the range
     of the irreversible slip and of the output [m]; slide, pull: first Fourier coefficients of slide [m] and force [N];
-    work: of friction [J].
+    work: of friction [J]; held: time [s] for which the interface sticks; start: mean phase [rad] modulo pi at which
+    slip starts after it, None where it never does.
     """
 
     acceleration: float
@@ -46,6 +48,8 @@ class Fine:
     slide: complex
     pull: complex
     work: float
+    held: float
+    start: float | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,7 +84,7 @@ class Run:
             state[:n], state[n:2 * n] = start.z, start.v
         pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
                    2 * np.pi / drive.period)
-        now, tally, work = np.zeros(14), np.zeros(20), np.zeros((26, size))
+        now, tally, work = np.zeros(14), np.zeros(25), np.zeros((26, size))
         now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
         now[[KIND, MOVES]], tally[PERIOD] = (self.wave.kind, drive.moving), drive.period
         work[24, 2 * n:-3] = element.sizes
@@ -188,8 +192,10 @@ class Run:
         """The last cycles since the time `begin` [s], where the work of friction stood at `work` [J]."""
         peaks, span = self.kept.tally, max(self.time - begin, 1e-300)
         slide, pull = (complex(*pair) * 2 / span for pair in peaks[WAVES:POWER].reshape(2, 2))
+        start = float(np.arctan2(peaks[START + 1], peaks[START]) / 2 % np.pi) if peaks[STARTS] else None
         return Fine(float(peaks[ACCELERATION]), float(peaks[FORCE]), float(peaks[SLIP] + peaks[SLIP_LEAST]) / 2,
-                    float(peaks[OUTPUT] + peaks[OUTPUT_LEAST]) / 2, slide, pull, float(self.moving.y[-1]) - work)
+                    float(peaks[OUTPUT] + peaks[OUTPUT_LEAST]) / 2, slide, pull, float(self.moving.y[-1]) - work,
+                    float(peaks[HELD]), start)
 
     def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
         """Move on to the time `end` [s] and keep the last `window` [s]: (rows, Fine).
@@ -199,7 +205,7 @@ class Run:
         begin = max(end - window, self.time)
         self.until(begin)
         tally, work = self.kept.tally, float(self.moving.y[-1])
-        tally[:WAVES], tally[WAVES:POWER], tolerance = -np.inf, 0.0, self.tolerance
+        tally[:WAVES], tally[WAVES:POWER], tally[HELD:], tolerance = -np.inf, 0.0, 0.0, self.tolerance
         self.tolerance *= CLOSER  # the extension of a step errs more than the step does
         self.moving.now[STEP] *= CLOSER**0.125
         count = max(LEAST, round((end - begin) / self.drive.period * SAMPLES) + 1)

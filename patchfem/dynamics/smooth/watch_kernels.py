@@ -16,6 +16,10 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST, SLOTS = range(7)  # of the peaks
 # of Kept.tally
 PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PLACE, WANTED, PERIOD = 0, 6, *range(10, 20)
+HELD, START, STARTS, SIDE = 20, 21, 23, 24
+SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
+BESIDE = 1e-3  # of a step, over which the share is taken
+STILL = 1e-14  # of the slide, below which it does not slide
 
 
 @njit(error_model="numpy", **INNER)
@@ -174,6 +178,57 @@ def peaks(m, h, k):
 
 
 @njit(error_model="numpy", **INNER)
+def slipping(m, k, at):
+    """Share of the slide that is irreversible at the share `at` of the step, less SHARE: < 0 where it sticks; NaN where
+    it does not slide, as beside a reversal in a step of no length."""
+    low = min(max(at - BESIDE, 0.0), 1 - 2 * BESIDE)
+    steps.between(m, low, k.room[0])
+    q0, _, _, _, slip0 = state_of(m, k.room[0])
+    steps.between(m, low + 2 * BESIDE, k.room[0])
+    q1, _, _, _, slip1 = state_of(m, k.room[0])
+    if abs(q1 - q0) <= STILL * max(abs(q0), abs(q1)):
+        return np.nan
+    return abs((slip1 - slip0) / (q1 - q0)) - SHARE
+
+
+@njit(error_model="numpy", **INNER)
+def starts(m, k, time):
+    """Take in that slip starts at a time [s]; slips that mean the same modulo pi count alike."""
+    turn = 4 * pi * time / k.tally[PERIOD]
+    k.tally[START] += cos(turn)
+    k.tally[START + 1] += sin(turn)
+    k.tally[STARTS] += 1
+
+
+@njit(error_model="numpy", **INNER)
+def holds(m, h, k):
+    """Take the step of h [s] into the time for which the interface sticks, and into the starts of slip after it."""
+    t, before = m.now[steps.TIME], slipping(m, k, 0.0)
+    if np.isnan(before):
+        before = k.tally[SIDE] if k.tally[SIDE] != 0 else -SHARE
+    if before >= 0 and k.tally[SIDE] < 0:  # it starts between two steps, where the slide turns
+        starts(m, k, t)
+    for part in range(1, PARTS + 1):
+        after, low, high = slipping(m, k, part / PARTS), (part - 1) / PARTS, part / PARTS
+        after = before if np.isnan(after) else after
+        if (before < 0) == (after < 0):
+            k.tally[HELD] += h / PARTS if after < 0 else 0.0
+        else:
+            a, b = low, high
+            while b - a > 1e-9:
+                middle = 0.5 * (a + b)
+                if (slipping(m, k, middle) < 0) == (before < 0):
+                    a = middle
+                else:
+                    b = middle
+            k.tally[HELD] += h * (a - low if before < 0 else high - a)
+            if after >= 0:
+                starts(m, k, t + a * h)
+        before = after
+    k.tally[SIDE] = before
+
+
+@njit(error_model="numpy", **INNER)
 def stored(m, y):
     """Energy of the modes and of the interface [J]."""
     n, out = m.rows.shape[1], 0.0
@@ -193,3 +248,4 @@ def watch(m, h, k):
     bounds(m, h, k)
     if k.tally[WANTED] > 0:
         peaks(m, h, k)
+        holds(m, h, k)

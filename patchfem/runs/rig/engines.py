@@ -15,7 +15,7 @@ import numpy as np
 from ...effects import has
 from ...model.model import Model
 from ...response.coarser import Rung, space_rung
-from ...response.errors import change, step_error, tolerance_error
+from ...response.errors import cells_error, change, jumps_error, step_error, tolerance_error
 from ...scene.rules import methods
 from ..effort import too_long
 from .pieces.costs import pieces, seconds_of_pieces, seconds_of_steps
@@ -145,8 +145,10 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """Rungs of the engine of pieces: the mesh, where its nodes make the elements."""
-    return [space_rung(Variant(numerics, coarse))] if coarse is not None and model.soft else []
+    """Rungs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a density."""
+    out = [space_rung(Variant(numerics, coarse))] if coarse is not None and model.soft else []
+    cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
+    return [*out, Rung((Variant(replace(numerics, paired=True), patch),), cells_error)] if cells else out
 
 
 def _fewer(numerics, share: int):
@@ -155,25 +157,10 @@ def _fewer(numerics, share: int):
 
 
 def _march_in_time(model: Model, numerics, patch) -> list:
-    """Rungs of the march in time: half and a quarter of the steps.
-
-    Of set-valued friction three neighbouring step counts stand besides. Where in a step a slide reverses is chance, so
-    its error does not fall evenly; three halves of the largest change count.
-    """
-    halves = [Variant(_fewer(numerics, share), patch) for share in (2, 4)]
-    if not set_valued(model, numerics):
-        return [Rung(tuple(halves), lambda *values: step_error(*values, numerics.steps))]
-    beside = [Variant(replace(numerics, steps=max(4, round(share * numerics.steps))), patch)
-              for share in (15 / 16, 7 / 8, 3 / 4)]
-
-    def rule(fine, half, quarter, *others):
-        out = step_error(fine, half, quarter, numerics.steps)
-        for other in others:
-            for name, gap in change(fine, other).items():
-                out[name] = max(out.get(name, 0.0), 1.5 * gap)
-        return out
-
-    return [Rung((*halves, *beside), rule)]
+    """Rungs of the march in time: half and a quarter of the steps."""
+    halves = tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
+    rule = jumps_error if set_valued(model, numerics) else step_error
+    return [Rung(halves, lambda *values: rule(*values, numerics.steps))]
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:

@@ -9,7 +9,7 @@ from ...dynamics.march import march as hub
 from ...dynamics.second_book import gap
 from ...effects import has
 from ...response import run_events
-from ...response.measures import step_harmonic, window_amplitudes, window_ends
+from ...response.measures import peaks_between, step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
 from ...response.spectrum import friction_harmonic, motion_harmonic
@@ -57,6 +57,7 @@ class Read:
         if rubs:
             rings, own = run_events.rings(done.window, rig.modes, rig.drive, None, self.held)
             stuck = run_events.all_stick(done.window, self.held) and not self.creeps
+        own = own | self.between(done.window)
         last = min(window, len(done.amplitudes))
         values = self.values(done, done.amplitudes[-last:], done.response.extra.get("ledger"), stuck) | rings
         levels, probe = self._levels(done) if rig.levels else ((), None)
@@ -66,6 +67,10 @@ class Read:
                         steady_of(rig.drive, *ends), outcome, done.snapshots, done.ledger, seconds, self.contact,
                         prepare, done.message, levels, probe, held=self.held, own=own, summed=self.summed(),
                         extremes=done.amplitudes)
+
+    def between(self, window) -> dict:
+        """What the peaks of a run may lie above its samples, by name."""
+        return peaks_between(window)
 
     def summed(self):
         """How the bonds are summed, a Choice; None of a law that is no sum."""

@@ -24,7 +24,7 @@ class Numerics:
     """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
     how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
     the last cycles, which a run for an error need not; local: relative error that a step of the smooth engine may
-    make."""
+    make; paired: whether each two cells of a law's density count as one."""
 
     engine: str
     steps: int
@@ -36,6 +36,7 @@ class Numerics:
     choice: object = None
     whole: bool = True
     local: float = 0.0
+    paired: bool = False
 
     def finer(self):
         """The choices with twice the steps, or a hundredth of the error of each."""

@@ -94,6 +94,8 @@ class Interfaces:
             parts = [self.contact.element]
         self.held = 1e-3 * min(one.length for one in parts)
         self.groups = tuple(group_of(one) for one in parts)
+        if numerics.paired:
+            self.groups = tuple(map(elements.paired, self.groups))
 
     def holds(self, done) -> bool:
         """Whether no interface slips in the window of a run by more than `held`, or the last digit."""

@@ -8,16 +8,18 @@ import numpy as np
 from ....dynamics.second_book import gap
 from ....dynamics.smooth import run as hub
 from ....response.errors import change
-from ....response.measures import slip_measures
+from ....response.measures import slip_measures, slip_noise
 from ....response.rows import measures_of
 from ....structure.drive_sizes import sinusoidal, whole
 from ..interface import model_of
 from ..march import Read
 from ..solution import Solution, seen
 
-# of the change at half the samples, the error: of what is of second order in them, the others are of fourth
-SAFE = {"stick_fraction": 2.5, "slip_start_phase": 2.5}
-GRAIN = {"stick_fraction": 0.5, "slip_start_phase": 1.0}  # and the samples that one of them may be off by besides
+SAFE = 0.2  # of the change at half the samples, the error: what is read off them is of fourth order
+CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
+LOCATED = 1e-7  # what a crossing of that share may be off: the extension of a step errs more than its end
+# of what is read off samples below that, of second order in them: times the change, and the samples that it may be off
+STUCK = {"stick_fraction": (2.5, 0.5), "slip_start_phase": (2.5, 1.0)}
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -38,6 +40,10 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
 class _Smooth(Read):
     """The measures of a run of high order: what the integrator knows comes before what samples show."""
 
+    def between(self, window) -> dict:
+        """{}: peaks are looked for inside the steps."""
+        return {}
+
     def summed(self):
         """None: no list of bonds."""
 
@@ -52,15 +58,22 @@ class _Smooth(Read):
         slips = slip_measures(even, drive, steps)
         known = {"relative_displacement_amplitude": fine.swing, "absolute_acceleration_peak": fine.acceleration,
                  "friction_force_peak": fine.force, "slip_amplitude": fine.slip,
-                 "stick_fraction": slips["stick_fraction"],
-                 "slip_start_phase": slips.get("slip_start_phase") if sinusoidal(drive) else None,
                  "work_check": gap(book["sampled"], book["booked"], book["passed"],
                                    book["power"] + book["peak_stored"])}
         span, loop = even.time[-1] - even.time[0], None
+        if self._clear(part, even):
+            slips = {"stick_fraction": min(fine.held / span, 1.0), "slip_start_phase": fine.start}
+        known |= {"stick_fraction": slips["stick_fraction"],
+                  "slip_start_phase": slips.get("slip_start_phase") if sinusoidal(drive) else None}
         if whole(span, drive):
             loop = turned.slide, fine.slide, fine.pull, fine.work * drive.period / span
         return measures_of(seen(self.model, self.patch, turned, extremes, book, self.numerics.steps, loop=loop,
                                 ledger=ledger, known=known))
+
+    @staticmethod
+    def _clear(part, even) -> bool:
+        """Whether the slip of a SmoothResult with samples `even` is no round-off."""
+        return 2 * part.fine.slip > CLEAR * slip_noise(even)
 
     def sampling(self, done) -> dict:
         """Errors of the measures that are read off the samples of a SmoothResult, by those off every second one."""
@@ -69,8 +82,11 @@ class _Smooth(Read):
         fewer = _picked(turned, np.isin(turned.time, half.time) | ~np.isin(turned.time, even.time))
         every, second = (self._measured(done, *pair, done.amplitudes, None) for pair in (
             (turned, even), (fewer, half)))
-        return {name: SAFE.get(name, 0.2) * gap + GRAIN.get(name, 0.0) / hub.SAMPLES
-                for name, gap in change(every, second).items()}
+        read = {} if self._clear(done, even) else STUCK
+        share = {name: read.get(name, (SAFE, 0.0)) for name in every}
+        found = {name: share[name][0] * gap + share[name][1] / hub.SAMPLES
+                 for name, gap in change(every, second).items()}
+        return found if read else found | {name: LOCATED for name in STUCK if name in found}
 
 
 def _picked(response, pick):

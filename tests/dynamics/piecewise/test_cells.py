@@ -1,0 +1,32 @@
+"""Half as many cells of a density, for the error of the others."""
+
+import numpy as np
+import pytest
+
+from patchfem.dynamics.piecewise.elements import elements_of, paired
+from patchfem.friction.laws.iwan import sliders
+
+
+def test_exact_pairs_keep_stiffness_and_limit():
+    for count in (1, 2, 7, 8):
+        rng = np.random.default_rng(count)
+        all_of = elements_of(rng.uniform(1, 2, count), rng.uniform(1, 2, count))
+        found = paired(all_of)
+        assert found.stiffness.size == (count + 1) // 2
+        assert found.limit == pytest.approx(all_of.limit, rel=1e-14)
+        assert found.stiffness.sum() == pytest.approx(all_of.stiffness.sum(), rel=1e-14)
+
+
+def test_order_two_of_the_cells_of_iwans_law():
+    """Force of a first loading to half of the largest stretch: four times nearer the closed form with twice the cells,
+    on the mean over such loadings."""
+    k, most = sliders(1.0, 1.0, -0.3, 0.0)
+    fine = elements_of(k, most)
+    coarse, coarser = paired(fine), paired(paired(fine))
+    places = np.linspace(0.3, 0.7, 2001) * most.max()
+
+    def force(parts):
+        return np.minimum(places[:, None], parts.yield_slide) @ parts.stiffness
+
+    first, second = (np.abs(force(a) - force(fine)).mean() for a in (coarse, coarser))
+    assert second / first == pytest.approx(5, rel=0.15)  # (16 - 1)/(4 - 1)
