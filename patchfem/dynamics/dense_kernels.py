@@ -8,7 +8,8 @@ from ..friction.flags_kernels import FAST, LEAN
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def factor(a):
-    """Cholesky factor of a (n, n) in its lower half, in place; False where a is not positive definite."""
+    """Cholesky factor of a (n, n) in its lower half, in place, one over its diagonal on the diagonal; False where a is
+    not positive definite."""
     n = a.shape[0]
     for j in range(n):
         pivot = a[j, j]
@@ -16,28 +17,34 @@ def factor(a):
             pivot -= a[j, k] * a[j, k]
         if not pivot > 0:
             return False
-        a[j, j] = np.sqrt(pivot)
+        over = 1 / np.sqrt(pivot)
+        a[j, j] = over
         for i in range(j + 1, n):
             rest = a[i, j]
             for k in range(j):
                 rest -= a[i, k] * a[j, k]
-            a[i, j] = rest / a[j, j]
+            a[i, j] = rest * over
     return True
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def solve(a, b):
-    """Put the solution x of (a a^T) x = b in place of b (n,), a a factor; returns b . x >= 0."""
+    """Put the solution x of (l l^T) x = b in place of b (n,), a as `factor` left it; returns b . x >= 0.
+
+    By columns: the unknowns below one do not wait for each other.
+    """
     n, product = b.size, 0.0
-    for i in range(n):
-        for k in range(i):
-            b[i] -= a[i, k] * b[k]
-        b[i] /= a[i, i]
-        product += b[i] * b[i]
-    for i in range(n - 1, -1, -1):
-        b[i] /= a[i, i]
-        for k in range(i):
-            b[k] -= a[i, k] * b[i]
+    for k in range(n):
+        here = b[k] * a[k, k]
+        b[k] = here
+        product += here * here
+        for i in range(k + 1, n):
+            b[i] -= a[i, k] * here
+    for k in range(n - 1, -1, -1):
+        here = b[k] * a[k, k]
+        b[k] = here
+        for i in range(k):
+            b[i] -= a[k, i] * here
     return product
 
 

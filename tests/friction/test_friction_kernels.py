@@ -39,6 +39,24 @@ def test_exact_bond_mean_and_step_are_advance(eps):
             assert moved[3] == pytest.approx(dissipated[j], rel=1e-11, abs=1e-14)
 
 
+def test_exact_short_slides_without_a_branch_are_those_with_one():
+    """The series for slides up to SHORT against 40 digits, and mean and step by them against `advance`."""
+    bonds, sigma = random_bonds(3, 20), np.random.default_rng(4).uniform(0, 2, 20)
+    for x in (0.0, 1e-9, 0.03, 0.2, 0.4999, point_kernels.SHORT):
+        with mp.workdps(40):
+            f1 = (1 - mp.exp(-mp.mpf(x))) / x if x else mp.mpf(1)
+            f2 = (1 - f1) / x if x else mp.mpf(1) / 2
+            want = (float(f1), float(f2), float(mp.exp(-mp.mpf(x))))
+        assert point_kernels.short_shape(x) == pytest.approx(want, rel=1e-15)
+        for dq in (0.37 * x, -0.37 * x):
+            out, mean, slope, dissipated = advance(bonds, dq, sigma, 0.37)
+            for j in range(20 if dq else 0):
+                assert point_kernels.short_mean(bonds[0, j], bonds[1, j], dq, sigma[j], 0.37) == pytest.approx(
+                    (mean[j], slope[j]), rel=1e-12, abs=1e-14)
+                moved = point_kernels.short_step(*bonds[:, j], dq, sigma[j], 0.37)
+                assert moved == pytest.approx((*out[:, j], dissipated[j]), rel=1e-12, abs=1e-15)
+
+
 def test_exact_bond_step_of_no_length():
     m, z, s2 = 0.8, -0.3, 0.4
     assert point_kernels.bond_mean(m, z, 0.0, 1.0, 1.0)[0] == z

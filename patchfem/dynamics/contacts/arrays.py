@@ -44,12 +44,17 @@ class Sheared(NamedTuple):
     ready: np.ndarray
 
 
-def sheared(weight, length: float, growth, psi, kappa) -> dict:
-    """The fields of `Sheared` at rest; psi (m, r), no modes of pieces that are rigid in shear."""
+def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1) -> dict:
+    """The fields of `Sheared` at rest; psi (m, r), no modes of pieces that are rigid in shear.
+
+    lanes: m is filled up to a multiple of it by points that bear and move nothing.
+    """
     (m, r), size = psi.shape, 1 + len(kappa)
-    return {"weight": np.array(weight, float), "eps": np.full(2, length), "growth": np.array(growth, float),
-            "psi": np.array(psi.T, order="C"), "kappa": np.array(kappa, float), "b": np.zeros(r),
-            "points": np.zeros((9, m)), "count": np.full(1, m), "y": np.zeros((2, size)), "last": np.zeros(size),
+    more = -m % lanes
+    return {"weight": np.pad(np.array(weight, float), (0, more)), "eps": np.full(2, length),
+            "growth": np.array(growth, float), "psi": np.pad(np.array(psi.T, order="C"), ((0, 0), (0, more))),
+            "kappa": np.array(kappa, float), "b": np.zeros(r), "points": np.zeros((9, m + more)),
+            "count": np.full(1, m + more), "y": np.zeros((2, size)), "last": np.zeros(size),
             "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))), "room": np.zeros((3, size)),
             "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
 

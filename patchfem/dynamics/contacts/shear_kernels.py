@@ -4,15 +4,15 @@ The functions are those that `march.loop_kernels` asks of every contact.
 """
 
 from ...compiled.inner import njit
-from ...friction.bonds.point_kernels import bond_step, grow, loose_step
-from ...friction.flags_kernels import LEAN
-from .shear_points_kernels import DENSITY, LOAD, MOVED, PLAY, POINTS, SLIDE, SQUARE, STRETCH
+from ...friction.bonds.point_kernels import bond_step, grow, loose_step, short_step
+from ...friction.flags_kernels import FAST, LEAN
+from .shear_points_kernels import DENSITY, LOAD, MOVED, PLAY, POINTS, SLIDE, SQUARE, STRETCH, short
 from .shear_solve_kernels import descend, halfway, went_on
 
 SET_VALUED = False
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def solve(free, beta, q, v, dt, c, goal):
     """(dq, path-mean force, iterations) of a step with dq = free - beta force; iterations < 0 when it failed."""
     halfway(v, dt, c)
@@ -29,27 +29,50 @@ def given(dq, q, v, dt, c, goal):
     return force, count >= 0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def commit(dq, force, q, v0, v1, dt, c):
     """Move points and pieces by the solved step; (energy dissipated [J], True)."""
-    points, length, lost = c.points, c.eps[1], 0.0
+    length = c.eps[1]
     loose = c.growth[5] * length
-    for j in range(c.weight.size):
-        m, z, s2 = points[DENSITY, j], points[STRETCH, j], points[SQUARE, j]
-        load, xi = points[LOAD, j], points[SLIDE, j]
-        if loose > 0.0:
-            m, z, s2, points[PLAY, j], part = loose_step(m, z, s2, points[PLAY, j], loose, xi, load, length)
-        else:
-            m, z, s2, part = bond_step(m, z, s2, xi, load, length)
-        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j] = m, z, s2
-        points[MOVED, j] += xi
-        lost += c.weight[j] * part / 2
+    lost = moved_short(c, length) if loose == 0.0 and short(c, length) else moved(c, loose, length)
     went_on(c)
     c.eps[0] = grow(c.eps[0], v0, v1, abs(dq), dt, c.growth)[0]
-    return lost, True
+    return lost / 2, True
+
+
+@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+def moved_short(c, length):
+    """Move all points by their slides, none beyond SHORT bond lengths [m]; twice the energy that they dissipate [J]."""
+    points, lost = c.points, 0.0
+    for j in range(c.weight.size):
+        xi = points[SLIDE, j]
+        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], part = short_step(
+            points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], xi, points[LOAD, j], length)
+        points[MOVED, j] += xi
+        lost += c.weight[j] * part
+    return lost
 
 
 @njit(error_model="numpy", **LEAN)
+def moved(c, loose, length):
+    """Move all points by their slides, of any size; twice the energy that they dissipate [J].
+
+    loose: half the elastic range of their bonds, length: of a bond [m].
+    """
+    points, lost = c.points, 0.0
+    for j in range(c.weight.size):
+        m, z, s2, xi = points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], points[SLIDE, j]
+        if loose > 0.0:
+            m, z, s2, points[PLAY, j], part = loose_step(m, z, s2, points[PLAY, j], loose, xi, points[LOAD, j], length)
+        else:
+            m, z, s2, part = bond_step(m, z, s2, xi, points[LOAD, j], length)
+        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j] = m, z, s2
+        points[MOVED, j] += xi
+        lost += c.weight[j] * part
+    return lost
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of points and pieces as they stand."""
     points, force, energy, slip, total = c.points, 0.0, 0.0, 0.0, 0.0
@@ -65,12 +88,12 @@ def state(c, q, v):
     return force, energy, slip / total if total > 0 else q
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def passed(free, rate, beta, gamma, share, v, dt, c, top):
     """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
     return 0.0, 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def hold(c, force):
     """Nothing: what holds is in the points."""

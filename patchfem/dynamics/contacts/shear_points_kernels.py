@@ -5,7 +5,7 @@ the load in the row LOAD; at its `ending` they are those after the slide.
 """
 
 from ...compiled.inner import njit
-from ...friction.bonds.point_kernels import bond_mean, loose_mean, shape
+from ...friction.bonds.point_kernels import SHORT, bond_mean, loose_mean, shape, short_mean
 from ...friction.flags_kernels import FAST, LEAN
 
 PLASTIC, POINTS = 1, 2
@@ -47,10 +47,31 @@ def bond_end(m, z, dq, sigma, eps):
 
 
 @njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+def short(c, length):
+    """Whether no point slides farther than SHORT bond lengths `length` [m]; not where one slides as far as nan."""
+    points, near = c.points, 0.0
+    for j in range(int(c.count[0])):
+        near += 1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0  # a sum, which unlike a maximum is vectorised
+    return near == c.count[0]
+
+
+@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def respond(kind, ending, c):
     """Write force [N] and slope [N/m] >= 0 of every point at its slide; returns the friction force [N]."""
-    points, weight, length = c.points, c.weight, c.eps[0 if ending else 1]
-    loose, force = c.growth[5] * length, 0.0
+    points, weight, length, force = c.points, c.weight, c.eps[0 if ending else 1], 0.0
+    if kind == POINTS and not ending and c.growth[5] == 0.0 and short(c, length):
+        for j in range(int(c.count[0])):
+            f, s = short_mean(points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length)
+            points[FORCE, j], points[SLOPE, j] = weight[j] * f, weight[j] * max(s, 0.0)
+            force += weight[j] * f
+        return force
+    return answer(kind, ending, c, length)
+
+
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def answer(kind, ending, c, length):
+    """`respond` of any law and slide, at a bond length [m]."""
+    points, weight, loose, force = c.points, c.weight, c.growth[5] * length, 0.0
     for j in range(int(c.count[0])):
         m, z, load, xi = points[DENSITY, j], points[STRETCH, j], points[LOAD, j], points[SLIDE, j]
         if kind == PLASTIC:

@@ -20,7 +20,7 @@ GRADIENT, STEP, TRIAL = range(3)
 SLACK = 100.0  # times the goal: a residual that round-off keeps from falling further is taken below it
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def halfway(v, dt, c):
     """The bond length in the middle of a step that begins with the speed v [m/s]."""
     c.eps[1] = grow(c.eps[0], v, v, abs(v) * dt / 2, dt / 2, c.growth)[0]
@@ -29,26 +29,48 @@ def halfway(v, dt, c):
 @njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def slid(q, moved, c):
     """Write the slides [m] of the points where the holder slides by q and the coordinates move by `moved` (r,)."""
-    psi, points, count = c.psi, c.points, int(c.count[0])
+    psi, points, count, r = c.psi, c.points, int(c.count[0]), moved.size
     for j in range(count):
         points[SLIDE, j] = q
-    for k in range(moved.size):
+    for k in range(0, r - 3, 4):  # four modes in one pass: a pass reads and writes every point
+        one, two, three, four = moved[k], moved[k + 1], moved[k + 2], moved[k + 3]
+        for j in range(count):
+            points[SLIDE, j] -= psi[k, j] * one + psi[k + 1, j] * two + psi[k + 2, j] * three + psi[k + 3, j] * four
+    for k in range(r - r % 4, r):
         part = moved[k]
         for j in range(count):
             points[SLIDE, j] -= psi[k, j] * part
 
 
+@njit(error_model="numpy", fastmath=FAST, **LEAN)
+def pulled(row, psi, points, count, out):
+    """Write psi^T of a row of the points, (r,), into out (1 + r,) from its second place on."""
+    r = psi.shape[0]
+    for k in range(0, r - 3, 4):
+        one, two, three, four = 0.0, 0.0, 0.0, 0.0
+        for j in range(count):
+            value = points[row, j]
+            one += psi[k, j] * value
+            two += psi[k + 1, j] * value
+            three += psi[k + 2, j] * value
+            four += psi[k + 3, j] * value
+        out[k + 1], out[k + 2], out[k + 3], out[k + 4] = one, two, three, four
+    for k in range(r - r % 4, r):
+        total = 0.0
+        for j in range(count):
+            total += psi[k, j] * points[row, j]
+        out[k + 1] = total
+
+
 @njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
 def gradient(y, free, beta, kind, ending, c, out):
     """Residual (1 + r,) at y = (dq, db); beta = 0 or `ending`: the slide is given. Returns the friction force [N]."""
-    psi, points, count, part = c.psi, c.points, int(c.count[0]), 1.0 if ending else 0.5
+    part = 1.0 if ending else 0.5
     slid(y[0], y[1:], c)
     force = respond(kind, ending, c)
+    pulled(FORCE, c.psi, c.points, int(c.count[0]), out)
     for k in range(c.kappa.size):
-        pull = 0.0
-        for j in range(count):
-            pull += psi[k, j] * points[FORCE, j]
-        out[k + 1] = c.kappa[k] * (c.b[k] + part * y[k + 1]) - pull
+        out[k + 1] = c.kappa[k] * (c.b[k] + part * y[k + 1]) - out[k + 1]
     out[0] = 0.0 if ending or beta == 0.0 else (y[0] - free) / beta + force
     return force
 
@@ -59,22 +81,31 @@ def hessian(beta, ending, c, hess):
     psi, points, count, given, total = c.psi, c.points, int(c.count[0]), ending or beta == 0.0, 0.0
     for j in range(count):
         total += points[SLOPE, j]
-    hess[0, 0] = 1.0 if given else 1 / beta + total
+    pulled(SLOPE, psi, points, count, hess[0])
     for k in range(c.kappa.size):
-        total = 0.0
+        hess[k + 1, 0] = 0.0 if given else -hess[0, k + 1]
         for j in range(count):
             points[FORCE, j] = points[SLOPE, j] * psi[k, j]
-            total += points[FORCE, j]
-        hess[k + 1, 0] = 0.0 if given else -total
-        for l in range(k + 1):
+        last = (k + 1) % 4
+        for l in range(0, k + 1 - last, 4):
+            one, two, three, four = 0.0, 0.0, 0.0, 0.0
+            for j in range(count):
+                value = points[FORCE, j]
+                one += value * psi[l, j]
+                two += value * psi[l + 1, j]
+                three += value * psi[l + 2, j]
+                four += value * psi[l + 3, j]
+            hess[k + 1, l + 1], hess[k + 1, l + 2], hess[k + 1, l + 3], hess[k + 1, l + 4] = one, two, three, four
+        for l in range(k + 1 - last, k + 1):
             dot = 0.0
             for j in range(count):
                 dot += points[FORCE, j] * psi[l, j]
             hess[k + 1, l + 1] = dot
         hess[k + 1, k + 1] += c.kappa[k] * (1.0 if ending else 0.5)
+    hess[0, 0] = 1.0 if given else 1 / beta + total
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def weighted(out, scale):
     """Largest residual in force units: modal residuals are multiplied by the slide they stand for."""
     worst = abs(out[0])
@@ -92,21 +123,20 @@ def descend(free, beta, kind, ending, c, goal):
     """
     which = 1 if ending else 0
     y, hess, g, p, trial = c.y[which], c.hess[which], c.room[GRADIENT], c.room[STEP], c.room[TRIAL]
-    force = gradient(y, free, beta, kind, ending, c, g)
-    size, least = weighted(g, c.scale), np.inf
     noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
-    stale, stall = True, 0
-    for count in range(1, 200):
-        if size <= max(goal, noise + 4e-16 * abs(force)):
-            return force, count
-        if c.ready[which] == 0.0:
-            hessian(beta, ending, c, hess)
-            if not factor(hess):
-                return force, -count
-            c.ready[which], stale = 1.0, False
-        for i in range(y.size):
-            p[i] = -g[i]
-        fall = -solve(hess, p)
+    size, least, fall, force, stale, stall = np.inf, np.inf, 0.0, 0.0, True, 0
+    for i in range(y.size):
+        p[i] = 0.0
+    for count in range(200):  # the first is the guess itself: one place of the gradient in the code, of two that run it
+        if count > 0:
+            if c.ready[which] == 0.0:
+                hessian(beta, ending, c, hess)
+                if not factor(hess):
+                    return force, -count
+                c.ready[which], stale = 1.0, False
+            for i in range(y.size):
+                p[i] = -g[i]
+            fall = -solve(hess, p)
         part, low, high = 1.0, 0.0, np.inf
         for _ in range(40):
             for i in range(y.size):
@@ -115,25 +145,27 @@ def descend(free, beta, kind, ending, c, goal):
             rise = 0.0
             for i in range(y.size):
                 rise += g[i] * p[i]
-            if rise <= -0.5 * fall:
+            if count == 0 or rise <= -0.5 * fall:
                 break
             high = part
             part = safe_point(low, high, max(0.1, -fall / (rise - fall)) * part)
         for i in range(y.size):
             y[i] = trial[i]
         new = weighted(g, c.scale)
-        if new > 0.1 * size or part < 1.0:
-            c.ready[which] = 0.0
-        stall = stall + 1 if new >= 0.5 * least and not stale else 0
-        least = min(least, new)
-        stale = c.ready[which] == 1.0
-        size = new
-        if stall >= 4 and size <= SLACK * goal:
-            return force, count
+        if new <= max(goal, noise + 4e-16 * abs(force)):
+            return force, count + 1
+        if count > 0:
+            if new > 0.1 * size or part < 1.0:
+                c.ready[which] = 0.0
+            stall = stall + 1 if new >= 0.5 * least and not stale else 0
+            stale = c.ready[which] == 1.0
+            if stall >= 4 and new <= SLACK * goal:
+                return force, count
+        size, least = new, min(least, new)
     return force, -200
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", forceinline=True, **LEAN)
 def went_on(c):
     """Move the coordinates of the pieces by the solved step and leave the next guess, as the last two went on."""
     y, last = c.y[0], c.last

@@ -13,6 +13,7 @@ from ...friction.protocol import Element
 from ..contacts import arrays
 
 HERE = "dynamics.contacts"
+LANES = 16  # points that compiled loops take at once: fewer left over are one after the other
 SET_VALUED = f"{HERE}.coulomb_kernels"  # the contact without a slope
 
 
@@ -57,7 +58,9 @@ class ContactModel:
             return {"stretch": contact.mem[0, 3:].copy()}
         if form in ("points", "places"):
             return {"bonds": bonds_of(self.element, contact.mem[0]).copy()}
-        return {"bonds": contact.points[:5].copy(), "b": contact.b.copy()} if hasattr(contact, "psi") else {}
+        if not hasattr(contact, "psi"):
+            return {}
+        return {"bonds": contact.points[:5, :self.reduction.points.size].copy(), "b": contact.b.copy()}
 
     def build(self, hub=None):
         """(contact, None) with arrays of their own."""
@@ -101,8 +104,8 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
         return element_model(points_element(law, area, sigma, pattern))
     area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]
     fields = arrays.sheared(law.static * area / law.length, law.length, growth_numbers(law), np.asarray(shear.shape),
-                            shear.stiffness)
-    fields["points"][[0, 5]] = law.initial * sigma, sigma  # m and load of every point
+                            shear.stiffness, LANES)
+    fields["points"][np.ix_([0, 5], range(area.size))] = law.initial * sigma, sigma  # m and load of every point
     limit = law.static * float(area @ sigma)
     return ContactModel(f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared)
 

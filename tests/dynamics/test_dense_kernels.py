@@ -1,0 +1,25 @@
+"""Small dense systems of the step solves against NumPy."""
+
+import numpy as np
+import pytest
+
+from patchfem.dynamics.dense_kernels import factor, solve
+
+
+@pytest.mark.parametrize("size", [1, 2, 9])
+def test_exact_factor_and_solve_are_those_of_numpy(size):
+    rng = np.random.default_rng(size)
+    root, right = rng.normal(size=(size, size)), rng.normal(size=size)
+    matrix = root @ root.T + np.eye(size)
+    a, x, want = np.tril(matrix), right.copy(), np.linalg.solve(matrix, right)
+    assert factor(a)
+    assert solve(a, x) == pytest.approx(right @ want, rel=1e-12)
+    assert x == pytest.approx(want, rel=1e-12)
+    lower = np.linalg.cholesky(matrix)
+    assert np.diag(a) == pytest.approx(1 / np.diag(lower), rel=1e-12)
+    assert np.tril(a, -1) == pytest.approx(np.tril(lower, -1), rel=1e-12)
+
+
+def test_refuses_what_is_not_positive_definite():
+    for bad in ([[1.0, 0.0], [2.0, 1.0]], [[0.0]], [[-1.0]], [[float("nan")]]):
+        assert not factor(np.array(bad))
