@@ -48,6 +48,14 @@ def _spread(number: int, most: int) -> np.ndarray:
     return np.arange(number) if number <= most else np.unique(np.linspace(0, number - 1, most).astype(int))
 
 
+def brief(text: str) -> str:
+    """A value as written, its number with six digits at most: 3.16227766016838e-06 rad is 3.16228e-06 rad."""
+    found = NUMBER.match(text)
+    if found is None or len(found[1]) < 9:
+        return text
+    return f"{float(found[1]):.6g} {found[2] or ''}".strip()
+
+
 def label(name: str) -> str:
     """A name of the program as people read it."""
     return name.replace("_", " ")
@@ -62,7 +70,7 @@ def _key(one: dict, drawn) -> dict:
     else:
         unit, values = one["unit"], np.asarray(one["values"], float)[drawn]
     return {"name": one["name"], "label": one["name"], "unit": "" if unit == "1" else unit, "values": values,
-            "texts": [str(one["texts"][i]) for i in drawn], "log": bool(one["log"])}
+            "texts": [brief(str(one["texts"][i])) for i in drawn], "log": bool(one["log"])}
 
 
 def _measure(name: str, one: dict, drawn) -> dict:
@@ -128,7 +136,7 @@ def _cases(table: dict) -> str:
         f"<th class=n>{escape(one['label'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}</th>" for one in columns)
     rows = []
     for i, outcome in enumerate(table["outcome"][:LISTED]):
-        cells = "".join(f"<td>{escape(str(one['texts'][i]))}</td>" for one in table["keys"])
+        cells = "".join(f"<td>{escape(brief(str(one['texts'][i])))}</td>" for one in table["keys"])
         said = escape(label(outcome))
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'

@@ -8,7 +8,7 @@ from page_data import data_of, own_part
 
 from patchfem.export.pages import library
 from patchfem.export.pages.document import document, plain
-from patchfem.export.pages.sweep import page
+from patchfem.export.pages.sweep import brief, page
 
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
@@ -66,6 +66,13 @@ def test_always_many_cases_are_thinned_and_it_is_said(table):
     text = page(table)
     assert len(text.encode()) < 3e6 + 40 * 20_000 * 3 and "Drawn are 20000 of 50000 cases" in text
     assert len(data_of(text)["outcome"]) == 20_000
+
+
+@pytest.mark.parametrize("text, shown", [("3.16227766016838e-06 rad", "3.16228e-06 rad"), ("26 lbf", "26 lbf"),
+                                         ("0.0001 rad", "0.0001 rad"), ("nonlocal", "nonlocal"),
+                                         ("0.123456789", "0.123457")])
+def test_exact_long_numbers_are_shown_short(text, shown):
+    assert brief(text) == shown
 
 
 def test_exact_numbers_that_are_not_finite_are_null():
