@@ -15,7 +15,7 @@ LISTS = {"direct": (False, False), "truncated": (True, False), "merged": (True, 
 ENGINES = (*LISTS, "recursion")
 # bounds of the error over merge width squared (test_merge_bounds): lengths that stay, stretch
 # with growth, the print with growth, the print of order < 1
-MERGING = (0.25, 1.0, 4.0, 1.0)
+MERGING = (0.25, 1.0, 6.0, 1.0)
 YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
 STRIP = {MOMENTS: 3e-10, POWER: 3e-9, SHARES: 2e-9, AGED: 3e-9}  # seconds per strip and pass, measured on one core
 SHARES_ANY = 4e-8  # the same for the printed law at constant length with an order other than 0, 1, 2

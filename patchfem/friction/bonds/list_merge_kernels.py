@@ -32,10 +32,11 @@ def merge(bonds, tally, now, law):
                 _join_moments(bonds, last, k)
                 continue
             if narrow and not spread and last >= head + many and bonds[1, last] == bonds[0, k] \
-                    and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 and law[1] != SHARES:
+                    and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0 and law[1] != SHARES \
+                    and (law[1] != POWER or law[0] >= 1.0 or _as_dense(bonds, last, k, limit, eps0)):
                 _join_ends(bonds, last, k, now, law)
                 continue
-            grown = _gone(bonds, k, now) if law[1] == AGED else law[1] != SHARES or _even(bonds, last, k, now, law)
+            grown = (law[1] < SHARES or _even(bonds, last, k, now, law)) and (law[1] != AGED or _gone(bonds, k, now))
             if narrow and grown and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
                     min(age, 200.0)), tally):
                 if last == head + many:
@@ -66,8 +67,9 @@ def _gone(bonds, k, now):
 def _even(bonds, i, k, now, law):
     """Whether the bonds of two strips together weigh alike over them, or so little that it does not matter.
 
-    Of a fractional order the weight R^p of young bonds is far from even: taken as even, it moves the share
-    joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction limit.
+    Of a fractional order the weight R^p of young bonds is far from even, of full length or not: taken as even, it moves
+    the share joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction
+    limit.
     """
     p, near, joint = law[0], (now[1] - bonds[9, k]) / law[2], (bonds[8, i] + bonds[8, k]) / law[2]
     if p == 0.0:
@@ -75,6 +77,17 @@ def _even(bonds, i, k, now, law):
     far = near + joint
     part = law[4] * (fexp((p + 1) * flog(far)) - fexp((p + 1) * flog(near)))
     return abs(p) * part * joint <= law[5] * law[5] * far
+
+
+@njit(error_model="numpy", **LEAN)
+def _as_dense(bonds, i, k, limit, eps0):
+    """Whether two strips that lie end to end weigh nearly alike per path.
+
+    Where the bond length changes they do not, by 1/eps^p: joined, the share |more - less|/4 of their weight moves over,
+    and of an order below 1 that counts in full once the slide is back among them, at u = 0.
+    """
+    left, right = bonds[4, i] * bonds[8, k], bonds[4, k] * bonds[8, i]
+    return abs(left - right) * (bonds[8, i] + bonds[8, k]) * eps0 <= limit * limit * (left + right)
 
 
 @njit(error_model="numpy", **LEAN)

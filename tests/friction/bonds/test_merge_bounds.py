@@ -42,6 +42,23 @@ def test_always_young_bonds_of_fractional_order_are_not_spread_evenly(order):
     assert share(Bonds(1.0, 1.0, order, "report", initial=0.0), path, 400, 2.9e-3)[0] < 1
 
 
+@pytest.mark.parametrize("order, seed", [(-0.9, 1), (-0.9, 4), (-0.5, 1)])
+def test_always_bonds_that_grow_fast_at_a_rest_are_not_spread_evenly_while_young(order, seed):
+    """Grown within a step, a millionth of a bond length after they formed: R^p is steep in them still, and places taken
+    as even were 121, 18 and 9 times the bound off."""
+    path = np.interp(np.arange(481) / 8, np.arange(61), 0.01 * random_walk(seed, 60, 0.1))
+    law = Bonds(1.0, 1.0, order, "report", 0.5, 0.1, 0.02, 2e-5, 0.0)
+    assert share(law, path, 800, 1e-3)[0] < 1
+
+
+@pytest.mark.parametrize("order", [0.1, 0.3, 0.5])
+def test_always_stretched_bonds_whose_length_falls_at_once_keep_the_bound(order):
+    """Lengths that fall by three quarters within 0.01: the weight of joined strips, taken as even, moved over to where
+    the slide was turning, up to 5.2 times the bound."""
+    law = Bonds(1.0, 1.0, order, "stretch", 0.24, 0.15, 6.6e-3, 2e-3, 0.0)
+    assert share(law, 0.046 * random_walk(3, 1500, 0.05), 400, 2e-4)[0] < 1
+
+
 ORDERS = {"report": [-0.9, -0.5, 0, 0.3, 0.5, 1, 1.5, 2, 3.3], "stretch": [0, 0.3, 0.5, 2, 3.3]}
 
 
