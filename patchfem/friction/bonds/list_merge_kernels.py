@@ -36,7 +36,9 @@ def merge(bonds, tally, now, law):
                     and (law[1] != POWER or law[0] >= 1.0 or _as_dense(bonds, last, k, limit, eps0)):
                 _join_ends(bonds, last, k, now, law)
                 continue
-            grown = (law[1] < SHARES or _even(bonds, last, k, now, law)) and (law[1] != AGED or _gone(bonds, k, now))
+            grown = law[1] != AGED or _gone(bonds, k, now)
+            if law[1] == SHARES or (law[1] == AGED and law[0] < 1):
+                grown = grown and _even(bonds, last, k, now, law)
             if narrow and grown and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
                     min(age, 200.0)), tally):
                 if last == head + many:
