@@ -8,6 +8,7 @@ from ..core import Outcome
 CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY, GROWS = 1, 2  # their places
 LEAST = 3  # windows by which free motion is told
+MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
 TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
 
 
@@ -152,6 +153,19 @@ def mean_amplitudes(extremes, window: int) -> tuple:
     error = np.abs(ends - value[:, None]).max(axis=1) + 2 * halves + beat**2 / np.maximum(value, 1e-300)
     known = (error < np.abs(amplitude[:, -1] - value)) & (value > 0)
     return np.where(known, value, np.nan), np.where(known, error, np.nan)
+
+
+def slip_period(time, rate) -> float:
+    """Longest time [s] from the start of one slip to that of the next, of the last three of a run; 0 where there are
+    fewer than two slips.
+
+    time (k,) [s]; rate (k,) [m/s] of the slide; it slips where that is above MOVES of the largest. A motion that never
+    holds has two slips a cycle, from one turn to the next.
+    """
+    speed = np.abs(np.asarray(rate, float))
+    slips = speed > MOVES * speed.max(initial=0.0)
+    starts = np.asarray(time, float)[1:][slips[1:] & ~slips[:-1]]
+    return float(np.diff(starts[-4:]).max(initial=0.0))
 
 
 def _rises(a) -> np.ndarray:

@@ -200,10 +200,22 @@ kind = "free"
 """
 
 
-@pytest.mark.parametrize("end, outcome", [(20.0, "transient"), (30.0, "transient"), (100.0, "transient")])
+@pytest.mark.parametrize("end, outcome", [(20.0, "transient"), (40.0, "steady"), (100.0, "steady")])
 def test_exact_a_belt_does_not_end_stuck(end, outcome):
-    """A block on a belt of 0.1 m/s sticks for 8 s of every 11.63 s: a window of one cycle, 6.28 s, sees no slip. What
-    it holds rises by 0.1 N/s all the while."""
+    """A block on a belt of 0.1 m/s sticks for 8 s of every 11.63 s, so windows of one cycle, 6.28 s, see no slip or
+    half of one. One of two cycles holds a whole period: 0.6 +- sqrt(0.17) m, from 40 s on twice in a row."""
     result = run(plan(loads(BELT + f'duration = "{end} s"\n')), estimate=False)
     slipped = result.response.slide[-1] - result.response.slide[0]
     assert abs(slipped) > 0.1 and result.outcome == outcome
+    if outcome == "steady":
+        assert result.extra["window"] == 2
+        assert result.measures["relative_displacement_amplitude"].value == pytest.approx(np.sqrt(0.17), abs=2e-7)
+        assert settling.slip_period(result.response.time, result.response.slide_rate) == pytest.approx(
+            8 + 2 * (np.pi - np.arctan(4)), rel=2e-5)  # the belt loses a little speed
+
+
+def test_exact_slips_that_are_too_few_have_no_period():
+    time = np.linspace(0, 10, 1001)
+    assert settling.slip_period(time, np.where(np.abs(time - 4) < 1, 1.0, 0.0)) == 0.0
+    assert settling.slip_period(time, 0 * time) == 0.0
+    assert settling.slip_period(time, np.where(time % 4 < 1, 0.0, 1.0)) == pytest.approx(4.0, abs=1e-12)

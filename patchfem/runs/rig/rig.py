@@ -1,6 +1,7 @@
 """A coupled run from its plan to its result: engine, errors by coarser runs, levels, frames of the interface."""
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from ...response.errors import with_errors
 from ...response.outcome import changing_note, settle
 from ...response.reasons import without_value
 from ...response.run_events import events_of, with_own
+from ...response.settling import slip_period
 from ...slip.fields import element_fields, point_fields
-from ...structure.drive_sizes import slowest
+from ...structure.drive_sizes import sinusoidal, slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
 from ..results.notes import creeping, of_growth, two_books, unbounded, unripe, warming
@@ -47,7 +49,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if numerics.engine == "exact":
         refuse_endless(model)
     raw, numerics, found = _solved(model, numerics, patch, coarse[0], seconds, say, progress, estimate)
-    extra |= raw.extra
+    extra |= raw.extra | {"window": numerics.window}
     wrong = unbalanced(ENGINES[numerics.engine], found)
     if wrong:
         raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
@@ -146,6 +148,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     go = engine.run
     found = go(model, numerics, patch, frames, say, progress)
     seconds |= {"march": found.seconds} | (found.prepare or {})
+    wide = _whole_period(model, numerics, found)
+    if wide > numerics.window:
+        numerics = replace(numerics, window=wide)
+        found = go(model, numerics, patch, frames, say, progress)
     if not estimated or found.outcome is Outcome.NOT_CONVERGED:
         return found, numerics, with_errors(found.values) | curve_measures(found.extra)
 
@@ -169,6 +175,16 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         numerics = numerics.finer()
         found = go(model, numerics, patch, frames, say, progress)
         seconds["march"] = found.seconds
+
+
+def _whole_period(model, numerics, found) -> int:
+    """Cycles of a window that holds a whole stick-slip period, where no sine sets the pace of a run (a belt); 0 where
+    the run has none that lasts, or none two windows long."""
+    drive = model.rig.drive
+    if model.friction is None or not drive.segments or sinusoidal(drive):
+        return 0
+    cycles = ceil(slip_period(found.response.time, found.response.slide_rate) / drive.period)
+    return cycles if 2 * cycles <= numerics.cycles else 0
 
 
 def _level_errors(found, rung, made: dict, numerics):
