@@ -102,7 +102,8 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
         if mine.size:
             sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
     found, last = {}, -np.inf
-    for when, number, kind in [*zip(events.time, events.interface, events.kind), (np.inf, 0, BORDER)]:
+    rows = zip(events.time.tolist(), events.interface.tolist(), events.kind.tolist())
+    for when, number, kind in [*rows, (np.inf, 0, BORDER)]:
         a, b = max(last, begin), min(when, end)
         if b > a and not sliding[0]:
             found.setdefault(tuple(sliding), []).append((float(a), float(b)))

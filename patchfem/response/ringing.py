@@ -34,6 +34,8 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     omega [rad/s] of a forced sine, 0 for none; size: largest value of the signal elsewhere. A line at a harmonic of the
     drive that does not decay is forced and no ring.
     """
+    if np.size(time) < LEAST_SAMPLES:
+        return None
     time, value = _even(np.asarray(time, float), np.asarray(value, float))
     size = max(size or 0.0, float(np.abs(value).max(initial=0.0)))
     if time.size < LEAST_SAMPLES or size == 0:

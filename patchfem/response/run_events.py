@@ -10,6 +10,9 @@ from .measures import slip_noise
 from .ringing import ringing
 
 OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
+LEAST = -min(OF_LOG)
+KINDS = np.full(LEAST + max(OF_LOG) + 1, np.nan)  # by the number of an event in a log
+KINDS[np.array(list(OF_LOG)) + LEAST] = list(OF_LOG.values())
 SOURCE = "located by the event engine"
 
 
@@ -29,7 +32,7 @@ def borders_of(drive) -> list:
 def of_log(log) -> Events:
     """Events of an EventLog of the exact engine, as the table of `response.events`."""
     part = slice(-MOST, None)
-    kind = np.array([OF_LOG[what] for what in log.what[part].tolist()], float)
+    kind = KINDS[log.what[part] + LEAST]
     slide = np.where(kind == BORDER, np.nan, log.slide[part])
     return table(np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1), log.count, SOURCE)
 
