@@ -13,6 +13,7 @@ import hashlib
 import json
 import os
 import struct
+import threading
 from functools import cache
 from pathlib import Path
 
@@ -31,7 +32,7 @@ class Words:
     """Arguments as words; tuples are remembered, for their fields never change."""
 
     def __init__(self):
-        self.known = {}
+        self.known, self.lock = {}, threading.Lock()
 
     def of(self, value) -> tuple:
         """(kind, bytes) of an argument: its type in short, its words. Unfit where it has none."""
@@ -45,9 +46,11 @@ class Words:
         held = self.known.get(id(value))
         if held is None:
             kinds, words = zip(*(self.of(one) for one in value)) if value else ((), ())
-            held = self.known[id(value)] = (value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words))
-            while len(self.known) > PARTS:
-                del self.known[next(iter(self.known))]
+            held = value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words)
+            with self.lock:
+                self.known[id(value)] = held
+                while len(self.known) > PARTS:
+                    del self.known[next(iter(self.known))]
         return held[1:]
 
 
@@ -62,8 +65,9 @@ def _of_array(value) -> tuple:
 class Code:
     """A function of machine code: called with the words of its arguments."""
 
-    def __init__(self, address: int, results):
-        self.call = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)(address)
+    def __init__(self, address: int, results, nogil: bool = False):
+        kind = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE  # the first lets other threads of Python run
+        self.call = kind(None, ctypes.c_void_p)(address)
         self.results, self.leaves = results, _leaves(results)
         self.front = bytes(8 * (1 + max(len(self.leaves), 1)))
 
@@ -98,7 +102,7 @@ def found(path: Path) -> Code | None:
         engine, binding = _engine()
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        return Code(engine.get_function_address(about["name"]), about["results"])
+        return Code(engine.get_function_address(about["name"]), about["results"], about.get("nogil", False))
     except (OSError, ValueError, KeyError, ImportError, RuntimeError):
         return None
 
@@ -139,7 +143,8 @@ def keep(path: Path, function, arguments: tuple) -> bool:
         code, calls = _code(function.targetctx, made, name, max(len(_leaves(results)), 1))
         if not all(map(_in_c_library, calls)):
             return False
-        about = {"name": name, "results": results, "calls": calls, "sha256": hashlib.sha256(code).hexdigest()}
+        about = {"name": name, "results": results, "calls": calls, "sha256": hashlib.sha256(code).hexdigest(),
+                 "nogil": bool(function.targetoptions.get("nogil"))}
         path.parent.mkdir(exist_ok=True)
         draft = path.with_suffix(f".{os.getpid()}")
         draft.write_bytes(json.dumps(about).encode() + b"\n" + code)

@@ -103,3 +103,28 @@ def test_exact_batch_is_the_single_runs(law):
 def test_exact_batch_is_the_single_runs_many(law):
     cases = models(law, 2, 180)
     held_against(cases, one_by_one.solve(cases), batch(cases))
+
+
+def test_exact_cases_shared_by_threads_are_the_same_to_the_last_bit(monkeypatch):
+    from patchfem.runs.many.lumped import threads
+
+    cases = [one for one in models("coulomb", 3, 100) if one.rig.cycles == 20]
+    alone = lumped.solve(cases)
+    monkeypatch.setattr(threads, "LEAST", 8)
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    shared = lumped.solve(cases)
+    for name, values in alone.values.items():
+        np.testing.assert_array_equal(shared.values[name], values)
+        np.testing.assert_array_equal(shared.errors[name], alone.errors[name])
+    assert list(shared.outcome) == list(alone.outcome) and shared.reasons == alone.reasons
+
+
+def test_always_parts_make_up_the_cases(monkeypatch):
+    from patchfem.runs.many.lumped import threads
+
+    monkeypatch.setattr(threads, "cores", lambda: 4)
+    for count in (0, 1, 31, 64, 129, 1000):
+        seen = []
+        threads.in_threads(seen.append, count)
+        assert sorted(k for part in seen for k in range(count)[part]) == list(range(count))
+        assert len(seen) == max(1, min(4, count // 32))

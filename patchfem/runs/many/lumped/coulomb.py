@@ -11,6 +11,7 @@ from ....response.loops import interface_loops
 from ....response.spectrum import distorted
 from ...rig.engines import EXACT, engine_of
 from .columns import Runs
+from .threads import in_threads
 
 PHASES = 8  # of a cycle for which there is room, beside those of the first ones
 KERNELS = "dynamics.one_mode.batch_kernels"
@@ -44,13 +45,17 @@ def row_of(model) -> tuple:
 
 def runs_of(models, cycles: int, window: int, say=None) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts."""
-    table, n = np.array([row_of(model) for model in models]), len(models)
-    windows = (cycles - 1) // window + 1
-    room = (np.zeros((PHASES * cycles + 256, 10)), np.zeros((read.TURNS, 4)), np.zeros(6), np.zeros((cycles, 2)))
+    table, n, windows = np.array([row_of(model) for model in models]), len(models), (cycles - 1) // window + 1
     extremes, phasors, books = np.empty((n, cycles, 2)), np.empty((n, windows, 2)), np.empty((n, 10))
     numbers, ends, codes = np.full((n, read.NUMBERS), np.nan), np.full((n, 3), np.nan), np.zeros(n, np.int64)
-    load(KERNELS, say).runs(np.ascontiguousarray(table[:, :9]), (cycles, window), room,
-                            (extremes, phasors, books, numbers, ends), codes)
+    kernels, given = load(KERNELS, say), np.ascontiguousarray(table[:, :9])
+
+    def go(part: slice) -> None:
+        room = (np.zeros((PHASES * cycles + 256, 10)), np.zeros((read.TURNS, 4)), np.zeros(6), np.zeros((cycles, 2)))
+        kernels.runs(given[part], (cycles, window), room,
+                     tuple(one[part] for one in (extremes, phasors, books, numbers, ends)), codes[part])
+
+    in_threads(go, n)
     output, mass = table[:, 10], table[:, 11]
     # where a rest at an extreme outlasts the window, round-off decides which of two like rests counts
     lost = (codes != 1) | (np.isnan(numbers[:, read.SECANT]) & (numbers[:, read.HIGH] > numbers[:, read.LOW]))
