@@ -79,7 +79,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     from ..export.sweeps.run import Place, collect, sweep_into
 
     by = by or By()
-    begin, talk, part = perf_counter(), (lambda text: None) if quiet else say, by.part()
+    begin, part = perf_counter(), by.part()
     asked, cases = asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     if by.collect:
@@ -88,11 +88,11 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     line = Progress(quiet)
     try:
         found = sweep_into(asked, cases, Place(target, resume, keep == "results", part),
-                           executors.of(by.executor, by.jobs), talk, line)
+                           executors.of(by.executor, by.jobs), None if quiet else say, line)
     except KeyboardInterrupt:
         line.end()
-        talk(f"interrupted; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
-             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
+        say(f"interrupted; {line.done} of {len(cases)} cases are kept; go on with: patchfem "
+            f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume")
         raise Ended(130) from None
     line.end()
     if part is not None:

@@ -10,6 +10,8 @@ from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
+from patchfem.export.sweeps.folder import TABLES
+from patchfem.runs.many import many
 
 RIG = POINT + COULOMB + SHORT
 LOADS, LEVELS = ["10 N", "26 lbf", "-1 N"], ["1 g", "5 g"]
@@ -29,6 +31,13 @@ def swept(scene):
     return out, cli("sweep", scene, *OVER, "-o", out)
 
 
+def alike(found, single, one) -> None:
+    """A cell has the number of a single run to 1e-12 of it or of what it is a part of, nothing where that has none."""
+    size = {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)  # a distortion is a share, a drift that of an amplitude
+    assert (found == "") == (single is None)
+    assert single is None or float(found) == pytest.approx(single, rel=1e-12, abs=1e-12 * size)
+
+
 def rows(out) -> list:
     with open(out / "sweep.csv", encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
@@ -45,13 +54,14 @@ def test_exact_every_case_is_a_single_run(swept, scene):
         single = pf.run(scene, **sets)
         assert row["outcome"] == single.outcome and row["message"] == ""
         for name, one in single.measures.items():
-            assert row[name] == ("" if one.value is None else repr(one.value)), name
-            assert row[f"{name}_error"] == ("" if one.error is None else repr(float(one.error))), name
+            alike(row[name], one.value, one)
+            alike(row[f"{name}_error"], one.error, one)
         kept = json.loads((out / "cases" / row["case"] / "summary.json").read_text())
         assert kept["case"] == sets and kept["kind"] == "rig" and kept["outcome"] == single.outcome
         assert kept["warnings"] == single.warnings and kept["notes"] == single.notes
         for name, one in single.measures.items():
-            assert (kept["measures"][name]["value"], kept["measures"][name]["error"]) == (one.value, one.error)
+            for part, number in (("value", one.value), ("error", one.error)):
+                alike("" if kept["measures"][name][part] is None else kept["measures"][name][part], number, one)
             assert kept["measures"][name].get("reason", "") == one.reason
 
 
@@ -71,7 +81,7 @@ def test_exact_the_dataset_has_a_dimension_per_key(swept):
         assert dict(found.sizes) == {"normal_load": 3, "drive_acceleration": 2}
         np.testing.assert_allclose(found.normal_load, [10, 26 * 4.4482216152605, -1])
         np.testing.assert_allclose(found.drive_acceleration, [9.80665, 5 * 9.80665], rtol=1e-15)
-        assert (found.normal_load.units, found.drive_acceleration.units) == ("N", "m/s^2")
+        assert (found.normal_load.units, found.drive_acceleration.units) == ("N", "m s-2")
         names = {"loop_area", "relative_displacement_amplitude"}
         for number, row in enumerate(rows(out)):
             at = {"normal_load": number // 2, "drive_acceleration": number % 2}
@@ -100,10 +110,9 @@ def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
 
 
 def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monkeypatch):
-    from patchfem.runs.many import one_by_one
-
-    ran, real = [], one_by_one.run
-    monkeypatch.setattr(one_by_one, "run", lambda what, say: ran.append(what) or real(what, say))
+    ran, real = [], many.answers
+    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(
+        model for model in models if isinstance(model, pf.Model)) or real(models, *more))
     out = tmp_path / "swept"
     assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
     assert len(ran) == 2
@@ -115,25 +124,50 @@ def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monk
 
 
 def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):
-    from patchfem.runs.many import one_by_one
+    real, left = many.answers, [2]
 
-    real, left = one_by_one.run, [2]
-
-    def stops(what, say):
+    def stops(models, *more):
         if not left[0]:
             raise KeyboardInterrupt
         left[0] -= 1
-        return real(what, say)
+        return real(models, *more)
 
-    monkeypatch.setattr(one_by_one, "run", stops)
+    monkeypatch.setattr(many, "answers", stops)
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
     assert answer.code == 130 and "--resume" in answer.err
-    assert 1 <= len(list((out / "cases").iterdir())) <= 2 and not (out / "sweep.csv").exists()  # whole chunks are kept
-    monkeypatch.setattr(one_by_one, "run", real)
+    assert 2 <= len(list((out / "cases").iterdir())) < 6 and not (out / "sweep.csv").exists()
+    monkeypatch.setattr(many, "answers", real)
     assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 3
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
+
+
+def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, monkeypatch):
+    out, real = tmp_path / "swept", many.answers
+    assert cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", out).code == 0
+
+    def stops(*given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(many, "answers", stops)
+    assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 130
+    assert {one.name for one in out.iterdir()} == {"cases", *(f"{name}.partial" for name in TABLES)}
+    monkeypatch.setattr(many, "answers", real)
+    assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 0
+    assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
+    assert {one.name for one in out.iterdir()} == {"cases", *TABLES}
+    assert len(list((out / "cases").iterdir())) == 3  # what was found before is kept, as long as it is gone on with
+    assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out).code == 0
+    assert len(list((out / "cases").iterdir())) == 2
+
+
+@pytest.mark.parametrize("unit, written", [("m/s^2", "m s-2"), ("N m/rad", "N m rad-1"), ("1/m^2", "m-2"), ("1", "1"),
+                                           ("m^2/N", "m2 N-1"), ("Pa", "Pa"), ("N s/m", "N s m-1")])
+def test_exact_units_are_written_as_in_results(unit, written):
+    from patchfem.export.sweeps.tables import cf_unit
+
+    assert cf_unit(unit) == written
 
 
 def test_exact_one_object_on_stdout(scene, tmp_path):

@@ -130,12 +130,20 @@ class Folder:
             _read(found, case, one)
         return [number for number, _ in read], found
 
-    def drop_others(self) -> None:
-        """Remove the cases of other sweeps, and what is left of cases that died half written."""
+    def unfinish(self) -> None:
+        """Mark the tables of an older sweep as what they are while cases are answered: not those of the folder."""
+        for name in TABLES:
+            if (self.target / name).is_file():
+                os.replace(self.target / name, self.target / f"{name}.partial")
+
+    def tidy(self, others: bool) -> None:
+        """Remove what is left of tables and cases that were never whole; others: the cases of other sweeps as well."""
         own = set(self.keys)
         for one in os.scandir(self.target / CASES):
-            if one.name not in own:
+            if one.name.startswith(".") or one.name.endswith(".partial") or (others and one.name not in own):
                 shutil.rmtree(one.path, ignore_errors=True)
+        for name in TABLES:
+            (self.target / f"{name}.partial").unlink(missing_ok=True)
 
     def _claim(self) -> None:
         lock = self.target / LOCK

@@ -49,6 +49,8 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         if told is not None:
             told(done, len(wanted))
         kept = set(there)
+        if len(kept) < len(wanted):
+            folder.unfinish()
         work = Work(asked, cases, Summaries(cases), Whole(folder.target, tuple(keys)) if place.whole else None)
         for numbers, found, texts in solved(work, [one for one in wanted if one not in kept], executor, say):
             folder.put(*_to_write(numbers, found, texts, place.whole))
@@ -59,6 +61,7 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
                 told(done, len(wanted))
         if place.shard is None:
             write_tables(asked, cases, total, folder)
+            folder.tidy(not place.resume)
     return total
 
 
@@ -80,15 +83,15 @@ def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
             raise Missing(f"{target}: {len(cases) - len(numbers)} of {len(cases)} cases have no answer; run their "
                           "shards again, or go on with --resume")
         write_tables(asked, cases, found, folder)
+        folder.tidy(False)
     return found
 
 
 def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder) -> None:
-    """Write sweep.csv, sweep.nc and report.html of all cases, and drop the cases of other sweeps from the folder."""
+    """Write sweep.csv, sweep.nc and report.html of all cases."""
     write_csv(cases, found, folder.keys, folder.target / "sweep.csv")
     netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
     write_page(asked, cases, found, folder.keys, folder.target)
-    folder.drop_others()
 
 
 def _part(count: int, shard: tuple | None) -> list[int]:

@@ -103,4 +103,14 @@ def _about(axis) -> dict:
         text = meanings.meaning(model, name)
     except KeyError:
         text = axis.key
-    return {"long_name": text, "key": axis.key} | ({"units": axis.unit} if axis.unit else {})
+    return {"long_name": text, "key": axis.key} | ({"units": cf_unit(axis.unit)} if axis.unit else {})
+
+
+def cf_unit(unit: str) -> str:
+    """A unit of a scene as the results write it: "m/s^2" is "m s-2"."""
+    above, *below = unit.split("/")
+    parts = [one.replace("^", "") for one in above.split() if one != "1" or not below]
+    for one in " ".join(below).replace("(", "").replace(")", "").split():
+        name, _, power = one.partition("^")
+        parts.append(f"{name}-{power or 1}")
+    return " ".join(parts)

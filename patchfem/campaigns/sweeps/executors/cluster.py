@@ -28,7 +28,7 @@ class Cluster:
 
             dask.config.set({"distributed.scheduler.allowed-failures": 0})  # tries are counted by the sweep
             self.own = distributed.LocalCluster(workers or os.cpu_count() or 1, threads_per_worker=1, processes=True,
-                                                dashboard_address=None, silence_logs="CRITICAL")
+                                                dashboard_address=":0", silence_logs="CRITICAL")
         try:
             self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:

@@ -26,11 +26,11 @@ ROOT = Path(__file__).parents[4]  # where the package lies: a worker imports thi
 class Worker:
     """A process that answers one chunk after the other."""
 
-    def __init__(self, work: Work):
+    def __init__(self, work: Work, silent: bool = False):
         here, there = Pipe()
         path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-        self.process = subprocess.Popen([sys.executable, "-c", f"from {MODULE} import main; main()",
-                                         str(there.fileno())], pass_fds=[there.fileno()], stdin=subprocess.DEVNULL,
+        words = [sys.executable, "-c", f"from {MODULE} import main; main()", str(there.fileno()), "silent" * silent]
+        self.process = subprocess.Popen(words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL,
                                         env=os.environ | ONE_THREAD | {"PYTHONPATH": path})
         there.close()  # so that the death of the process closes the pipe
         self.pipe: Connection = here
@@ -72,7 +72,7 @@ class Pool:
         workers: list[Worker] = []
         try:
             while True:
-                self._hand_out(workers, work, take)
+                self._hand_out(workers, lambda: _started(work, say is None), take)
                 busy = {one.pipe: one for one in workers if one.chunk is not None}
                 if not busy:
                     return
@@ -87,20 +87,20 @@ class Pool:
             for one in workers:
                 one.end()
 
-    def _hand_out(self, workers: list, work: Work, take: Callable) -> None:
+    def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
         """Give every idle process a chunk; start another while there are chunks and not yet enough processes."""
         for one in [one for one in workers if one.chunk is None] + [None] * (self.workers - len(workers)):
             chunk = take()
             if chunk is None:
                 return
             if one is None:
-                workers.append(one := _started(work))
+                workers.append(one := start())
             one.give(chunk)
 
 
-def _started(work: Work) -> Worker:
+def _started(work: Work, silent: bool) -> Worker:
     try:
-        return Worker(work)
+        return Worker(work, silent)
     except OSError as error:
         raise Missing(f"a process of the sweep cannot be started ({error.strerror}); lower -j") from None
 

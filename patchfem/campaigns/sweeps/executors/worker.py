@@ -6,7 +6,8 @@ from multiprocessing.connection import Connection
 
 
 def main() -> None:
-    """Answer the chunks that come through the pipe whose number is the first word of the command line."""
+    """Answer the chunks that come through the pipe whose number is the first word of the command line; a second word
+    keeps it silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the business of the process that asks
     pipe = Connection(int(sys.argv[1]))
     try:
@@ -15,7 +16,7 @@ def main() -> None:
 
         while True:
             chunk = pipe.recv()
-            pipe.send(answer(work, chunk, _say))
+            pipe.send(answer(work, chunk, None if sys.argv[2] else _say))
     except (EOFError, BrokenPipeError, ConnectionResetError):  # who asked is gone
         return
 
