@@ -17,6 +17,7 @@ FULL = 2  # status of a loop whose list of bonds is full
 GOAL = 1e-11  # residual of the step solve over the friction limit
 MOST_KEPT = 400_000  # samples kept outside the last cycles
 MOST_TURNS = 100  # of them in a cycle
+AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -103,10 +104,13 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
 
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total = round(cycles * steps_per_cycle)
+    if not whole and not marks and not run.passed(total - max(window, 2) * steps_per_cycle):
+        run = fresh(modes, drive, model, steps_per_cycle, travel, start)  # it ends before: once more, cycle by cycle
     last, kept, kept_at, extremes, phasors, snapshots, samples = deque(maxlen=max(window, 2)), [], [], [], [], [], 0
     asked, found = {round(mark * steps_per_cycle) for mark in marks}, []
     whole = whole or bool(asked)
-    size = total % steps_per_cycle or steps_per_cycle  # a fraction of a cycle comes first, the window is whole
+    # a fraction of a cycle comes first, the window is whole
+    size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         final = run.done + size >= total
         first, rows, work = run.cycle(size, frames if final else 0, snapshots)
@@ -193,6 +197,12 @@ class Run:
     def response(self, rows, number) -> Response:
         """Histories of the samples with step numbers `number` (k,)."""
         return _response(rows, number, self.prop.dt, self.modes, self.drive)
+
+    def passed(self, steps: int) -> bool:
+        """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far."""
+        while self.done < steps and self.outcome is None:
+            self.cycle(min(steps - self.done, AT_ONCE, PIECES * self.prop.steps), 0, [])
+        return self.outcome is None
 
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
         """March `size` steps in `frames` pieces (0: one), with a snapshot after each.

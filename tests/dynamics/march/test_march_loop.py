@@ -252,6 +252,26 @@ def test_exact_energy_ledger_of_a_driven_march():
         assert abs(miss) <= 1e-8 * (book["power"] + book["peak_stored"])
 
 
+@pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (3, np.inf), (40, 0.8)])
+def test_exact_a_run_without_histories_has_the_same_last_cycles(cycles, travel):
+    """Long pieces of which nothing is kept, also where the flexure's stop at a share of the way ends one of them."""
+    model, drive = jenkins_model([2e5, 1e5], [1e-6, 2e-6]), BaseSine(49.0, OMEGA)
+    if np.isfinite(travel):  # of the amplitude that the run would reach
+        travel *= march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2).amplitudes.max()
+    one, other = (march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2, travel, whole=whole)
+                  for whole in (True, False))
+    assert one.outcome is other.outcome is (Outcome.EXCEEDS_TRAVEL if np.isfinite(travel) else None)
+    assert (10 < one.cycles_done < 40) or not np.isfinite(travel)
+    assert one.cycles_done == other.cycles_done
+    for name in ("time", "slide", "force", "output", "acceleration"):
+        assert np.array_equal(getattr(one.window, name), getattr(other.window, name))
+    assert np.array_equal(one.step_force, other.step_force)
+    assert np.array_equal(one.amplitudes[-2:], other.amplitudes[-2:])
+    assert other.window_work == pytest.approx(one.window_work, rel=1e-12)
+    assert other.ledger == pytest.approx(one.ledger, rel=1e-12)
+    assert other.response.extra["ledger"][:, -1] == pytest.approx(one.response.extra["ledger"][:, -1], rel=1e-12)
+
+
 # ---- free decay
 
 def release(basis, model, start, steps_per_cycle, count):
