@@ -21,7 +21,7 @@ import numpy as np
 
 FINE = (0, -2)  # numba's status of a function that returned something, or nothing
 NUMBERS = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
-PARTS = 3  # tuples of arguments whose words are remembered: a run calls with the same ones again and again
+PARTS = 12  # tuples of arguments whose words are remembered: a run calls with the same ones again and again
 
 
 class Unfit(Exception):

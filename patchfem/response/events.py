@@ -101,8 +101,13 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
         mine = events.kind[events.interface == number + 1]
         if mine.size:
             sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
+    first = int(np.searchsorted(events.time, begin))  # of those before only the last of each interface counts
+    for number in range(count):
+        mine = events.kind[:first][events.interface[:first] == number + 1]
+        if mine.size:
+            sliding[number] = bool(mine[-1] != STOP)
     found, last = {}, -np.inf
-    rows = zip(events.time.tolist(), events.interface.tolist(), events.kind.tolist())
+    rows = zip(*(column[first:].tolist() for column in (events.time, events.interface, events.kind)))
     for when, number, kind in [*rows, (np.inf, 0, BORDER)]:
         a, b = max(last, begin), min(when, end)
         if b > a and not sliding[0]:

@@ -1,5 +1,7 @@
 """The table of events: seen in samples, cut at its length, and the stick intervals between events."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -88,3 +90,29 @@ def test_exact_sticks_are_cut_where_another_interface_changes():
 def test_exact_an_interface_without_events_sticks_or_slides_all_the_time():
     none = table([])
     assert sticks(none, 1.0, 3.0, [False]) == [(1.0, 3.0)] and sticks(none, 1.0, 3.0, [True]) == []
+
+
+def test_exact_sticks_of_a_window_do_not_hang_on_when_the_list_begins():
+    """The sticks of a random list of events within a window, against a walk along all of the list."""
+    from patchfem.response.events import RELEASE_UP, REVERSAL_UP, STOP, sticks, table
+
+    r = np.random.default_rng(4)
+    for _ in range(30):
+        rows, time, moving = [], 0.0, [True, False]
+        for _ in range(60):
+            time += r.exponential()
+            number = int(r.integers(2))
+            kind = (int(r.choice([STOP, REVERSAL_UP])) if moving[number] else RELEASE_UP)
+            moving[number] = kind != STOP
+            rows.append((time, number + 1, kind, 0.0))
+        begin, end = 0.4 * time, 0.9 * time
+        marks, spans = sorted({begin, end, *(row[0] for row in rows if begin < row[0] < end)}), {}
+        for a, b in itertools.pairwise(marks):
+            state = []
+            for number, first in ((1, True), (2, False)):
+                before = [row[2] for row in rows if row[1] == number and row[0] <= a]
+                state.append(before[-1] != STOP if before else first)
+            if not state[0]:
+                spans.setdefault(tuple(state), []).append((a, b))
+        longest = max(spans.values(), key=lambda one: sum(b - a for a, b in one), default=[])
+        assert sticks(table(rows), begin, end, [True, False]) == longest

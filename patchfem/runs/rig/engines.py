@@ -6,6 +6,7 @@ the scene have refused, `scene.rules.methods`.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from importlib import import_module
 from math import inf
 from typing import NamedTuple
@@ -260,6 +261,7 @@ def unbalanced(engine: Engine, measures: dict) -> str:
         f"{bar:.2g}, so a step made or lost energy{'; ' + remedy if remedy else ''}"
 
 
+@lru_cache(8)
 def engine_of(model: Model, per_point: bool = False) -> Engine:
     """The engine that a scene names, or the first of AUTOMATIC that lacks nothing.
 
