@@ -34,7 +34,8 @@ scene acts, one left out does not exist. A key that only some values of a select
 MEASURED = """\
 Values are in SI. The error is an estimated half-width; it is to stay below tolerance × |value| + floor, else a warning
 says so. Measures of a motion are those of the last cycles, the last ten or the last tenth of a shorter run. A number
-behind a name counts the interfaces (strips, where strips slide apart): `slip_amplitude_2` is that of the second.
+behind a name counts the interfaces (strips, where strips slide apart): `slip_amplitude_2` is that of the second. Of a
+displacement the floor is 1e-5 of what the drive itself moves, a/omega^2, where that is less.
 """
 
 

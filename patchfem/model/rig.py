@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import ModalBasis, Start
-from ..structure.drive_sizes import peak_speed
+from ..structure.drive_sizes import omega_of, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_names, rubbings_of
 from .structure import acts, first_of, frequencies, modes_of, notes_of, start_of, yaws
@@ -55,6 +55,11 @@ class Rig:
         """Scale of the speeds to expect [m/s], from drive and start; the default floor of the speed in 2.10 follows
         from it."""
         return peak_speed(self.drive, self.start)
+
+    @property
+    def displacement(self) -> float:
+        """Scale of the displacements to expect [m], from drive and start: the speed over the omega of the drive."""
+        return self.speed / omega_of(self.drive)
 
     @property
     def stiffness(self) -> float:

@@ -15,7 +15,7 @@ from statistics import median
 import numpy as np
 
 from ..core import Measure
-from .rows import of_first, row_of
+from .rows import floor_of, of_first, row_of
 
 ORDERS = 2**1.7, 2**2.3  # ratios of two changes at halved steps that show second order
 SURE = 2.2  # times the error that follows from the order: 95 % of these are below 1.5 to 2 times it
@@ -51,11 +51,11 @@ def change(fine: dict, coarse: dict) -> dict:
     return {name: abs(gap) for name, gap in signed(fine, coarse).items()}
 
 
-def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
+def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = np.inf) -> dict:
     """Error of the time step by name from the measures of runs at `steps`, half and a quarter of them per cycle.
 
     By the order where the changes show it, else by their size and that of the main measures, as the head of the file
-    says. What counts samples has at least their resolution.
+    says. What counts samples has at least their resolution. size [m]: as `floor_of` takes it.
     """
     last, before = signed(fine, half), signed(half, quarter)
     sizes = {name: max(abs(gap), abs(before.get(name, 0.0)) / 4) for name, gap in last.items()}
@@ -72,7 +72,7 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
             least = 0.0 if kind in APART else SHARE * typical * value
             out[name] = grows * LOOSE * LOOSER.get(kind, 1.0) * max(sizes[name], least)
         if sizes[name] > ROUND * value:
-            out[name] = max(out[name], OF_FLOOR * row_of(name).floor)
+            out[name] = max(out[name], OF_FLOOR * float(floor_of(name, size)))
         out[name] += row_of(name).grain / steps
     return out
 
@@ -103,9 +103,9 @@ def tolerance_error(fine: dict, coarse: dict) -> dict:
             for name, gap in gaps.items()}
 
 
-def jumps_error(fine: dict, half: dict, quarter: dict, steps: int) -> dict:
+def jumps_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = np.inf) -> dict:
     """`step_error` of a set-valued law, whose releases lie between samples."""
-    found = step_error(fine, half, quarter, steps)
+    found = step_error(fine, half, quarter, steps, size)
     return {name: error + BETWEEN.get(of_first(name), 0.0) / steps for name, error in found.items()}
 
 
@@ -126,15 +126,15 @@ def typical_change(fine: dict, sizes: dict) -> float:
     return median([sizes[name] / abs(fine[name]) for name in MAIN if sizes.get(name) and fine[name]] or [0.0])
 
 
-def with_errors(values: dict, *errors: dict, least: float = 0.0) -> dict:
+def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np.inf) -> dict:
     """Measures by name whose error is the sum of the given errors, plus `least` of the value.
 
-    A measure that a coarser run does not have is as uncertain as it is large.
+    A measure that a coarser run does not have is as uncertain as it is large. size [m]: as `floor_of` takes it.
     """
-    out, size = {}, values.get("relative_displacement_amplitude", 0.0)
+    out, amplitude = {}, values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():
-        error = total_error(name, value, [part.get(name, abs(value)) for part in errors], least, size)
-        out[name] = Measure(float(value), row_of(name).unit, float(error), row_of(name).floor)
+        error = total_error(name, value, [part.get(name, abs(value)) for part in errors], least, amplitude)
+        out[name] = Measure(float(value), row_of(name).unit, float(error), float(floor_of(name, size)))
     return out
 
 

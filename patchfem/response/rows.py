@@ -153,6 +153,9 @@ ROWS = (
         "hysteresis: largest difference of the amplitude between rising and falling levels, at one level"),
 )
 TABLE = {row.name: row for row in ROWS}
+MOVED = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady", "slip_amplitude",
+         "drift_per_cycle")
+LEAST_MOVED = 1e-5  # of the displacement of a drive, above which no error of a displacement is let pass unsaid
 
 
 def measures_of(seen: Seen) -> dict:
@@ -172,6 +175,18 @@ def of_first(name: str) -> str:
     """Name of a measure without the number of its interface: slip_amplitude_2 becomes slip_amplitude."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
+
+
+def floor_of(name: str, size=np.inf):
+    """Floor of the error of a measure of any interface, in its unit; of a displacement at most the share LEAST_MOVED of
+    `size` [m], of what the drive of the run moves by itself.
+
+    size: one, or (n,) of many runs; 0 or inf where no drive moves anything.
+    """
+    floor = row_of(name).floor
+    if of_first(name) not in MOVED:
+        return floor
+    return np.where(np.greater(size, 0), np.minimum(floor, LEAST_MOVED * np.asarray(size)), floor)
 
 
 def row_of(name: str) -> Row:

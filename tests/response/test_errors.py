@@ -7,8 +7,11 @@ import pytest
 
 from patchfem.model.model import build
 from patchfem.response.errors import BETWEEN, MAIN, SURE, cells_error, change, jumps_error, step_error, with_errors
+from patchfem.response.rows import floor_of
+from patchfem.runs.plan import plan
 from patchfem.runs.rig import march as rig_march
 from patchfem.runs.rig.numerics import choose
+from patchfem.runs.run import run
 from patchfem.scene import scene
 
 TEXT = """
@@ -123,6 +126,41 @@ def test_always_a_march_claims_no_digit_far_below_the_floor():
     """Three runs that agree by chance to 1e-14 m: a tenth of the floor of 1e-10 m stays."""
     values = {NAME: 1e-9}
     assert step_error(values, {NAME: 1e-9 + 1e-14}, {NAME: 1e-9 + 4e-14}, 400)[NAME] == pytest.approx(1e-11)
+
+
+RUBBING = """[normal]
+load = "{load} N"
+[friction]
+law = "coulomb"
+static = 0.3
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "one"
+frequency = "143 Hz"
+damping = 0.02
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "120 Hz"
+acceleration = "{size} g"
+cycles = 30
+[accuracy]
+method = "march"
+"""
+
+
+def test_exact_a_small_drive_is_met_as_a_large_one():
+    """Drive and load a billion times smaller: the same steps and the same relative errors. With 1e-10 m beside 6e-14 m
+    any error was small enough."""
+    large, small = (run(plan(scene.loads(RUBBING.format(load=30 * size, size=5 * size)))) for size in (1.0, 1e-9))
+    assert small.extra["steps_per_cycle"] == large.extra["steps_per_cycle"]
+    one, other = small.measures[NAME], large.measures[NAME]
+    assert one.value == pytest.approx(1e-9 * other.value, rel=1e-9)
+    assert one.error == pytest.approx(1e-9 * other.error, rel=1e-3) and one.error < 1e-3 * one.value
+    assert other.floor == 1e-10 and one.floor == pytest.approx(
+        1e-5 * 5e-9 * 9.80665 / (2 * np.pi * 120)**2, rel=1e-12)
+    assert floor_of(NAME, 0.0) == floor_of(NAME) == 1e-10 and floor_of("loop_area", 1e-12) == 1e-10
 
 
 def test_exact_a_release_lies_between_two_samples():

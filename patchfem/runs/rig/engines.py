@@ -161,7 +161,7 @@ def _march_in_time(model: Model, numerics, patch) -> list:
     """Rungs of the march in time: half and a quarter of the steps."""
     halves = tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
     rule = jumps_error if set_valued(model, numerics) else step_error
-    return [Rung(halves, lambda *values: rule(*values, numerics.steps))]
+    return [Rung(halves, lambda *values: rule(*values, numerics.steps, model.rig.displacement))]
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:

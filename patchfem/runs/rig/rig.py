@@ -145,7 +145,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     Steps that the scene does not pin are halved until the error of the displacement is met.
     """
     engine, frames, made = ENGINES[numerics.engine], FRAMES if patch is not None else 0, {}
-    go = engine.run
+    go, size = engine.run, model.rig.displacement
     found = go(model, numerics, patch, frames, say, progress)
     seconds |= {"march": found.seconds} | (found.prepare or {})
     wide = _whole_period(model, numerics, found)
@@ -153,7 +153,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         numerics = replace(numerics, window=wide)
         found = go(model, numerics, patch, frames, say, progress)
     if not estimated or found.outcome is Outcome.NOT_CONVERGED:
-        return found, numerics, with_errors(found.values) | curve_measures(found.extra)
+        return found, numerics, with_errors(found.values, size=size) | curve_measures(found.extra)
 
     def solve(variant):
         return go(model, replace(variant.numerics, whole=False), variant.patch)
@@ -162,7 +162,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     while True:
         time, more = estimate(solve, found.values, engine.in_time(model, numerics, patch), made)
         spent += more
-        measures = with_errors(found.values, *time, *space, least=engine.least)
+        measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
         if found.levels and time:
             rung = engine.in_time(model, numerics, patch)[0]
             found = replace(found, levels=_level_errors(found, rung, made, numerics), halved=made[rung.runs[0]])

@@ -10,7 +10,7 @@ from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, settled, steady_error
 from ....response.reasons import CYCLIC, without_value
-from ....response.rows import TABLE
+from ....response.rows import TABLE, floor_of
 from ....response.settling import CLASSES, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, omega_of, slowest
 from ...results.notes import BOOKS
@@ -62,15 +62,16 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
     values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
     errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
+    moved = np.array([model.rig.displacement for model in models])
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
             continue
-        row = TABLE[name]
-        alone |= there & ~grows & (errors[name] > tolerance * np.abs(value) + row.floor)
+        row, floor = TABLE[name], floor_of(name, moved)
+        alone |= there & ~grows & (errors[name] > tolerance * np.abs(value) + floor)
         found.units[name], found.values[name] = row.unit, value
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
-        found.floors[name] = np.where(there, row.floor, np.nan)
+        found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, runs, found)
     for case, model in enumerate(models):
         found.numerics[case] = numerics
