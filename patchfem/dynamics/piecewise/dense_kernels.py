@@ -3,7 +3,8 @@
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series
-from .march_kernels import EACH, HEAD, moved, speed_series
+from .march_kernels import EACH, HEAD
+from .search_kernels import moved, speed_series
 from .series_kernels import fastest, largest, motion_series, powers, value
 
 

@@ -6,24 +6,12 @@ alone. A turning point may shift in time, but the slide is at rest there, so the
 that of the slide.
 """
 
-from numba import njit
-
+from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .drive_kernels import RATE, drive_series
-from .march_kernels import (
-    AT_ONCE,
-    MOST_IDLE,
-    TURNS,
-    advance,
-    arrive,
-    happen,
-    left_of,
-    next_event,
-    output_of,
-    wait,
-    widen,
-)
+from .march_kernels import AT_ONCE, MOST_IDLE, advance, arrive, happen, left_of, output_of, wait, widen
 from .memory_kernels import carried, tangent
+from .search_kernels import TURNS, next_event
 from .series_kernels import REACH, fastest, motion_series, powers
 
 

@@ -1,0 +1,100 @@
+"""Compiled search for the first event of a piece: a yield, or a turning point of a slide or of the output.
+
+Up to the first turning point of a slide, whose speed is proved free of roots before it, the slide is monotone, so a
+yield before it is one root of a monotone function: no event can be missed.
+"""
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import FAST, LEAN
+from .memory_kernels import threshold
+from .series_kernels import NONE, OVER, first_root, polish
+
+NOTHING, YIELDS, TURNS, OUTPUT_TURNS, STOPS = 0, 1, 2, 3, 4  # what ends a piece
+TINY = 1e-14  # of the terms of a speed: below it a slide at a turning point has no acceleration
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def heading(poly, top, rests):
+    """(order of the first term of a speed that counts, its sign); poly: its series; rests: it is zero at first."""
+    if not rests and poly[0] != 0.0:
+        return 0, 1.0 if poly[0] > 0 else -1.0
+    size = 0.0
+    for k in range(top):
+        size += abs(poly[k])
+    for k in range(1, min(top, 4)):
+        if abs(poly[k]) > TINY * size:
+            return k, 1.0 if poly[k] > 0 else -1.0
+    return 0, 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def speed_series(row, coefs, top, poly):
+    """Fill poly (top,) with the series of the rate over u of row (n,) times the coordinates."""
+    for k in range(top):
+        part = 0.0
+        for i in range(row.size):
+            part += row[i] * coefs[k + 1, i]
+        poly[k] = (k + 1) * part
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def moved(poly, top, u):
+    """Integral from 0 to u of a speed whose series is poly (top,)."""
+    out = poly[top - 1] * OVER[top]
+    for k in range(top - 2, -1, -1):
+        out = out * u + poly[k] * OVER[k + 1]
+    return out * u
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def crossing(poly, top, room, limit, spare):
+    """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by `room` the way it goes; NONE
+    if it does not. room > 0 [m], signed; spare: room for a polynomial."""
+    end = moved(poly, top, limit)
+    way = 1.0 if room > 0 else -1.0
+    if way * end < way * room:
+        return NONE
+    spare[0] = way * room
+    for k in range(top):
+        spare[k + 1] = -way * poly[k] * OVER[k + 1]
+    return polish(spare, 0, top, 0.0, limit, limit * room / end)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def next_event(top, plant, table, memory, clock, room):
+    """(u, what, face, sign) of the first event of a piece; u = 1 and NOTHING where none ends it.
+
+    u = 0: the state changes before anything moves.
+    """
+    faces, polys = plant.faces.shape[0], room.polys
+    u, what, face, sign = 1.0, NOTHING, 0, 0.0
+    for f in range(faces):
+        poly = polys[f]
+        speed_series(plant.faces[f], room.coefs, top, poly)
+        order, way = heading(poly, top, clock.rest[f] == 1.0)
+        if way == 0.0:
+            continue
+        if memory.slipping[f] > 0 and way != memory.way[f]:
+            return 0.0, TURNS, f, way
+        spare = polys[faces]
+        for k in range(order, top):
+            spare[k] = way * poly[k]
+        root = first_root(spare, order, top - 1, room.hulls)
+        if root < u:
+            u, what, face, sign = root, TURNS, f, -way
+        gap = threshold(f, way, table, memory) - memory.place[f]
+        if way * gap <= 0:
+            return 0.0, YIELDS, f, way
+        root = crossing(poly, top, gap, u, polys[faces])
+        if root <= u:
+            u, what, face, sign = root, YIELDS, f, way
+    if plant.along < 0:
+        poly, spare = polys[faces + 1], polys[faces]
+        speed_series(plant.output, room.coefs, top, poly)
+        order, way = heading(poly, top, clock.rest[faces] == 1.0)
+        for k in range(order, top):
+            spare[k] = way * poly[k]
+        root = first_root(spare, order, top - 1, room.hulls) if way != 0.0 else NONE
+        if root < u:
+            u, what, face, sign = root, OUTPUT_TURNS, faces, -way
+    return u, what, face, sign
