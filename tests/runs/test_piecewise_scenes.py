@@ -51,10 +51,11 @@ def both(text, *sets):
 def agree(exact, march, *besides):
     """Measures of a march whose bars do not hold the exact values."""
     assert exact.extra["engine"] == "piecewise" and march.extra["engine"] == "march"
-    assert set(exact.measures) == set(march.measures)
+    steady = {"relative_displacement_amplitude_steady"}  # the map of the yields finds it where samples cannot
+    assert set(exact.measures) - steady == set(march.measures) - steady
     out = []
     for name, other in march.measures.items():
-        mine = exact.measures[name]
+        mine = exact.measures.get(name, other)
         if name in (*ROUND, *besides) or mine.value is None or other.value is None:
             continue
         if abs(mine.value - other.value) > 1.5 * (other.error or 0.0) + mine.error + other.floor:
