@@ -24,7 +24,8 @@ from ..press import pressed
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
 ROUNDS = 4  # of the search for the contacts
 MOST_NODES = 400  # of the finest interface
-START = (4.0, 2.8, 2.0, 1.4, 1.0)  # times the cells that a case asks of its coarsest mesh: the first that are enough
+# times the cells that a case asks of its coarsest mesh: the first that are enough are taken
+START = (4.0, 2.8, 2.0, 1.7, 1.4, 1.2, 1.0)
 CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
 
 
