@@ -14,6 +14,7 @@ would cost their load, 1.4 % for the six of that patch.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dger
 
 from ..core import PatchfemError, frozen_array
 from ..elasticity.threads import one_thread
@@ -72,28 +73,27 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         return JenkinsSet(frozen_array([stiffness]), frozen_array(at), frozen_array(points, np.int64),
                           frozen_array(force), frozen_array(force[:, None] / at), 0)
     c = tangential[np.ix_(points, points)] + np.diag(local_length / force)
-    inverse = np.linalg.inv(c)
+    inverse = np.asfortranarray(np.linalg.inv(c))  # rows and columns of nodes that have yielded are 0 in it
     stick = np.ones(force.size, bool)
     carried = np.zeros(force.size)
     slide, rates, at, reluctant = 0.0, [], [], 0
     while stick.any():
-        rate = inverse.sum(axis=1)
-        index = np.flatnonzero(stick)
-        wait = np.where(rate > 0, (force[index] - carried[index]) / np.where(rate > 0, rate, 1.0), np.inf)
-        reluctant = max(reluctant, int(np.sum(rate <= 0)))
+        rate = inverse.sum(axis=0)
+        wait = np.where(rate > 0, (force - carried) / np.where(rate > 0, rate, 1.0), np.inf)
+        wait[~stick] = np.inf
+        reluctant = max(reluctant, int(np.sum(stick & (rate <= 0))))
         first = wait.min()
         slide += max(first, 0.0)
-        carried[index] += rate * max(first, 0.0)
-        going = wait <= first * (1 + 1e-12)  # nodes that yield at once, as mirrored ones do
-        rates.append(np.zeros(force.size))
-        rates[-1][index] = rate
+        carried[stick] += rate[stick] * max(first, 0.0)
+        going = stick & (wait <= first * (1 + 1e-12))  # nodes that yield at once, as mirrored ones do
+        rates.append(np.where(stick, rate, 0.0))
         at.append(slide)
-        for local in np.flatnonzero(going)[::-1]:
-            column = inverse[:, local]
-            rest = np.delete(np.arange(inverse.shape[0]), local)
-            inverse = inverse[np.ix_(rest, rest)] - np.outer(column[rest], column[rest]) / column[local]
-        carried[index[going]] = force[index[going]]
-        stick[index[going]] = False
+        for node in np.flatnonzero(going)[::-1]:
+            column = inverse[:, node].copy()
+            inverse = dger(-1 / column[node], column, column, a=inverse, overwrite_a=1)
+            inverse[node], inverse[:, node] = 0.0, 0.0
+        carried[going] = force[going]
+        stick[going] = False
     drop = -np.diff(np.array([*rates, np.zeros(force.size)]), axis=0).T
     return JenkinsSet(frozen_array(drop.sum(axis=0)), frozen_array(at), frozen_array(points, np.int64),
                       frozen_array(force), frozen_array(drop), reluctant)

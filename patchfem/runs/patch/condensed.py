@@ -13,7 +13,7 @@ from ...mesh.tensor import TensorGrid
 from ...model.pieces import layers_of
 
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
-SHARED = 2  # geometries whose shared pieces are kept
+SHARED = 4  # geometries whose shared pieces are kept, either plane state counted
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -118,6 +118,14 @@ def shared_pairs(asked) -> tuple:
     """The condensed pieces of every level of a `PatchModel` that has `meshes`; those of the last patches are kept."""
     pieces = asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
     return _shared(asked.meshes.name, pieces, _Content(asked))
+
+
+def pair_beside(asked, pair: Pair) -> Pair:
+    """The pieces of a `PatchModel` on the bodies of another Pair; kept where these are of meshes that it shares."""
+    for k, level in enumerate(() if asked.meshes is None else asked.meshes.levels):
+        if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (pair.upper is pair.piece):
+            return shared_pairs(asked)[k]
+    return condensed(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
 class _Content:

@@ -11,8 +11,9 @@ from ...core import Measure, PatchfemError
 from ...mesh.nested import plan_of
 from ...scene.keys.contact import outermost
 from ..results.patch_rows import DECISIVE, TABLE
+from .condensed import pair_beside
 from .limits import limit
-from .press import Patch, pressed, solve
+from .press import Patch, pressed
 from .rounding import open_ends, unresolved_rounding
 from .values import edge_cells, values
 
@@ -35,10 +36,8 @@ def plane_band(asked, patch: Patch) -> list:
     other = other_plane(asked)
     if other is None:
         return []
-    pair = patch.pair
-    upper = None if pair.upper is pair.piece else pair.upper_grid
     try:
-        mine, theirs = values(patch), values(solve(other, pair.grid, upper))
+        mine, theirs = values(patch), values(pressed(other, pair_beside(other, patch.pair)))
     except PatchfemError as error:
         return [f"{_assumed(asked)}; the truth lies towards plane {other.plane}, where the patch has no answer "
                 f"({error})"]

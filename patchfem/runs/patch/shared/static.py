@@ -13,7 +13,7 @@ from ....contact.many.anchored import Anchored
 from ....elasticity.threads import one_thread
 from ....mesh.tensor import TensorGrid
 from .. import measures as one_by_one
-from ..condensed import Pair, condensed, shared_pairs
+from ..condensed import Pair, shared_pairs
 from ..measures import Hidden, combined, least_of
 from ..press import with_linear_skin
 from ..values import peak_pressure
@@ -107,7 +107,7 @@ def _in_other_plane(patches) -> Found | None:
     first = one_by_one.other_plane(patches[0])
     if first is None:
         return None
-    return pressed_on(patches, condensed(first, *first.meshes.levels[1]))
+    return pressed_on(patches, shared_pairs(first)[1])
 
 
 def _rows(values: dict) -> list:
