@@ -133,3 +133,28 @@ def test_exact_levels_tell_where_the_last_one_goes():
     run = pf.run(POINT + PLASTIC + MODE + drive, **{"accuracy.method": "exact"})
     steady = pf.run(RIG, **STEADY, **{"drive.acceleration": "6 g"}).measures["relative_displacement_amplitude"].value
     assert run.measures["relative_displacement_amplitude_steady"].value == pytest.approx(steady, rel=1e-9)
+
+
+def test_exact_a_rise_to_a_motion_that_exists_is_no_growth(monkeypatch):
+    """Beyond the knee with next to no damping the amplitude rises by like steps; damping bounds it all the same."""
+    keys = {"structure.mode.axial.damping": "1e-6", "drive.acceleration": "8 g", "drive.cycles": "100"}
+    run = pf.run(RIG, **keys, **{"accuracy.method": "exact"})
+    told = run.measures["relative_displacement_amplitude_steady"]
+    there = pf.run(RIG, **keys, **STEADY).measures["relative_displacement_amplitude"]
+    assert run.outcome == "transient" and told.value == pytest.approx(there.value, rel=1e-9)
+    # far beyond the knee the force is a square wave at the limit, whose first harmonic is 4/pi of it
+    rig, limit = run.plan.model.rig, run.measures["friction_force_peak"].value
+    push = 8 * 9.80665 - 4 / np.pi * limit / rig.modes.mass
+    assert told.value == pytest.approx(push / (2 * 1e-6 * rig.modes.omega[0]**2), rel=1e-4)
+    monkeypatch.setattr("patchfem.runs.rig.pieces.run.settles", lambda *_: None)
+    assert pf.run(RIG, **keys, **{"accuracy.method": "exact"}).outcome == "grows"
+
+
+def test_exact_a_curve_over_levels_has_them_all():
+    drive = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = 12\n' \
+        'levels = ["3 g", "6 g", "4 g"]\n'
+    run = pf.run(POINT + PLASTIC + MODE + drive, **STEADY)
+    for level, amplitude in zip(run.extra["curve"]["level"], run.extra["curve"]["amplitude"]):
+        point = pf.run(RIG, **STEADY, **{"drive.acceleration": f"{float(level)!r} m/s^2"})
+        assert amplitude == pytest.approx(point.measures["relative_displacement_amplitude"].value, rel=1e-9)
+    assert list(run.extra["curve"]["regime"]) == ["stuck", "slides", "stuck"]

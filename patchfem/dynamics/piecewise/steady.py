@@ -42,6 +42,11 @@ class Steady:
     iterations: int
 
     @property
+    def error(self) -> float:
+        """Relative error that the residual leaves in the motion: over how far the multipliers are from 1."""
+        return self.residual / max(float(np.abs(1 - self.multipliers).min(initial=1.0)), 1e-12)
+
+    @property
     def regime(self) -> str:
         """How the interfaces move: stuck, in partial slip, or all of them slide."""
         return "stuck" if self.slipping == 0 else "slides" if self.slipping > 1 - 1e-12 else "partial slip"

@@ -78,7 +78,7 @@ def settles(modes, drive, groups, done) -> tuple | None:
         return None
     if np.abs(one.multipliers).max(initial=0.0) >= 1:
         return None
-    return one.amplitude, one.amplitude * (1e-9 + one.residual)
+    return one.amplitude, one.amplitude * (1e-9 + one.error)
 
 
 class Interfaces:

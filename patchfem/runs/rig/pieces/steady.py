@@ -38,7 +38,7 @@ class Yields:
                  "residual": one.residual, "map": "yields"}
         raw = replace(raw, outcome=raw.outcome or Outcome.STEADY, steady=(None, None),
                       book=raw.book | {"iterations": float(one.iterations)})
-        return raw, {name: abs(v) * (1e-9 + one.residual) for name, v in raw.values.items() if v is not None}, extra
+        return raw, {name: abs(v) * (1e-9 + one.error) for name, v in raw.values.items() if v is not None}, extra
 
     def curve(self, drive) -> tuple:
         """Curve as arrays by name, the sine of its largest amplitude, and the Point of the motion there."""
