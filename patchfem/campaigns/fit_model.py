@@ -1,5 +1,7 @@
 """The bench along a measured motion as a function of some values of its scene."""
 
+from itertools import product
+
 import numpy as np
 
 from ..core import Outcome, PatchfemError
@@ -13,6 +15,8 @@ from ..runs.bench.engine import smooth_sum_of
 from ..runs.bench.watch import Watch
 from ..scene.scene import Scene, SceneError, loads
 from .fit_path import lead_in, whole_cycles
+
+MOST_MOVED = 3  # keys of [contact] whose ends the shared meshes are chosen by
 
 
 class BenchModel:
@@ -44,6 +48,7 @@ class BenchModel:
         self.pieces = max(1, -(-steps // legs)) if self.pinned and not self.exact else 1
         self.refused, self.made = None, 0
         self.patch, self.moving = None, any(key.startswith("contact.") for key in named)
+        self.meshes = None  # those that all values of the ranges share, made when a patch is first asked for
 
     def __call__(self, values) -> np.ndarray:
         """Reading (k,) at the rows; PatchfemError where the values make no scene."""
@@ -85,10 +90,31 @@ class BenchModel:
         if self.patch is None or self.moving:
             from ..runs.patch.ladder import solve_all
 
+            model = self._shared().given(model) if self.moving else model
             self.patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
             if self.patch.pressure.outcome is Outcome.NO_CONTACT:
                 raise PatchfemError(self.patch.pressure.outcome.sentence, "")
         return self.patch
+
+    def _shared(self):
+        """The meshes of the ends and the middle of every range of a key of [contact], the others in their middle."""
+        if self.meshes is None:
+            from ..runs.many.meshes import Shared
+
+            middle = [(one.low + one.high) / 2 for one in self.wanted]
+            moved = [k for k, one in enumerate(self.wanted) if one.key.startswith("contact.")]
+            ends = product(*((self.wanted[k].low, middle[k], self.wanted[k].high) for k in moved[:MOST_MOVED]))
+            models, refused = [], self.refused
+            for values in ends:
+                at = list(middle)
+                for k, value in zip(moved, values):
+                    at[k] = value
+                try:
+                    models.append(build(self.scene_at(at)))
+                except PatchfemError:  # the descent will be told
+                    continue
+            self.meshes, self.refused = Shared(models, False), refused
+        return self.meshes
 
     def _on_lower(self) -> bool:
         if self.scene.contact is None:

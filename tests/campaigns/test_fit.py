@@ -10,12 +10,15 @@ from command_line import cli
 from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
-from patchfem.campaigns.fit import fit_loop
+from patchfem.campaigns.fit import LOAD_UNITS, fit_loop
+from patchfem.campaigns.fit_model import BenchModel
 from patchfem.core import PatchfemError
 from patchfem.export.fit_folder import fitted_scene
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
+from patchfem.runs.patch import condensed
+from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import SceneError, load, loads
 
 LOAD = 100.0
@@ -186,6 +189,23 @@ def test_exact_a_ratio_column_and_a_patch_fit_alike(tmp_path):
     for scene in (scene_of(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
         found = fit_loop(scene, loop, free_of(*TRUTH["bonds"]))
         assert found.found.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+
+
+def test_exact_a_moved_patch_is_condensed_once_whatever_was_asked_before(tmp_path):
+    """A free tilt moves the contact, not the mesh: pieces are condensed once, and a value has one answer."""
+    time, slide = rows(8, 1)
+    loop = read_loop(table(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
+    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
+            '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n')
+    scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
+    wanted, _ = ranges(["contact.tilt.angle=5 urad..200 urad"])
+    before, found = condensed._shared.cache_info().misses, []
+    for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
+        model = BenchModel(scene, loop, wanted)
+        found.append([model(np.array([value])) for value in values])
+    assert condensed._shared.cache_info().misses == before + 1
+    assert np.array_equal(found[0][1], found[1][1]) and np.array_equal(found[0][2], found[1][0])
+    assert np.abs(found[0][0] - found[0][2]).max() > 1e-3 * np.abs(found[0][0]).max()
 
 
 # ---- noise
