@@ -259,6 +259,7 @@ def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):
     told = json.loads(cli("plan", scene, *OVER, "--json").out)
     one = json.loads(cli("plan", scene, "--json").out)
     assert told["cases"] == 6 and told["values"] == {"normal.load": 3, "drive.acceleration": 2}
-    assert told["seconds"] == pytest.approx(6 * told["seconds_per_case"], rel=0.01)
+    more = json.loads(cli("plan", scene, "--over", "friction.static=0.1..0.6:2000", "--json").out)
+    assert more["seconds"] - told["seconds"] == pytest.approx(1994 * told["seconds_per_case"], rel=0.01)
     assert (told["kind"], told["engine"], told["effects"]) == (one["kind"], one["engine"], one["effects"])
     assert "6 cases of 3 normal.load, 2 drive.acceleration" in cli("plan", scene, *OVER).out

@@ -39,6 +39,11 @@ def _batch(name: str, *kinds: str) -> Batch:
 BATCHES: tuple[Batch, ...] = (_batch("patches", "patch"), _batch("lumped.lumped", "rig"))
 
 
+def taken(model: Model) -> Batch | None:
+    """The batch that takes a model; None where it is run by itself."""
+    return next((one for one in BATCHES if not one.refuses(model)), None)
+
+
 def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,
             say: Callable | None = None) -> Answers:
     """Answers of the models in their order; an error in place of a model is the message of its failed case.
@@ -51,7 +56,7 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
         if isinstance(model, PatchfemError):
             found.fail(case, str(model))
             continue
-        batch = next((one for one in BATCHES if keep is None and not one.refuses(model)), None)
+        batch = taken(model) if keep is None else None
         groups.setdefault((batch, batch.group(model)) if batch else (None, None), []).append(case)
     for (batch, _), cases in groups.items():
         found.place(cases, _solved(batch, cases, [models[case] for case in cases], keep, say))
