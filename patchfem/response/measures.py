@@ -10,7 +10,7 @@ from ..dynamics.second_book import gap, sampled_work, share
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
-JUMP = 4.0  # times the change on the other side of a sample, beyond which it is no smooth peak
+SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
 
 
 def energy_balance(book: dict):
@@ -108,12 +108,19 @@ def acceleration_peak(window: Response) -> float:
     """
     size = np.abs(window.acceleration)
     top = int(np.argmax(size))
-    if not 0 < top < len(size) - 1:
+    if not 0 < top < len(size) - 1 or not _smooth_at(size, top):
         return float(size[top])
     left, mid, right = size[top - 1:top + 2]
     bend = left - 2 * mid + right
     gain = -(right - left)**2 / (8 * bend) if bend < 0 else 0.0
     return float(mid + (gain if gain < 0.01 * mid else 0.0))  # a larger gain is a jump, not a smooth peak
+
+
+def _smooth_at(size, top: int) -> bool:
+    """Whether samples (k,) are smooth at the largest one: there they bend no more than SMOOTH times as much as at the
+    samples on both sides. Beside a jump one of those bends the other way."""
+    bends = -np.diff(size[max(top - 2, 0):top + 3], 2)
+    return bool(bends.min() * SMOOTH >= bends.max())
 
 
 def peaks_between(window: Response) -> dict:
@@ -125,9 +132,8 @@ def peaks_between(window: Response) -> dict:
     size, out = np.abs(window.acceleration), {}
     top = int(np.argmax(size))
     if 0 < top < len(size) - 1:
-        left, right = abs(size[top] - size[top - 1]), abs(size[top] - size[top + 1])
-        if max(left, right) > JUMP * max(min(left, right), 1e-300):
-            out["absolute_acceleration_peak"] = float(min(left, right))
+        if not _smooth_at(size, top):
+            out["absolute_acceleration_peak"] = float(size[top] - max(size[top - 1], size[top + 1]))
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
         for name, at in (("normal_load_least", int(np.argmin(load))), ("normal_load_peak", int(np.argmax(load)))):

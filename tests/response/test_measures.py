@@ -135,8 +135,23 @@ def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
     assert measures.acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
     jump = response(time, acceleration=np.where(time < 0.5, time, -0.2))
     assert measures.acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
+    small = response(time, acceleration=40 + np.where(time < 0.52, time, time - 0.9))  # its parabola rises by .07
+    assert measures.acceleration_peak(small) == 40.5
+    assert measures.peaks_between(small)["absolute_acceleration_peak"] == pytest.approx(0.05)  # a step on the slope
+    assert measures.peaks_between(round_top) == {}
     edge = response(time, acceleration=time)
     assert measures.acceleration_peak(edge) == 1.0
+
+
+def test_always_a_load_between_samples_lies_within_its_bar():
+    """A load that changes as a sine has its ends between two samples."""
+    for shift in (0.1, 0.3, 0.5):
+        time = np.arange(101) / 50
+        load = 40 + 10 * np.sin(2 * pi * time + 2 * pi * shift / 50)
+        window = replace(response(time), extra={"normal_load": load})
+        found = measures.peaks_between(window)
+        assert 50 - load.max() <= 1.01 * found["normal_load_peak"] < 0.1
+        assert load.min() - 30 <= 1.01 * found["normal_load_least"] < 0.1
 
 
 def test_exact_window_amplitudes():

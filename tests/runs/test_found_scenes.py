@@ -30,8 +30,8 @@ KNOWN = [  # scene, measure, truth, half a unit of its last digit
     ("s20261120_21", "equivalent_damping", 0.2000530, 5e-7),
     ("s77_40", "drift_per_cycle", -1.02e-8, 5e-11),
 ]
-REFERRED = ("s20261120_10", "s20261120_11", "s20261120_21", "s20261120_51", "s20261120_7", "s77_14", "s77_21", "s77_24",
-            "s77_3", "s77_40", "s77_41")
+REFERRED = ("s20261120_10", "s20261120_11", "s20261120_21", "s20261120_38", "s20261120_51", "s20261120_7", "s77_14",
+            "s77_21", "s77_24", "s77_3", "s77_40", "s77_41")
 
 
 @pytest.mark.parametrize(("name", "measure", "truth", "digit"), KNOWN)
@@ -92,6 +92,11 @@ def spec_of(path) -> dict:
            "frequency": si(drive.get("frequency", modes[0]["frequency"])), "forced": drive["kind"] == "force",
            "cycles": drive.get("cycles"), "seeded": 2 * np.pi * modes[0]["frequency"]}
     out["size"] = si(drive["force"]) / mass if "force" in drive else si(drive.get("acceleration", 50.0))
+    if f.get("reading") == "report":
+        out["law"] = "report"
+    if "levels" in drive:
+        out["levels"] = [si(level) for level in drive["levels"]]
+        out["size"] = max(out["levels"])
     if drive.get("waveform") == "sweep":
         out |= {"drive": "sweep", "sweep": {key: si(drive[key]) for key in ("from", "to", "rate")}}
     if drive.get("waveform") == "file":

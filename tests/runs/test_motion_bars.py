@@ -74,6 +74,26 @@ def test_exact_the_sliders_of_the_independent_iwan_law():
     assert force[4] == pytest.approx(law.loading(0.9 * law.top), rel=1e-12)
 
 
+@pytest.mark.parametrize("order", [0.0, 1.0, 2.0])
+def test_exact_the_printed_sum_of_the_independent_program(order):
+    """A path of five strokes, the first 80 bond lengths: bond by bond by the middle rule, and 1 - exp(-R/eps) (2.18) of
+    a first loading of order one."""
+    law, q, path, places = LAWS["report"](2.0, bond_length=0.5, order=order), 0.0, 0.0, [np.zeros((1, 2))]
+    for end in (40.0, 39.0, 39.6, 38.0, 38.5):
+        law.mode = 1 if end > q else -1
+        share = (np.arange(50_000) + 0.5) / 50_000 * abs(end - q)
+        places.append(np.column_stack([path + share, q + law.mode * share]))
+        if end == 40.0 and order == 1:
+            assert law.force(np.array([1.3, 1.3]), 0.0, 0.0) == pytest.approx(2 * (1 - np.exp(-2.6)), rel=1e-12)
+        q, path = end, path + abs(end - q)
+        bonds, u = np.concatenate(places[1:]), q - np.concatenate(places[1:])[:, 1]
+        steps = np.concatenate([np.full(50_000, one[1, 0] - one[0, 0]) for one in places[1:]]) / 0.5
+        rho = (path - bonds[:, 0]) / 0.5
+        total = float(np.sum(rho**order * np.exp(-rho) * np.sign(u) * steps)) / max(1.0, order)
+        assert law.force(np.array([q, path]), 0.0, 0.0) == pytest.approx(2 * total, abs=1e-3)
+        law.turned(0, np.array([q, path]), 0.0, -law.mode)
+
+
 def test_exact_a_slip_that_turns_at_its_limit_starts_no_slip():
     """Two slips a cycle start at one phase modulo pi. Stop, release and stop again at one time are no start: they moved
     the phase of seed 5021 by 0.035."""

@@ -28,7 +28,7 @@ from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, load
 
 FINER = 16  # times the steps of the run that stands for the truth
-LONGEST = 240  # seconds of a scene
+LONGEST = 1500  # seconds of a scene, on a machine that others use
 MOST_STEPS = 12000  # of DOP853, some six seconds
 SURE = 5.0  # times the change at the last halving of the steps, what the finer run may be off
 ROUGH, FINE = (0.04, 1e-10), (0.025, 1e-12)  # longest step over the shortest period and relative error of a step
@@ -40,7 +40,7 @@ SHARP = 1e-8  # of the value: a bar that is narrower is as sharp as anybody can 
 
 def referable(s: dict) -> bool:
     """Whether the independent program has the equations of a spec."""
-    if s["law"] in ("order", "report") or "load_amplitude" in s or (s["patch"] or {}).get("shear"):
+    if s["law"] == "order" or "load_amplitude" in s or (s["patch"] or {}).get("shear"):
         return False
     return not ((s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"))
 

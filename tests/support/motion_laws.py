@@ -4,7 +4,10 @@ A law holds the numbers of one contact; its state s (k,) and its mode: +-1 the s
 holds (Coulomb) or stretches (elastic-plastic). Nothing here comes from the package.
 """
 
+from itertools import pairwise
+
 import numpy as np
+from scipy.special import gamma, gammainc
 
 
 class Law:
@@ -12,7 +15,7 @@ class Law:
     rate of the rest; energy(s), None where it has none; guards(s, v, t): values whose fall through zero ends a stretch;
     turned: what an event does."""
 
-    size, set_valued, split_by_mode = 1, False, False
+    size, set_valued, split_by_mode, splits = 1, False, False, True  # the last: slip and the rest can be told apart
 
     def __init__(self, limit: float, **keys):
         self.limit, self.mode, self.keys = limit, 1, keys
@@ -241,6 +244,45 @@ class Iwan(Law):
         return s
 
 
+class Report(Law):
+    """Eq. 2.17 as printed: F = mu N int (R/eps)^p exp(-R/eps) sgn(u) dR/eps, u the displacement since a bond formed.
+
+    Between turns of the path u changes its sign once at most, so that every stroke is a difference of incomplete gamma
+    functions. The state is (slide, path); turns of both are kept as long as they count.
+    """
+
+    size, splits = 2, False
+
+    def __init__(self, limit, **keys):
+        super().__init__(limit, **keys)
+        self.order, self.turns = keys.get("order", 1.0), [(0.0, 0.0)]
+
+    def force(self, s, v, t):
+        q, path, eps, p = s[0], s[1], self.keys["bond_length"], self.order
+        places = np.array([*self.turns, (path, q)])
+        rho, u = (path - places[:, 0]) / eps, q - places[:, 1]
+        sums = gammainc(p + 1, np.maximum(rho, 0.0))
+        passed = rho[:-1] - np.abs(u[:-1]) / eps  # where a stroke was at the present place, if it was
+        inside = u[:-1] * u[1:] < 0
+        middle = np.where(inside, gammainc(p + 1, np.maximum(passed, 0.0)), sums[1:])
+        way = np.where(u[:-1] != 0, np.sign(u[:-1]), np.sign(u[1:]))
+        total = way @ (sums[:-1] - middle) + np.sign(u[1:]) @ (middle - sums[1:])
+        first = (path / eps)**p * np.exp(-path / eps) / gamma(p + 1) * np.sign(q)
+        return self.limit * (total + first)
+
+    def rate(self, s, v, t):
+        return np.array([v, self.mode * v])
+
+    def split(self, s, v, t):
+        return 0.0
+
+    def turned(self, k, s, v, accel):
+        if accel * self.mode <= 0:
+            turns, old = [*self.turns, (float(s[1]), float(s[0]))], s[1] - 60 * self.keys["bond_length"]
+            self.turns, self.mode = [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:], -self.mode
+        return s
+
+
 class Coulomb(Law):
     """|F| <= static while it holds, kinetic against the slide while it slides."""
 
@@ -261,4 +303,5 @@ class Coulomb(Law):
 
 
 LAWS = {"coulomb": Coulomb, "weakening": Coulomb, "convolution": Coulomb, "elastic-plastic": Plastic, "iwan": Iwan,
-        "tanh": Tanh, "bouc-wen": BoucWen, "lugre": LuGre, "stretch": Stretch, "growing": Stretch}
+        "tanh": Tanh, "bouc-wen": BoucWen, "lugre": LuGre, "stretch": Stretch, "growing": Stretch,
+        "report": Report}

@@ -100,8 +100,11 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
         slip, part, face = w.q[:, k] - w.back[:, k], motion.parts[k], p.faces[k]
         ends = [w.top(sign * slip, lambda t, y, law=law, part=part, face=face, sign=sign:
                       sign * (face @ y[:n] - law.reversible(y[part]))) for sign in (1, -1)]
-        out[f"slip_amplitude{tail}"] = sum(ends) / 2
+        if law.splits:
+            out[f"slip_amplitude{tail}"] = sum(ends) / 2
         out[f"loop_area{tail}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
+        if not law.splits:
+            continue
         out[f"stick_fraction{tail}"], starts = _stuck(w, law, k)
         if k == 0 and sine and starts.size:
             out["slip_start_phase"] = float(np.angle(np.mean(np.exp(2j * 2 * np.pi / period * starts))) / 2 % np.pi)

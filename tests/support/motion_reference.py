@@ -223,7 +223,7 @@ class Motion:
         out, n = self.share / max(self.plant.fastest, self.s["frequency"]), self.n
         speed = np.abs(self.plant.faces @ y[n:2 * n]).max()
         gain = np.abs(self.plant.faces @ slope[n:2 * n]).max() + 1e-300
-        if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre"):
+        if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
             way = 30 * self.share * min(law.scale() for law in self.laws)  # |v| h + |a| h^2/2
             out = min(out, 2 * way / (speed + np.sqrt(speed**2 + 2 * gain * way)))
         elif self.s["law"] == "tanh":
