@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from math import prod
 from textwrap import shorten
 from typing import TYPE_CHECKING
@@ -125,9 +125,14 @@ def build(scene: Scene) -> Model:
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
                   (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
-                  _wear(scene), tuple(absent(named)))
+                  _wear(scene), _absent(named))
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks))
     return replace(found, source=source)
+
+
+@lru_cache(64)
+def _absent(named: tuple) -> tuple:
+    return tuple(absent(named))
 
 
 def _wear(scene: Scene) -> WearModel | None:

@@ -24,7 +24,7 @@ class Draft:
     def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
         self.path, self.lines, self.raw = path, lines, raw
         self.sets: set[str] = set()
-        self.tables = Tables.model_construct()
+        self.tables = _made(Tables, {})
         self.mistakes: list[tuple[int, str]] = []
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}  # id of a written table -> itself, and the table without
@@ -41,7 +41,7 @@ class Draft:
     def value(self, key: str) -> Any:
         """Value that was written at a dotted key; None where nothing was."""
         value: Any = self.raw
-        for part in key.split("."):
+        for part in _pieces(key):
             if isinstance(value, dict):
                 value = value.get(part)
             elif isinstance(value, list) and part.isdecimal() and int(part) < len(value):
@@ -167,6 +167,11 @@ def _ends_in_comment(text: str) -> bool:
     except (ValueError, RecursionError):
         return True
     return False
+
+
+@lru_cache(4096)
+def _pieces(key: str) -> tuple[str, ...]:
+    return tuple(key.split("."))
 
 
 @lru_cache(1024)

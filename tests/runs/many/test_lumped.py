@@ -128,3 +128,19 @@ def test_always_parts_make_up_the_cases(monkeypatch):
         threads.in_threads(seen.append, count)
         assert sorted(k for part in seen for k in range(count)[part]) == list(range(count))
         assert len(seen) == max(1, min(4, count // 32))
+
+
+def test_exact_a_case_beyond_the_room_is_run_by_itself(monkeypatch):
+    """A block that stops twice a cycle has twice the phases of one that slides, in the same call."""
+    from patchfem.runs.many.lumped import coulomb
+
+    base = base_of(load(SCENE.format(law=LAWS["coulomb"], kind="base", kind_size=SIZES["base"])))
+    shared = ["drive.frequency=100 Hz", "drive.cycles=80", "structure.mode.axial.damping=0.05"]
+    cases = [build(base.changed([*shared, one])) for one in ("normal.load=5 N", "normal.load=125 N")]
+    monkeypatch.setattr(coulomb, "PHASES", 0)  # 256 in all
+    seen, real = [], one_by_one.solve
+    monkeypatch.setattr(one_by_one, "solve", lambda models, say: seen.extend(models) or real(models, say))
+    many = batch(cases)
+    assert seen == cases[1:]
+    monkeypatch.undo()
+    held_against(cases, one_by_one.solve(cases), many)
