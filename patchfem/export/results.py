@@ -21,8 +21,8 @@ class Folder:
     """Context of a results folder, which is claimed at entry.
 
     `path` is the partial folder to write into. Leaving without an error renames it, leaving with one removes it but for
-    a kept STATE, which `resume` leaves in place at the next entry. PatchfemError for a target that holds other files or
-    is in use, Missing where it cannot be written.
+    a kept STATE, which `resume` leaves in place at the next entry. PatchfemError for a target that holds other files,
+    Missing where it is in use or cannot be written.
     """
 
     def __init__(self, target: Path, resume: bool = False):
@@ -86,4 +86,4 @@ def _only_ours(place: Path, shown) -> None:
     if lock.is_file():
         writer = lock.read_text()
         if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
-            raise PatchfemError(f"{shown}: another run (process {writer}) is writing it; name another -o or wait")
+            raise Missing(f"{shown}: another run (process {writer}) is writing it; name another -o or wait")

@@ -251,6 +251,8 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
 
 def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
     first, last, unit = _ends(key, low, high)
+    if float not in _types(key):
+        raise ValueError(f"{low}..{high}: a whole number is drawn from a list of its values, such as 1,2,3")
     if count:
         raise ValueError(f"{low}..{high}:{count}: values are drawn between the ends; leave :{count} out")
     if first == last:

@@ -519,4 +519,4 @@ def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monk
     partial.mkdir()
     (partial / ".writer").write_text("1", "utf-8")  # a process that lives
     busy = cli("run", scene, "-o", tmp_path / "next")
-    assert busy.code == 2 and "another run" in busy.err
+    assert busy.code == 4 and "another run" in busy.err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 
 from ...scene.axes import Axis, read
@@ -13,6 +14,7 @@ from .cases import Cases, product
 
 LOOKED = 32  # cases that are read before a sweep starts, to find one that is valid
 SHOWN = 12  # mistakes that are printed
+MOST = 3_000_000  # cases of a sweep: their names and columns fill some gigabytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,10 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         first = [f"{axis.key}={axis.texts[0]}" for axis in (*axes, *(one for part in parts for one in part.axes))
                  if isinstance(axis, Axis)]
         raise SceneError([*asked.mistakes(first), *wrong])
+    count = prod([*map(len, parts), *([request.count] if request.count else [len(axis.texts) for axis in axes])])
+    if count > MOST:
+        raise SceneError([f"{asked.path}: {count} cases are more than one sweep holds ({MOST}); sweep parts of the "
+                          "ranges, or draw from them with --sobol N"])
     if request.count and axes:
         from .samples import drawn
 
