@@ -67,6 +67,20 @@ def words_of(*arguments) -> bytes:
     return b"".join(words.of(one)[1] for one in arguments)
 
 
+@pytest.mark.parametrize("values", [
+    np.zeros((3, 4)), np.zeros((3, 4)).T, np.zeros((6, 4))[::2], np.zeros((2, 2, 2))[:, :, 1], np.zeros(0),
+    np.zeros((0, 3)), np.zeros(()), np.arange(5)[1:], np.broadcast_to(1.0, (3,)), np.frombuffer(b"12345678"),
+    np.zeros(9, "u1")[1:].view(float)])
+def test_exact_the_words_of_an_array_are_those_of_its_interface(values):
+    """Read-only, empty, strided, transposed and unaligned ones; once more from what is remembered of their kind."""
+    told, flags = values.__array_interface__, values.flags
+    words = (0, 0, values.size, values.itemsize, told["data"][0], *values.shape, *values.strides)
+    order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+    kind = f"{told['typestr']}{values.ndim}{order}{'r' * told['data'][1]}{'u' * (not flags.aligned)}"
+    for _ in range(2):
+        assert machine.Words().of(values) == (kind, np.array(words, "q").tobytes())
+
+
 @pytest.fixture(scope="module")
 def weighing(tmp_path_factory):
     path, given = tmp_path_factory.mktemp("code") / "weighed.code", some_arguments()

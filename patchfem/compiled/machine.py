@@ -21,6 +21,7 @@ import numpy as np
 
 FINE = (0, -2)  # numba's status of a function that returned something, or nothing
 NUMBERS = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
+_KINDS = {}  # (dtype, dimensions, flags) of an array -> its kind, what packs its words, whether it lends its memory
 PARTS = 12  # tuples of arguments whose words are remembered: a run calls with the same ones again and again
 
 
@@ -56,10 +57,17 @@ class Words:
 
 def _of_array(value) -> tuple:
     flags, count = value.flags, value.ndim
-    order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
-    there = value.__array_interface__["data"][0]
-    words = struct.pack(f"{5 + 2 * count}q", 0, 0, value.size, value.itemsize, there, *value.shape, *value.strides)
-    return f"{value.dtype.str}{count}{order}{'' if flags.writeable else 'r'}{'' if flags.aligned else 'u'}", words
+    held = _KINDS.get((value.dtype, count, flags.num))
+    if held is None:
+        order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
+        kind = f"{value.dtype.str}{count}{order}{'' if flags.writeable else 'r'}{'' if flags.aligned else 'u'}"
+        held = kind, struct.Struct(f"{5 + 2 * count}q").pack, order == "C" and flags.writeable
+        _KINDS[value.dtype, count, flags.num] = held
+    kind, pack, plain = held
+    # numpy describes an array at length for its interface: 3 us, which a short call would feel
+    there = ctypes.addressof(ctypes.c_char.from_buffer(value)) if plain and value.size else \
+        value.__array_interface__["data"][0]
+    return kind, pack(0, 0, value.size, value.itemsize, there, *value.shape, *value.strides)
 
 
 class Code:
