@@ -12,7 +12,8 @@ the far end loses no digits. The lean is -theta.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotrs
+
+from ..elasticity.lapack import dpotrf, dpotrs
 
 ROUND = 1e-14  # rounding of an opening, relative to the terms it is the sum of
 SMALL = 100  # nodes up to which a new factor costs no more than the change of an old one

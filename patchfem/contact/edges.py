@@ -9,7 +9,8 @@ the set, moves smoothly with the load and with the mesh instead of in steps of a
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+
+from ..elasticity.lapack import cho_factor, cho_solve
 
 BEARING = 1e-13  # share of the largest pressure from which a node of a smooth skin counts as in contact
 # cells of an edge by the height of the first row over their length; Hertz contact, 35 meshes, each to .003
@@ -50,7 +51,7 @@ def ends(normal, x, force, gap, softness=None, row: float | None = None) -> list
     if not changes.size:
         return []
     rise = np.zeros(x.size)  # of the forces per approach
-    rise[index] = cho_solve(cho_factor(normal[np.ix_(index, index)], lower=True), np.ones(index.size))
+    rise[index] = cho_solve(cho_factor(normal[np.ix_(index, index)]), np.ones(index.size))
     out = []
     for change in changes:
         node, side = (change, 1) if active[change] else (change + 1, -1)
@@ -112,7 +113,7 @@ def stiffness(compliance, active, motion, found: list) -> float:
     index = np.flatnonzero(active)
     others = [end.node + end.side for end in found]
     spots = [int(np.searchsorted(index, end.node)) for end in found]
-    factor = cho_factor(compliance[np.ix_(index, index)], lower=True)
+    factor = cho_factor(compliance[np.ix_(index, index)])
     known = cho_solve(factor, np.concatenate([motion[index, None], compliance[np.ix_(index, others)],
                                               np.eye(index.size)[:, spots]], axis=1))
     carried, reached, unit = known[:, 0], known[:, 1:1 + len(found)], known[:, 1 + len(found):]

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..core import Compliance, Outcome, PatchfemError, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 from .active_set import Ask, Operator
 from .unilateral import checked, refuse, solve
 

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, Outcome, PatchfemError, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 from .skin_laws import ExponentialSkin, LinearSkin
 from .unilateral import LIMIT, solve_forces
 

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 from .skin import _refuse
 from .skin_laws import ExponentialSkin, LinearSkin
 from .strips_solve import bare_parts, by_strip, closing_alone, holder_motions, loaded, skin_parts, smooth, softer

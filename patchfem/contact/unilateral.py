@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 from .active_set import ROUND, Ask, Found, Operator, factor, flaw, nested_set, rest, settle
 from .gradients import descend, gradients
 

@@ -8,13 +8,11 @@ x, and the other way round. Both are motions of its right half, and the inside o
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dtrsm
-from scipy.linalg.lapack import dpotrf, dpotri
 
 from ..core import NotConverged
 from .grid_fronts import GridFactor, eliminate
+from .lapack import dpotrf, dpotri, dtrsm, one_thread
 from .tensor_stiffness import applied
-from .threads import one_thread
 
 RESIDUAL = 1e-8  # of a solve with random forces, relative to the forces, beyond which solutions are refined
 CORRECTION = 1e-2  # of the displacements by one step of refinement, relative, beyond which the factors are refused

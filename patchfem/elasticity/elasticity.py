@@ -3,14 +3,19 @@
 The unknowns of a node are (along x, into the piece), so both pieces of a pair obey the same matrix.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ..core import NotConverged, frozen_array
 from .condense import Condensed, condense
 from .tensor_stiffness import matrix_of, tensor_stencil
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 @dataclass(frozen=True, eq=False, slots=True)

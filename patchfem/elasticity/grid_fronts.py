@@ -14,10 +14,9 @@ from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.blas import dtrsm
-from scipy.linalg.lapack import dpotrf
 
 from ..core import NotConverged
+from .lapack import dpotrf, dtrsm
 
 LEAF = 24  # cells of a part that is not halved any further
 CHUNK = 256  # leaves assembled at once

@@ -11,12 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.linalg.lapack import dpotrf, dpotri
 
 from ..core import NotConverged, frozen_array
 from .elasticity import Layers, lame
 from .grid_fronts import Shape, eliminate_parts, plan
-from .threads import one_thread
+from .lapack import dpotrf, dpotri, one_thread
 
 DIGITS = 4e-15  # of the largest stiffness times the largest compliance: pieces of 1 to 30 times their length showed a
 # tenth to a half of it

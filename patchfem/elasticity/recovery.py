@@ -8,7 +8,6 @@ computed one estimates the error (Zienkiewicz and Zhu 1987).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ..core import frozen_array
 from .elasticity import Layers, hooke, lame, von_mises
@@ -55,10 +54,44 @@ def cells_of(piece) -> Cells:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Patches:
+    """Which cells stand around every place, with weights: starts (s + 1,) into cells and weights (k,), place by place.
+    """
+
+    starts: np.ndarray
+    cells: np.ndarray
+    weights: np.ndarray
+
+    @property
+    def row(self) -> np.ndarray:
+        """The place (k,) of every cell."""
+        return np.repeat(np.arange(self.starts.size - 1), np.diff(self.starts))
+
+    def __matmul__(self, values) -> np.ndarray:
+        """Weighted sums (s, k) over the cells of every place of values (t, k) at the cells."""
+        return np.add.reduceat(self.weights[:, None] * values[self.cells], self.starts[:-1])
+
+    def of(self, places):
+        """The patches of some places (p,)."""
+        counts = np.diff(self.starts)[places]
+        starts = np.append(0, np.cumsum(counts))
+        taken = np.arange(starts[-1]) + np.repeat(self.starts[:-1][places] - starts[:-1], counts)
+        return Patches(starts, self.cells[taken], self.weights[taken])
+
+
+def patches(place, cell, weight=None) -> Patches:
+    """Patches of pairs of a place (k,) and a cell (k,), which may come more than once; every place has a cell."""
+    pairs, first = np.unique(np.asarray(place, np.int64) << 32 | cell, return_index=True)
+    row = pairs >> 32
+    starts = np.append(0, np.cumsum(np.bincount(row)))
+    return Patches(starts, pairs & 0xFFFFFFFF, np.ones(row.size) if weight is None else weight[first])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Recovery:
     """A linear map from cell middles to places; a node has one place in each material that it touches.
 
-    node, coating: (s,) node number and material of each place; fit: (s, t) sparse, rows sum to one; place: (corners,)
+    node, coating: (s,) node number and material of each place; fit: weights that sum to one; place: (corners,)
     of every corner of every cell, in the order of Cells.corners.
     """
 
@@ -66,7 +99,7 @@ class Recovery:
     node: np.ndarray
     coating: np.ndarray
     place: np.ndarray
-    fit: csr_matrix
+    fit: Patches
 
     def __call__(self, values) -> np.ndarray:
         """Values (..., s, k) at the places from values (..., t, k) at the cell middles; linear fields are recovered
@@ -85,28 +118,26 @@ def recovery(cells: Cells) -> Recovery:
     """
     owner, corners = cells.owner(), cells.corners()
     key, place = np.unique(2 * corners + cells.is_coating[owner], return_inverse=True)
-    shape = (key.size, cells.is_coating.size)
-    near = csr_matrix((np.ones(owner.size), (place, owner)), shape=shape)
+    near = patches(place, owner)
     node, middle = key // 2, cells.middles()
     fit, thin = _planes(near, cells.points[node], middle)
     if thin.any():
-        wide = (near[thin] @ near.T @ near).tocsr()
-        wide.sum_duplicates()
         pick = np.flatnonzero(thin)
-        more, _ = _planes(wide, cells.points[node[pick]], middle)
-        keep = csr_matrix((np.where(thin, 0.0, 1.0), (np.arange(key.size),) * 2), shape=(key.size,) * 2)
-        put = csr_matrix((np.ones(pick.size), (pick, np.arange(pick.size))), shape=(key.size, pick.size))
-        fit = (keep @ fit + put @ more).tocsr()
+        own = near.of(pick)
+        touched = patches(near.cells, near.row).of(own.cells)  # the places that touch the cells of a thin patch
+        beyond = near.of(touched.cells)
+        more, _ = _planes(patches(own.row[touched.row][beyond.row], beyond.cells), cells.points[node[pick]], middle)
+        keep = ~thin[fit.row]
+        fit = patches(*(np.concatenate(both) for both in ((fit.row[keep], pick[more.row]), (
+            fit.cells[keep], more.cells), (fit.weights[keep], more.weights))))
     return Recovery(cells, node, key % 2 == 1, place, fit)
 
 
 def _planes(near, at, middle) -> tuple:
     """Weights of the cells of every patch by least squares, and whether the patch is too thin for a plane: equal shares
     then."""
-    near = near.tocsr()
-    starts, counts = near.indptr[:-1], np.diff(near.indptr)
-    row = np.repeat(np.arange(counts.size), counts)
-    offset = middle[near.indices] - at[row]
+    starts, counts, row = near.starts[:-1], np.diff(near.starts), near.row
+    offset = middle[near.cells] - at[row]
     size = np.maximum.reduceat(np.abs(offset), starts)
     offset /= np.where(size > 0, size, 1.0)[row]
     terms = np.column_stack([np.ones(row.size), offset])
@@ -120,7 +151,7 @@ def _planes(near, at, middle) -> tuple:
     # cells in one line fix no slope across it: the pseudo-inverse leaves that one out
     slope = np.einsum("sij,sj->si", np.linalg.pinv(spread, rcond=1e-8, hermitian=True), -mean)
     share = 1 / counts[row] + np.einsum("ni,ni->n", apart, slope[row])
-    return csr_matrix((share, near.indices, near.indptr), shape=near.shape), thin
+    return Patches(near.starts, near.cells, share), thin
 
 
 @dataclass(frozen=True, eq=False, slots=True)

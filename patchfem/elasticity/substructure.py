@@ -17,8 +17,8 @@ from .condense import CORRECTION, RESIDUAL
 from .dissect import dissection
 from .elasticity import Layers, hooke, lame, remedy
 from .factor import factorise
+from .lapack import one_thread
 from .mapped import stiffness
-from .threads import one_thread
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -8,8 +8,14 @@ A stencil (nx, rows, 3, 3, 2, 2) [N/m per m] holds at [c, r, 1 + dc, 1 + dr] the
 dc, r + dr), unknowns (along x, inward); it is zero where there is no such node. rows: those that are free.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.sparse import bsr_matrix, csr_matrix
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
@@ -73,6 +79,8 @@ def stencil_of(matrix: csr_matrix, columns: int) -> np.ndarray:
 
 def matrix_of(stencil) -> csr_matrix:
     """The stencil as a sparse matrix, unknowns column by column, row by row, two per node (along x, inward)."""
+    from scipy.sparse import bsr_matrix  # a piece that is condensed by its grid needs none
+
     columns, rows = stencil.shape[:2]
     c, r, dc, dr = np.ogrid[:columns, :rows, -1:2, -1:2]
     there = (c + dc >= 0) & (c + dc < columns) & (r + dr >= 0) & (r + dr < rows)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..contact.unilateral import residuals, undetermined
 from ..core import Compliance, NotConverged, PatchfemError, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 from .sets import Kept, bounded_shear, press_forces
 from .unlike import coupled_forces
 

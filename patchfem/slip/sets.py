@@ -7,11 +7,10 @@ comes first, then the shear, a convex program. A set that is visited twice hands
 """
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotrf, dpotri
 
 from ..contact.unilateral import INDEFINITE, solve_forces
 from ..core import NotConverged, PatchfemError
+from ..elasticity.lapack import cho_factor, cho_solve, dpotrf, dpotri
 
 ROUND = 1e-14  # of the largest value: what counts as nothing
 MOST = 100  # sets tried before the slower method
@@ -160,23 +159,23 @@ def _stroke(block, inverse, zero, one, reference, limit, sign, total, slide):
     force = np.empty(limit.size)
     force[slips] = fixed
     if 2 * slips.sum() <= limit.size:
-        half = cho_factor(inverse[np.ix_(slips, slips)], lower=True, check_finite=False) if slips.any() else None
+        half = cho_factor(inverse[np.ix_(slips, slips)]) if slips.any() else None
         across = inverse[np.ix_(stuck, slips)]
 
         def freed(whole):  # forces of the stuck nodes once the slipping ones carry nothing more
-            return whole[stuck] - across @ cho_solve(half, whole[slips], check_finite=False) if slips.any() else whole
+            return whole[stuck] - across @ cho_solve(half, whole[slips]) if slips.any() else whole
 
         def carried(right):
             return freed(inverse @ np.where(slips, 0.0, right))
 
         rate = freed(one)
-        push = across @ cho_solve(half, fixed, check_finite=False) if slips.any() else 0.0
+        push = across @ cho_solve(half, fixed) if slips.any() else 0.0
         rest = push - freed(zero)
     else:
-        half = cho_factor(block[np.ix_(stuck, stuck)], lower=True, check_finite=False) if stuck.any() else None
+        half = cho_factor(block[np.ix_(stuck, stuck)]) if stuck.any() else None
 
         def carried(right):
-            return cho_solve(half, right[stuck], check_finite=False) if stuck.any() else np.zeros(0)
+            return cho_solve(half, right[stuck]) if stuck.any() else np.zeros(0)
 
         rate = carried(np.ones(limit.size))
         rest = -carried(reference + block[:, slips] @ fixed)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg.blas import dger
 
 from ..core import PatchfemError, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 
 SHEAR_MODES = 8  # modes a shear reduction starts from
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import NotConverged, PatchfemError, frozen_array
-from ..elasticity.threads import one_thread
+from ..elasticity.lapack import one_thread
 from .partial_slip import Operators, operators_of
 
 __all__ = ["OperatingTangent", "operating_tangent", "operators_of"]

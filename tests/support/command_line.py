@@ -54,5 +54,5 @@ def loaded(code: str, *words) -> set:
 def absent(modules: set, *stages) -> None:
     """None of the packages of ALWAYS and none of these stages (and packages) are among the modules."""
     for name in {*ALWAYS, *stages}:
-        here = name if name in ("skfem", *ALWAYS) else f"patchfem.{name}"
+        here = name if name in ("scipy", "skfem", *ALWAYS) else f"patchfem.{name}"
         assert not {m for m in modules if m == here or m.startswith(here + ".")}, name

@@ -11,12 +11,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from ...core import Compliance, Interface, NotConverged, Outcome, Pressure, frozen_array
 from ...elasticity import high_order
 from ...elasticity.grid_fronts import predicted_seconds
-from ...elasticity.threads import one_thread
+from ...elasticity.lapack import cho_factor, cho_solve, one_thread
 from ...mesh.grading import Layout, columns, rows
 from ...model.pieces import layers_of
 from .grading import loaded
@@ -275,7 +274,7 @@ def _stiffnesses(asked, pieces: Compliance, closing, edges: tuple, found: tuple)
     held = np.flatnonzero(((x[:, None] >= ends[:, 0] - tiny) & (x[:, None] <= ends[:, 1] + tiny)).any(axis=1))
     here, one = np.ix_(held, held), np.ones(held.size)
     arms = np.stack([one, x[held]], axis=1)
-    normal = cho_solve(cho_factor(pieces.normal[here], lower=True), arms)
+    normal = cho_solve(cho_factor(pieces.normal[here]), arms)
     soft = pieces.tangential[here]
     if not asked.alike:
         cross = closing[here]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...contact import edges
 from ...core import Outcome
-from ...elasticity.threads import one_thread
+from ...elasticity.lapack import one_thread
 from .press import Patch
 
 

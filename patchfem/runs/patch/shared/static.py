@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....contact.many.anchored import Anchored
-from ....elasticity.threads import one_thread
+from ....elasticity.lapack import one_thread
 from ....mesh.tensor import TensorGrid
 from .. import measures as one_by_one
 from ..condensed import Pair, shared_pairs
