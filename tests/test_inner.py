@@ -1,9 +1,13 @@
 """Functions that compiled code calls: compiled with their callers, the same answers, callable from Python still."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
+from patchfem.compiled import inner
 from patchfem.compiled.inner import Inner, njit
 
 ALIKE = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp"}}
@@ -20,40 +24,61 @@ def nearest(values, here):
 
 def made(decorate):
     """A function and one that calls it, both by this decorator."""
-    inner = decorate(nearest)
+    called = decorate(nearest)
 
     def total(values, places):
         out = 0.0
         for here in places:
-            who, far = inner(values, here)
+            who, far = called(values, here)
             out += who + far / (1 + abs(here))
         return out
 
-    return inner, decorate(total)
+    return called, decorate(total)
 
 
 def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
     values, places = np.random.default_rng(3).normal(size=(2, 50))
-    inner, total = made(njit(**ALIKE))
+    called, total = made(njit(**ALIKE))
     truth = made(lambda function: function)[1](values, places)
     assert total(values, places) == pytest.approx(truth, rel=1e-14)
-    asked = inner.overloads[next(iter(inner.overloads))]
+    asked = called.overloads[next(iter(called.overloads))]
     assert asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0  # no machine code of its own
-    assert not inner._alone.overloads and len(total._alone.overloads) == 1
-    assert inner(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
-    assert len(inner._alone.overloads) == 1
-    inner.enable_caching()
+    assert not called._alone.overloads and len(total._alone.overloads) == 1
+    assert called(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
+    assert len(called._alone.overloads) == 1
+    called.enable_caching()
     assert total(values.astype("f4"), places) == pytest.approx(truth, rel=1e-5)  # nothing of an inner one to keep
 
 
 def test_always_this_numba_has_what_inner_functions_need():
     """Else all of them are compiled for themselves and inside all others: the same answers at three times the wait."""
-    inner, total = made(njit())
-    assert isinstance(inner, Inner) and isinstance(total, Inner)
+    called, total = made(njit())
+    assert isinstance(called, Inner) and isinstance(total, Inner)
 
 
 def test_exact_without_its_hooks_it_is_numba_s(monkeypatch):
     monkeypatch.setattr("patchfem.compiled.inner.HOOKS", ("something_else",))
-    inner, total = made(njit(**ALIKE))
-    assert type(inner) is type(total) is CPUDispatcher
+    called, total = made(njit(**ALIKE))
+    assert type(called) is type(total) is CPUDispatcher
     assert total(np.arange(3.0), np.array([0.5, 1.75])) == 0 + 0.5 / 1.5 + 2 + 0.25 / 2.75
+
+
+def test_always_kernels_are_compiled_by_it():
+    """numba's own `njit` would compile a function for itself, inside each that calls it, and again per constant."""
+    kernels = list(Path(inner.__file__).parents[1].rglob("*kernels.py"))
+    assert len(kernels) > 50
+    own = re.compile(r"(?m)^(from numba import .*\bn?jit\b|@numba\b)")
+    assert not [str(path) for path in kernels if own.search(path.read_text("utf-8"))]
+
+
+def test_exact_constants_in_calls_make_no_more_functions():
+    @njit()
+    def power(x, count, whole):
+        return x ** count if whole else 0.5 * x ** count
+
+    @njit()
+    def several(x):
+        return power(x, 2, True) + power(x, 3, False) + power(x, int(x), x > 0)
+
+    assert several(3.0) == 9 + 13.5 + 27
+    assert len(power.overloads) == 1

@@ -9,6 +9,7 @@ is optimised once. A call of it from Python compiles it for itself.
 from types import SimpleNamespace
 
 import numba
+from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.options import DefaultOptions
@@ -35,6 +36,12 @@ class Inner(CPUDispatcher):
     def __init__(self, function, names, options, compiler):
         super().__init__(function, names, options | NO_C | NO_PYTHON, compiler)
         self._alone = CPUDispatcher(function, names, options | NO_C)
+
+    def get_call_template(self, args, kws):
+        """As numba's, of the types alone: else a call with another constant would be another function to compile."""
+        if not self.targetoptions.get("forceinline"):
+            args = tuple(map(types.unliteral, args))
+        return super().get_call_template(args, kws)
 
     def __call__(self, *arguments):
         return self._alone(*arguments)

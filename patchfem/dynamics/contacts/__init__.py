@@ -2,6 +2,6 @@
 
 In: the numbers and memory of a law. Out: the slide and the path-mean force of a step, the memory after it. A contact is
 one law on one slide (`element_kernels`, of any law), set-valued Coulomb friction, points behind shear modes, or a list
-of bonds; `arrays` has their tuples. `shear_solve_kernels` is the solver of points behind shear modes, of this march and
-of that under a load that changes. Read `element_kernels` first.
+of bonds; `arrays` has their tuples. `spring_kernels` is the law of springs that are not linear. `shear_solve_kernels`
+solves points behind shear modes, for this march and that under a load that changes. Read `element_kernels` first.
 """

@@ -46,7 +46,8 @@ def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
 
 
 def _spring(port: int, numbers, potential) -> Joint:
-    return Joint(port, Element(f"{HERE}.spring_kernels", np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
+    law = "dynamics.contacts.spring_kernels"
+    return Joint(port, Element(law, np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
 
 
 @cache

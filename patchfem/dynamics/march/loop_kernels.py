@@ -25,6 +25,8 @@ from ..modal_kernels import (
     tell,
 )
 
+SET_VALUED = contact.SET_VALUED  # a name of this module, which numba leaves branches out by
+
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def march(first, steps, motion, plant, table, c, goal, travel, ledger, rows):
@@ -54,7 +56,7 @@ def march(first, steps, motion, plant, table, c, goal, travel, ledger, rows):
             break
         at = (first + i) % around
         free = free_slide(motion, plant.reach, 0, table, at)
-        if contact.SET_VALUED:
+        if SET_VALUED:
             rate = free_rate(motion, slide, plant.free, plant.dense, table, at)
             top = held_force(motion, plant, table, at, free / beta, accel) if abs(v) * dt <= 1e-6 * abs(free) else inf
             dq, speed = contact.passed(free, rate, beta, gamma, share, v, dt, c, top)
@@ -69,7 +71,7 @@ def march(first, steps, motion, plant, table, c, goal, travel, ledger, rows):
             after += slide[k] * motion[1, k]
         lost, ok = contact.commit(dq, used, q, v, after, dt, c)
         work = used * dq
-        if contact.SET_VALUED:
+        if SET_VALUED:
             if speed != after:
                 blow = struck(motion, slide, speed, after, plant.mass)
                 work += blow

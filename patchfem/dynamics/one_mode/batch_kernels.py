@@ -2,8 +2,8 @@
 arithmetic of `sdof_kernels` and `window_kernels`."""
 
 import numpy as np
-from numba import njit
 
+from ...compiled.inner import njit
 from . import window_kernels as plain
 from .event_kernels import COMPILED, compiled_copy, enter, march
 

@@ -44,7 +44,7 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
 
 # of all tests but one, so that they share one compiled loop
 ALL = (*(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
-       "dynamics.march.spring_kernels")
+       "dynamics.contacts.spring_kernels")
 
 
 def coulomb(port, static, kinetic):
