@@ -232,3 +232,57 @@ def test_always_the_picture_names_its_curves(tmp_path):
                  *picture.SKINS.values()):
         assert word in text
     assert np.all(np.diff(picture.portions(None, "bare", 10.0 ** np.arange(-5.5, -2), 0)) < 0)
+
+
+# ---- in motion
+
+@pytest.fixture(scope="module")
+def moving():
+    return study("misalignment/in_motion.py")
+
+
+@pytest.fixture(scope="module")
+def maps(moving):
+    """Aligned, at the tilt that may be left alone, and at one that may not; stuck and slipping."""
+    return moving.swept((1e-6, 3e-5, 1e-4), (26.0,), (3.0, 5.0))
+
+
+@pytest.fixture(scope="module")
+def moved(maps):
+    return maps.squeeze("contact_load")
+
+
+def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moved):
+    stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
+    assert slipping["contact_fraction"].values == pytest.approx([1.0, 0.49, 0.219], rel=0.03)
+    for found, names in ((stuck, ("equivalent_stiffness",)), (slipping, (
+            "equivalent_stiffness", "equivalent_damping", "loop_area", "relative_displacement_amplitude"))):
+        for name in names:
+            assert abs(found[name].values[1] / found[name].values[0] - 1) < 0.05, name
+    assert 0.08 < 1 - stuck["equivalent_stiffness"].values[2] / stuck["equivalent_stiffness"].values[0] < 0.1
+
+
+def test_always_the_table_of_the_rig_in_motion(moving, moved):
+    stuck, slipping = moved.isel(drive_acceleration=0), moved.isel(drive_acceleration=1)
+    at = [0, 2]
+    assert 1e-6 * stuck["equivalent_stiffness"].values[at] == pytest.approx([31.9, 29.2], abs=0.15)
+    assert moving.resonance(stuck["equivalent_stiffness"].values[at]) == pytest.approx([967, 926], abs=2)
+    assert stuck["stick_fraction"].values[at] == pytest.approx([1, 1])
+    assert 1e3 * slipping["loop_area"].values[at] == pytest.approx([1.699, 1.617], rel=2e-3)
+    assert slipping["equivalent_damping"].values[at] == pytest.approx([2.132, 2.188], rel=2e-3)
+    assert 1e6 * slipping["relative_displacement_amplitude"].values[at] == pytest.approx([12.91, 12.38], rel=2e-3)
+
+
+def test_always_a_stuck_interface_is_a_little_softer_than_pieces_and_bonds_in_series(moved):
+    """What the patch shears by and what the bonds stretch by add up, and the first of its nodes have yielded."""
+    stuck = moved.isel(drive_acceleration=0)
+    bonds = 0.30 * LOAD / 1e-6
+    both = 1 / (1 / bonds + 1 / stuck["tangential_stiffness"].values)
+    assert stuck["equivalent_stiffness"].values[0] == pytest.approx(both[0], rel=0.06)
+    assert (stuck["equivalent_stiffness"].values < both).all()
+
+
+def test_always_the_maps_name_what_they_show(moving, maps, tmp_path):
+    text = moving.picture(maps, tmp_path / "x.svg").read_text()
+    for word in ("misalignment [mrad]", "26 lbf, 5 g", "rubbed share", "loop energy, to that at 1e-06 rad"):
+        assert word in text
