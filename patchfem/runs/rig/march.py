@@ -9,6 +9,7 @@ from ...dynamics.march import march as hub
 from ...dynamics.second_book import gap
 from ...effects import has
 from ...response import run_events
+from ...response.ends import end_error
 from ...response.measures import peaks_between, step_harmonic, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
@@ -19,6 +20,8 @@ from .interface import model_of
 from .numerics import quadrature_of
 from .solution import Solution, sampled_loop, seen
 from .strips import joined, mark_as_one, other_measures
+
+LATE = 1.5  # times what an end beside the asked one changes to first order
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -69,8 +72,11 @@ class Read:
                         extremes=done.amplitudes)
 
     def between(self, window) -> dict:
-        """What the peaks of a run may lie above its samples, by name."""
-        return peaks_between(window)
+        """What the peaks of a run may lie above its samples, and what its end at a sample leaves open, by name."""
+        found, steps = peaks_between(window), self.numerics.cycles * self.numerics.steps
+        late = end_error(window, self.model.rig.drive.period, steps - round(steps))
+        late = {name: LATE * error for name, error in late.items()}
+        return late | {name: error + late.get(name, 0.0) for name, error in found.items()}
 
     def summed(self):
         """How the bonds are summed, a Choice; None of a law that is no sum."""
