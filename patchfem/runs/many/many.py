@@ -56,11 +56,19 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
         if isinstance(model, PatchfemError):
             found.fail(case, str(model))
             continue
-        batch = taken(model) if keep is None else None
-        groups.setdefault((batch, batch.group(model)) if batch else (None, None), []).append(case)
+        groups.setdefault(_place(model) if keep is None else (None, None), []).append(case)
     for (batch, _), cases in groups.items():
         found.place(cases, _solved(batch, cases, [models[case] for case in cases], keep, say))
     return found
+
+
+def _place(model: Model) -> tuple:
+    """(batch, group) of a model; (None, None) where it is run by itself."""
+    try:
+        batch = taken(model)
+        return (batch, batch.group(model)) if batch is not None else (None, None)
+    except Exception:  # what is odd about the model is told by its own run
+        return None, None
 
 
 def _solved(batch: Batch | None, cases: list, models: list, keep: Callable | None, say: Callable | None) -> Answers:

@@ -56,6 +56,12 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
     assert "breaks: ZeroDivisionError" in said[0]
 
 
+def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(monkeypatch):
+    batch = many.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
+    monkeypatch.setattr(many, "BATCHES", (batch,))
+    same(many.answers([pf.build(BENCH)]), 0, pf.run(BENCH))
+
+
 def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
     seen = []
 
