@@ -66,15 +66,16 @@ def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
     assert one.ledger == pytest.approx(two.ledger, abs=1e-13 * np.abs(np.diff(two.ledger[0])).sum())
 
 
-@pytest.mark.parametrize("reading, order, growth", SUMS)
-def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading, order, growth):
-    """Over all slides; 1e-5 besides for the two points per strip, which fall with the step."""
-    for slide in SLIDES:
-        one, two = both(model_of(sum_of(reading, order, growth), slide), 100)
-        error = one.engine.choice.error + (2e-5 if growth else 1e-5)
-        assert one.engine.name.endswith("bond list")
-        assert np.abs(one.force - two.force).max() <= error * 30
-        assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
+@pytest.mark.parametrize("reading, order, growth, slide", [
+    pytest.param(*law, slide, marks=() if (k + n) % len(SLIDES) == 0 else pytest.mark.slow)
+    for k, law in enumerate(SUMS) for n, slide in enumerate(SLIDES)])
+def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading, order, growth, slide):
+    """1e-5 besides for the two points per strip, which fall with the step; a third of all laws and slides always."""
+    one, two = both(model_of(sum_of(reading, order, growth), slide), 100)
+    error = one.engine.choice.error + (2e-5 if growth else 1e-5)
+    assert one.engine.name.endswith("bond list")
+    assert np.abs(one.force - two.force).max() <= error * 30
+    assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
 
 
 def test_exact_samples_at_the_place_of_the_first_bonds_cost_no_work():

@@ -82,10 +82,12 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law):
     model, element = PAIRS[law]
     alone = march(one(), DRIVE, model, 6, 100, window=6)
     turns = march(one(), DRIVE, JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL), 6, 100, window=6)
-    beside = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
-    as_patch = march(one(), DRIVE, beside, 6, 100, window=6)
+    others = [turns]
+    if law in ("coulomb", "bonds"):  # patches of other laws differ by the law alone, and each is a loop to compile
+        beside = JointsModel(model, (interlock(0, 1e-9, 1.0),), np.ones((1, 1)), 49.0, ALL if law == "coulomb" else ())
+        others.append(march(one(), DRIVE, beside, 6, 100, window=6))
     scale = np.abs(alone.response.slide).max()
-    for other in (turns, as_patch):
+    for other in others:
         assert other.outcome is None
         assert other.response.slide == pytest.approx(alone.response.slide, abs=1e-8 * scale)
         same = np.abs(other.window.force - alone.window.force) <= 1e-5 * 39.0

@@ -464,7 +464,7 @@ GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e
 def test_exact_bond_lengths_of_a_nanometre_and_a_metre_are_one_law(reading, order, length):
     """Lengths scale with eps_0 and l_k, speeds too: the tractions are those of eps_0 = 1."""
     rng = np.random.default_rng(5)
-    path = np.concatenate([[0], np.cumsum(rng.normal(0, 1.5, 40))])
+    path = np.concatenate([[0], np.cumsum(rng.normal(0, 1.5, 24))])
     laws = [Quadrature, Recursion] if (reading, order) == ("stretch", 1.0) else [Quadrature]
     for growth in ({}, GROWTH):
         scaled = {key: value * (1.0 if key == "ratio" else length) for key, value in growth.items()}

@@ -13,24 +13,33 @@ from patchfem.surface.compare.verdict import changed, confidence, verdicts
 from patchfem.surface.profile import Profile
 from patchfem.surface.synthetic import report_area
 
+MANY = pytest.param(40, marks=pytest.mark.slow)
 
-def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most():
-    sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in range(70000, 70040)]
+
+@pytest.mark.parametrize("count", [20, MANY])
+def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most(count):
+    seeds = range(70000, 70000 + count)
+    sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in seeds]
     found = [ratio("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
     words = [changed(one) for one in found]
-    assert words.count("reduced") <= 4 and words.count("increased") <= 4  # of 80; 5 % and less
+    assert words.count("reduced") <= count // 10 and words.count("increased") <= count // 10  # of 2 count; 5 %
     values = np.quantile([one.value for one in found], (0.05, 0.95))
+    if count < 40:  # too few for the ends of the distribution
+        assert (0.64 * 0.85 < values[0] < 1 < values[1] < 1.57 * 1.15) and np.prod(values) == pytest.approx(1, abs=1e-3)
+        return
     assert values == pytest.approx((0.64, 1.57), rel=0.15)  # measured on the report's surface, 1 mm
 
 
-def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_cases_at_most():
+@pytest.mark.parametrize("count", [12, MANY])
+def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_cases_at_most(count):
     words, widths = [], []
-    for seed in range(30100, 30140):
+    for seed in range(30100, 30100 + count):
         p = pair(seed, share=0.0)
         one = compared(p.before, p.after)
         words.append(changed(one.amplitude_ratio))
         widths.append(one.amplitude_ratio.high / one.amplitude_ratio.low)
-    assert words.count("reduced") <= 4 and np.median(widths) < 1.01  # 5 or more of 40 at 2.5 %: one in 300
+    most = 4 if count == 40 else 2  # 5 or more of 40 at 2.5 %: one in 300; 3 or more of 12: one in 300
+    assert words.count("reduced") <= most and np.median(widths) < 1.01
 
 
 def test_exact_intervals_of_fisher_and_of_pitman():

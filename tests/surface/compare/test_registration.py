@@ -81,15 +81,16 @@ def test_always_levelling_both_traces_takes_the_wear_away():
     assert found == pytest.approx(p.worn.mean(), abs=0.005 * UM)
 
 
-def test_always_traces_of_two_places_have_no_depth_but_a_guess():
+@pytest.mark.parametrize("count", [8, pytest.param(24, marks=pytest.mark.slow)])
+def test_always_traces_of_two_places_have_no_depth_but_a_guess(count):
     held, guesses = [], []
-    for seed in range(24):
+    for seed in range(count):
         found = compared(pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after)
         assert found.reference == "" and found.worn.mean.value is found.shift.value is None
         assert "no common place" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
         held.append(found.abbott.low <= 0 <= found.abbott.high)
         guesses.append(found.abbott.value)
-    assert sum(held) >= 20
+    assert sum(held) >= count * 5 // 6
     assert 0.5 * UM < np.sqrt(np.mean(np.square(guesses))) < 2 * UM  # about 1 um, as for other programs' traces
 
 
@@ -169,10 +170,11 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
             Profile(x, frozen_array(sides[1] - cut + noise[1] - 0.002 * x), "after"), depth * 4 / 3 * 0.3e-3)
 
 
+@pytest.mark.parametrize("count", [4, pytest.param(10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("depth, rough, rms", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)])
-def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms):
+def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, count):
     held, errors = [], []
-    for seed in range(10):
+    for seed in range(count):
         before, after, area = groove(60000 + seed, depth, rough)
         found = compared(before, after)
         assert found.reference == "flanks" and found.shift.value is None
@@ -180,7 +182,7 @@ def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms):
         errors.append(found.worn.area.value / area - 1)
         assert found.worn.largest.low <= depth <= found.worn.largest.high
         assert found.worn.mean.value == pytest.approx(found.worn.area.value / found.flanks.width)
-    assert sum(held) >= 8 and np.sqrt(np.mean(np.square(errors))) < rms
+    assert sum(held) >= 0.8 * count and np.sqrt(np.mean(np.square(errors))) < rms
 
 
 def test_exact_a_groove_in_a_straight_line():
