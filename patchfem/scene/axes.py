@@ -18,6 +18,7 @@ from .reader import _message, _set_value, owner_of
 LIMITS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 MOST = 10_000_000  # values of one range
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
+_UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
 _TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
 _ENDS = {"]": "[", "}": "{"}
 
@@ -91,14 +92,21 @@ def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
             if ends is None:
                 out.append(piece)
             elif sampled and len(pieces) == 1:
-                return _span(key, *ends.groups())
+                return _span(key, *_with_unit(*ends.groups()))
             else:
-                out += _steps(key, *ends.groups())
+                out += _steps(key, *_with_unit(*ends.groups()))
         except ValueError as error:
             wrong.append(str(error))
     if wrong:
         raise ValueError("\n".join(wrong))
     return values_of(key, out)
+
+
+def _with_unit(low: str, high: str, *rest) -> tuple:
+    """The parts of a range; a bare number before the dots has the unit of the number behind them, as in 1..9 mm."""
+    unit = _UNIT.fullmatch(high)
+    bare = unit is not None and unit[1] and _UNIT.fullmatch(low) is not None and not _UNIT.fullmatch(low)[1]
+    return (f"{low} {unit[1]}" if bare else low, high, *rest)
 
 
 def values_of(key: str, texts: Iterable[str], distinct: bool = True) -> Axis:

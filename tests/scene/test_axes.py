@@ -21,6 +21,7 @@ def axis(text, **how):
 
 @pytest.mark.parametrize("text, values, unit", [
     ("contact.tilt.angle=1e-6 rad..1e-2 rad:9", np.logspace(-6, -2, 9), "rad"),
+    ("contact.tilt.angle=1e-6..1e-2 rad:9", np.logspace(-6, -2, 9), "rad"),  # the unit of the end is that of both
     ("contact.tilt.angle=1 mrad..2 mrad:5", np.linspace(1e-3, 2e-3, 5), "rad"),
     ("contact.tilt.angle=1 mrad..10 mrad:3", np.geomspace(1e-3, 1e-2, 3), "rad"),  # b/a = 10 is logarithmic
     ("contact.tilt.angle=1 mrad..9.99 mrad:3", np.linspace(1e-3, 9.99e-3, 3), "rad"),
@@ -62,7 +63,8 @@ def test_exact_a_text_gives_the_value_beside_it():
 @pytest.mark.parametrize("text, says", [
     ("contact.load=5 lb", "did you mean 'lbf'"),
     ("contact.load=5", "a bare number without a unit"),
-    ("contact.tilt.angle=1e-6..1e-2 rad:9", "'1e-6' is a bare number"),
+    ("contact.tilt.angle=1e-6..1e-2:9", "'1e-6' is a bare number"),
+    ("contact.tilt.angle=1e-6 rad..1e-2:9", "'1e-2' is a bare number"),
     ("contact.tilt.angle=1 mm..2 rad:9", "'mm' is a unit of length"),
     ("contact.lod=3 N", "did you mean 'load'"),
     ("friction.law=coulom", "did you mean 'coulomb'"),
