@@ -92,3 +92,9 @@ def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
     assert found[0].patch.meshes.name == meshed(good)[0].patch.meshes.name
     with pytest.raises(PatchfemError, match="tips over"):
         run(found[2])
+
+
+def test_always_patches_that_wear_share_a_mesh_as_fine_as_their_own():
+    cases = [replace(one, patch=replace(one.patch, sweeps="wear", still=False)) for one in family(1e-5, 1e-4)]
+    for own, shared in zip(cases, meshed(cases), strict=True):
+        assert shared.patch.meshes.levels[0][0].x.size >= 0.75 * solve_all(own.patch, 1e-2)[0].x.size

@@ -51,7 +51,8 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grading.SWING]
     layout = _layout([*cases, *swept], not (every and all_))
-    for share in START if layout is not None else ():
+    # a contact that moves on the way has measures that its first state tells nothing of
+    for share in () if layout is None else START[-1:] if asked.sweeps else START:
         levels, good = _climbed(cases, grading.grids_of(asked, layout.times(share)), tolerance, share > 1)
         if good or share == START[-1]:
             return named(levels)
