@@ -30,7 +30,7 @@ BETWEEN = {"slip_start_phase": 1.0, "stick_fraction": 0.3}  # over the steps per
 SHARE, LEAST = 0.4, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.15, 0.1  # of runs that a tolerance tells apart
 OF_CELLS = 0.3  # of runs whose cells are half as many
-OF_FLOOR = 0.1  # of the floor of a measure: a march without an order claims no more digits
+OF_FLOOR = 0.1  # of the floor of a measure, and its square where steps meet a tolerance: nobody uses the digits below
 ROUND = 1e-12  # of a value, the last digits of a long sum
 GAPS = ("energy_balance", "work_check")
 LAST = 1e-13  # of the amplitude, the last digits of a mean over it
@@ -88,18 +88,19 @@ def _size(values: dict, name: str) -> float:
     return value
 
 
-def tolerance_error(fine: dict, coarse: dict) -> dict:
+def tolerance_error(fine: dict, coarse: dict, moved: float = np.inf) -> dict:
     """Error by name of a run whose steps meet a tolerance, from one whose steps may err 30 times as much.
 
     A thirtieth of the change on the mean. One change can be small by chance, and one run can err by three times as
     much as its tolerance says; so a fraction of the typical relative change of the main measures counts besides. The
     factors held for 98.4 % of the values of 40 random scenes of four laws that were not used to choose them, all of a
-    scene in 82 %, at a median of four to twelve times the error of most measures.
+    scene in 82 %, at a median of four to twelve times the error of most measures. moved [m]: size of `floor_of`.
     """
     gaps = change(fine, coarse)
     typical = typical_change(fine, gaps)
     size = abs(fine.get("relative_displacement_amplitude", 0.0))
-    return {name: max(OF_CHANGE * gap, OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])))
+    least = {name: OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])) for name in gaps}
+    return {name: max(OF_CHANGE * gap, least[name], OF_FLOOR**2 * float(floor_of(name, moved)))
             for name, gap in gaps.items()}
 
 

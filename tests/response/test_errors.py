@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from patchfem.model.model import build
-from patchfem.response.errors import BETWEEN, MAIN, SURE, cells_error, change, jumps_error, step_error, with_errors
+from patchfem.response.errors import (
+    BETWEEN,
+    MAIN,
+    SURE,
+    cells_error,
+    change,
+    jumps_error,
+    step_error,
+    tolerance_error,
+    with_errors,
+)
 from patchfem.response.rows import floor_of
 from patchfem.runs.plan import plan
 from patchfem.runs.rig import march as rig_march
@@ -177,3 +187,9 @@ def test_always_runs_with_half_the_cells_hold_an_error_of_second_order():
     coarse = {name: 1.0 + 3e-6 for name in MAIN} | {"loop_area": 1.0}
     found = cells_error(values, coarse)
     assert found[NAME] == pytest.approx(3e-6) and found["loop_area"] >= 0.5e-6
+
+
+def test_always_steps_that_meet_a_tolerance_claim_no_digit_far_below_the_floor():
+    """Two runs that agree by chance to 1e-18 m: a hundredth of the floor of 1e-10 m stays."""
+    assert tolerance_error({NAME: 1e-9}, {NAME: 1e-9 + 1e-18})[NAME] == pytest.approx(1e-12)
+    assert tolerance_error({NAME: 1e-3}, {NAME: 1e-3 + 1e-9})[NAME] == pytest.approx(0.15e-9)

@@ -230,7 +230,7 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
     The error of a run follows that of its steps, `response.errors.tolerance_error`.
     """
     wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
-    return [Rung((wider,), tolerance_error)]
+    return [Rung((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
 
 
 EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
