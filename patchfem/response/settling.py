@@ -157,7 +157,7 @@ def mean_amplitudes(extremes, window: int) -> tuple:
 
 def slip_period(time, rate) -> float:
     """Longest time [s] from the start of one slip to that of the next, of the last three of a run; 0 where there are
-    fewer than two slips.
+    fewer than two slips, or where the last one is further back than half as much again: it came to hold.
 
     time (k,) [s]; rate (k,) [m/s] of the slide; it slips where that is above MOVES of the largest. A motion that never
     holds has two slips a cycle, from one turn to the next.
@@ -165,7 +165,8 @@ def slip_period(time, rate) -> float:
     speed = np.abs(np.asarray(rate, float))
     slips = speed > MOVES * speed.max(initial=0.0)
     starts = np.asarray(time, float)[1:][slips[1:] & ~slips[:-1]]
-    return float(np.diff(starts[-4:]).max(initial=0.0))
+    longest = float(np.diff(starts[-4:]).max(initial=0.0))
+    return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 
 
 def _rises(a) -> np.ndarray:

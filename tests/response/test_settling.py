@@ -222,3 +222,4 @@ def test_exact_slips_that_are_too_few_have_no_period():
     assert settling.slip_period(time, np.where(np.abs(time - 4) < 1, 1.0, 0.0)) == 0.0
     assert settling.slip_period(time, 0 * time) == 0.0
     assert settling.slip_period(time, np.where(time % 4 < 1, 0.0, 1.0)) == pytest.approx(4.0, abs=1e-12)
+    assert settling.slip_period(time, np.where((time % 2 < 1) | (time > 4), 0.0, 1.0)) == 0.0  # it came to hold
