@@ -14,10 +14,9 @@ would cost their load, 1.4 % for the six of that patch.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dger
 
 from ..core import PatchfemError, frozen_array
-from ..elasticity.lapack import one_thread
+from ..elasticity.lapack import dger, one_thread
 
 SHEAR_MODES = 8  # modes a shear reduction starts from
 

@@ -5,7 +5,6 @@ from math import inf, pi
 from ...effects import has
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
-from ...slip.shear_modes import SHEAR_MODES
 from ...structure.drive_sizes import largest, omega_of
 from ..effort import exact_effort
 from .engines import no_pieces, steady_by
@@ -41,6 +40,8 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
             entries, seconds = list_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
         elif soft:
+            from ...slip.shear_modes import SHEAR_MODES
+
             unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
             each = 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
         elif numerics.per_point:

@@ -14,7 +14,6 @@ from ...response.outcome import changing_note, settle
 from ...response.reasons import without_value
 from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
-from ...slip.fields import element_fields, point_fields
 from ...structure.drive_sizes import sinusoidal, slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
@@ -219,6 +218,8 @@ def rig_fields(model, numerics, patch, raw) -> dict:
             tau = limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
+    from ...slip.fields import element_fields, point_fields
+
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
