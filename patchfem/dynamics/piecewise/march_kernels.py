@@ -106,7 +106,7 @@ def widen(out, clock, books):
     books.extremes[cycle, 1] = max(books.extremes[cycle, 1], out)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", cache=True, forceinline=True, fastmath=FAST, **LEAN)
 def stored(motion, plant, table, memory):
     """Energy of the modes and of the elements [J]."""
     out = 0.0

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from patchfem.compiled.inner import Inner
 from patchfem.core import PatchfemError
+from patchfem.dynamics.piecewise import march_kernels
 from patchfem.dynamics.piecewise import memory_kernels as kernels
 from patchfem.dynamics.piecewise.elements import elements_of, stretches, table_of, virgin
 from patchfem.slip.shear_modes import jenkins_set
@@ -90,3 +92,9 @@ def test_refuses_elements_that_are_none():
         elements_of([1.0, -1.0], [1.0, 1.0])
     with pytest.raises(PatchfemError, match="finite"):
         elements_of([1.0], [np.inf])
+
+
+@pytest.mark.parametrize("name", ["march", "stored"])
+def test_exact_what_python_calls_is_kept_without_numba(name):
+    """A function for compiled callers alone cannot be kept: every run would bring up numba's compiler for it."""
+    assert not isinstance(getattr(march_kernels, name), Inner)
