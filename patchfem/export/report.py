@@ -340,7 +340,7 @@ def _measures(data: dict) -> Section:
         if m.get("reason"):
             cells += f"<td class=soft colspan=3>{escape(m['reason'])}</td>"
         else:
-            cells += (f"<td class=n>{error}</td><td>{escape(m['unit'])}</td>"
+            cells += (f"<td class=n>{error}</td><td class=v>{escape(m['unit'])}</td>"
                       f"<td>{escape(others(name, m))}</td>")
         rows.append(f"<tr>{cells}<td class=soft>{escape(means.get(name, ''))}</td></tr>")
     note = (f"<p class=soft>The run holds {cycles(data):.2g} of a cycle: measures per cycle are not those of a whole "

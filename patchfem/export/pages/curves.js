@@ -34,7 +34,7 @@
     rule(fig, mark) {
       fig.add_layout(new Bokeh.Span({location: mark.x, dimension: "height", line_color: shade(mark.colour),
         line_dash: "dotdash"}));
-      if (mark.name) fig.line([], [], {line_color: shade(mark.colour), line_dash: "dotdash", ...label(mark)});
+      if (mark.name) fig.line([mark.x, mark.x], [NaN, NaN], {line_color: shade(mark.colour), line_dash: "dotdash", ...label(mark)});
     },
     arrow(fig, mark) {
       const [a, b] = mark.x, [c, d] = mark.y, at = (s, p, q) => p + s * (q - p);
