@@ -40,18 +40,22 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
             entries, seconds = list_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)
         elif soft:
-            from ...slip.shear_modes import SHEAR_MODES
-
-            unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
-            each = 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
+            each = _of_modes(numerics, points, unknowns)
         elif numerics.per_point:
             each = 6e-8 * points
     elif soft and rig.load_varies:
-        unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
-        each = 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
+        each = _of_modes(numerics, points, unknowns)
     elif soft:
         each = 3e-9 * points + 5e-7
     return numerics.engine, int(steps * 1.75), steps * 1.75 * each
+
+
+def _of_modes(numerics, points: int, unknowns: dict) -> float:
+    """Seconds of a step behind shear modes, whose number goes into `unknowns`."""
+    from ...slip.shear_modes import SHEAR_MODES
+
+    unknowns["shear_modes"] = numerics.shear_modes or SHEAR_MODES
+    return 4e-8 * points * (1 + unknowns["shear_modes"] / 4)
 
 
 def groups(model: Model) -> dict:
