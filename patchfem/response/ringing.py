@@ -7,6 +7,7 @@ sinusoids are fitted together and the one with the most energy is kept.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dgesdd
 
 LEAST_PERIODS = 1.5  # of the ring in a stick; below them frequency and decay cannot be told apart
 LEAST_SAMPLES = 16
@@ -15,6 +16,9 @@ PER_PERIOD = 24  # samples of a ring that are enough
 FAINT = 1e-6  # of the largest value of the signal, below which nothing rings
 MISSED = 0.1  # share of the ring that a fit may leave over
 WIDEST = 0.5  # largest damping ratio of what is called a ring
+WHOLE = 1e-9  # of what the forced sine leaves: a fit that leaves less has found the ring, no other start is tried
+ROUNDING = float(np.finfo(float).eps)
+SHORT = 0.9  # of LEAST_PERIODS; a WHOLE fit below it is refused, and its last digits are not sought
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,17 +118,21 @@ def _forced(time, omega: float) -> np.ndarray:
 
 
 def _columns(time, forced, poles) -> np.ndarray:
-    parts = [forced]
-    for own, rate in poles.reshape(-1, 2):
-        fall = np.exp(np.clip(-rate * time, -50, 50))
-        parts.append(np.stack([fall * np.cos(own * time), fall * np.sin(own * time)], axis=1))
-    return np.concatenate(parts, axis=1)
+    n = forced.shape[1]
+    out = np.empty((time.size, n + len(poles)), order="F")  # columns stand together, as LAPACK wants them
+    out[:, :n] = forced
+    for k, (own, rate) in enumerate(poles.reshape(-1, 2)):
+        fall, turn = np.exp(np.minimum(np.maximum(-rate * time, -50), 50)), own * time
+        out[:, n + 2 * k], out[:, n + 2 * k + 1] = fall * np.cos(turn), fall * np.sin(turn)
+    return out
 
 
 def _apart(columns, value) -> tuple:
     """Rest of a projection: (what columns (k, c) leave of value (k,), orthonormal basis of those that count, their
     numbers)."""
-    u, sizes, turned = np.linalg.svd(columns, full_matrices=False)
+    u, sizes, turned, failed = dgesdd(columns, full_matrices=0)  # half the time of numpy.linalg.svd on so few rows
+    if failed:
+        raise np.linalg.LinAlgError("SVD did not converge")
     u = u[:, sizes > 1e-12 * sizes[0]]
     inside = u.T @ value
     return value - u @ inside, u, turned[:inside.size].T @ (inside / sizes[:inside.size])
@@ -147,15 +155,18 @@ def _grown(time, value, forced, rest) -> tuple | None:
     best = None
     for _ in range(MOST_TERMS):
         poles = best[0] if best is not None else np.empty(0)
-        tries = [_refined(time, value, forced, np.append(poles, start))
-                 for start in _starts(time, value, forced, poles, rest)]
+        tries = []
+        for start in _starts(time, value, forced, poles, rest):
+            tries.append(_refined(time, value, forced, np.append(poles, start), WHOLE * scale))
+            if tries[-1][2] < WHOLE * scale:
+                break
         new = min(tries, key=lambda one: one[2])
         if not np.isfinite(new[2]) or new[2] > last / 2:  # less gain is noise
             break
         best, last = new, new[2]
-        rest = _share(time, value, forced, best[0])[0]
         if last < 1e-6 * scale or time.size < 8 * (len(best[0]) + 2):
             break
+        rest = _share(time, value, forced, best[0])[0]
     return best[:2] if best is not None else None
 
 
@@ -171,21 +182,28 @@ def _starts(time, value, forced, poles, rest) -> list:
     """Starting values around the highest line of what is left: the best of them by projection, with two decays."""
     span, top = time[-1], _highest(time, rest)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
-    sizes = [np.sum(_share(time, value, forced, np.append(poles, (own, 0.5 / span)))[0]**2) for own in near]
+    sizes = [np.sum(_apart(_columns(time, forced, np.append(poles, (own, 0.5 / span))), value)[0]**2) for own in near]
     own = near[int(np.argmin(sizes))] if near else top
     return [np.array([own, decay / span]) for decay in (0.1, 2.0)]
 
 
-def _refined(time, value, forced, poles) -> tuple:
+def _refined(time, value, forced, poles, whole: float = 0.0) -> tuple:
     """Refined poles, their standard errors and the rms of what is left.
 
-    Levenberg and Marquardt's method on the projected residual, with the Jacobian of Kaufman (1975).
+    Levenberg and Marquardt's method on the projected residual, with the Jacobian of Kaufman (1975). It ends where the
+    residual is rounding of the signal, where a step gains less than the rounding of the sum of squares it lowers, or
+    where less than `whole` (rms) is left by sinusoids too slow to be a ring.
     """
     scale, damping = np.abs(poles) + 1 / time[-1], 1e-3
+    least, short = (4 * ROUNDING)**2 * (value @ value), SHORT * 2 * np.pi * LEAST_PERIODS / time[-1]
     left, slopes = _slopes(time, value, forced, poles, scale)
     for _ in range(60):
         normal, pull, size = slopes.T @ slopes, slopes.T @ left, left @ left
+        if size <= least or (size < time.size * whole**2 and poles[::2].max() < short):
+            break
         step = -np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-300), pull, rcond=None)[0]
+        if -pull @ step <= ROUNDING * size:  # whether such a step is taken or not is chance
+            break
         tried = poles + scale * step
         new = _slopes(time, value, forced, tried, scale)
         if new[0] @ new[0] <= size:
@@ -204,9 +222,8 @@ def _slopes(time, value, forced, poles, scale) -> tuple:
     """Projected residual (k,) and its derivative by poles/scale (k, 2 r)."""
     columns, n = _columns(time, forced, poles), forced.shape[1]
     left, basis, numbers = _apart(columns, value)
-    out = []
-    for k in range(len(poles) // 2):
-        part, (a, b) = columns[:, n + 2 * k:n + 2 * k + 2], numbers[n + 2 * k:n + 2 * k + 2]
-        out += [time * (b * part[:, 0] - a * part[:, 1]), -time * (a * part[:, 0] + b * part[:, 1])]
-    slopes = np.stack(out, axis=1) * scale
+    cosines, sines, a, b = columns[:, n::2], columns[:, n + 1::2], numbers[n::2], numbers[n + 1::2]
+    slopes = np.empty((time.size, len(poles)))
+    slopes[:, ::2], slopes[:, 1::2] = b * cosines - a * sines, -(a * cosines + b * sines)
+    slopes *= time[:, None] * scale
     return left, basis @ (basis.T @ slopes) - slopes
