@@ -11,6 +11,7 @@ import numpy as np
 from .measures import ROUND
 
 CLOSE = 1e-9  # of a period: nearer samples are the two sides of an event
+RESTS = 1e-9  # of the largest rate: slower is at rest
 MOVES = 1e-3  # of the largest step of the slide: a rest has ended, whatever round-off moved in it
 
 
@@ -34,7 +35,8 @@ def turns_of(time, slide, rate, force, period: float, jumps: bool = False) -> li
     """(smallest, largest) Turn of the slide of every whole cycle of a window, oldest first.
 
     time, slide, rate, force: (k,) samples [s, m, m/s, N]; period [s]. jumps: the force jumps where the slide turns;
-    then it is the mean of the values before and after the rest there.
+    then it is the mean of the values before and after the rest there. The force is None where the slide is largest at a
+    border of the cycle and turns farther than a sample from it: the force there is not that of a turn.
     """
     out, near = [], CLOSE * period
     for begin, end in cycle_spans(time, period):
@@ -43,7 +45,9 @@ def turns_of(time, slide, rate, force, period: float, jumps: bool = False) -> li
         for way in (-1, 1):
             at, value, share = _turn(time[part], way * slide[part], way * rate[part], near)
             at += part.start
-            pull = _beside(slide, force, at, way * value) if jumps else \
+            if not jumps and share == 0.0 and at in (part.start, part.stop - 1):
+                at, share = _crossed(way * rate, at, at == part.start)
+            pull = _beside(slide, force, at, way * value) if jumps else None if at is None else \
                 float(force[at] + share * (force[min(at + 1, len(force) - 1)] - force[at]))
             pair.append(Turn(way * value, pull))
         out.append(tuple(pair))
@@ -65,6 +69,17 @@ def _turn(time, y, v, near: float) -> tuple:
         if 0 <= s <= 1 and value > best[1]:
             best = (k, float(value), float(s))
     return best
+
+
+def _crossed(v, at: int, first: bool) -> tuple:
+    """(number of a sample, share of the way to the next one) at which the rate v (k,) falls through 0, in the last step
+    before the sample `at` (first) or in the first one after it; (None, 0) where it does not."""
+    k = at - 1 if first else at
+    if abs(v[at]) <= RESTS * np.abs(v).max(initial=0.0):
+        return at, 0.0
+    if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
+        return k, float(v[k] / (v[k] - v[k + 1]))
+    return None, 0.0
 
 
 def _beside(slide, force, at: int, value: float) -> float | None:

@@ -210,3 +210,24 @@ def test_exact_range_and_drift_of_an_exact_run(more, drive):
     wide = np.mean([np.ptp(one) / 2 for one in slides])
     truth = done.measures["loop_area"].value / (2 * pi * 0.884 * OMEGA**2 * wide**2)
     assert damping.value == pytest.approx(truth, rel=damping.error / truth + 2e-8)  # (pi/20000)^2/2 at the top
+
+
+@pytest.mark.parametrize("border, secant", [(0.05, None), (0.03, None), (0.002, 0.0), (0.0, 0.0)])
+def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, secant):
+    """A steep law of the rate: F = 0 at every turn, although F is not where a decaying slide is largest at a border.
+
+    Where the largest slide is far from a turn there is no secant.
+
+    border: time from the last turn before the first cycle to its begin, over the period.
+    """
+    decay = 0.02 * OMEGA
+    turn = np.arctan2(-decay, OMEGA) / OMEGA  # exp(-decay t) cos(OMEGA t) is largest there
+    time = turn + (border + np.linspace(-0.5, 4.0, 1801)) * PERIOD
+    time = np.sort(np.append(time[time >= turn + border * PERIOD], turn + np.arange(0.5, border + 4, 0.5) * PERIOD))
+    wave = np.exp(-decay * time)
+    slide = 1e-5 * wave * np.cos(OMEGA * time)
+    rate = -1e-5 * wave * (decay * np.cos(OMEGA * time) + OMEGA * np.sin(OMEGA * time))
+    turns = loops.turns_of(time, slide, rate, np.tanh(rate / 1e-4), PERIOD)
+    assert turns[0][1].slide == pytest.approx(slide[0], rel=1e-12)  # the range is that of the cycle all the same
+    found = loops.secant_stiffness(turns)
+    assert found is None if secant is None else found == pytest.approx(secant, abs=1e-6)
