@@ -42,4 +42,4 @@ def _of_cycles(name: str, values, window, drive) -> str:
         return f"{HOLDS}, so its loop has no width"
     if name == "equivalent_damping":
         return "the first mode is rigid, so 2 pi K A^2 is 0"
-    return "the interface rests at the ends of the last cycles, so the force beside the rest is not known"
+    return "none of the last cycles shows the force on both sides of its largest slides"
