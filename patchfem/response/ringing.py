@@ -7,7 +7,6 @@ sinusoids are fitted together and the one with the most energy is kept.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.lapack import dgesdd
 
 LEAST_PERIODS = 1.5  # of the ring in a stick; below them frequency and decay cannot be told apart
 LEAST_SAMPLES = 16
@@ -130,6 +129,8 @@ def _columns(time, forced, poles) -> np.ndarray:
 def _apart(columns, value) -> tuple:
     """Rest of a projection: (what columns (k, c) leave of value (k,), orthonormal basis of those that count, their
     numbers)."""
+    from ..elasticity.lapack import dgesdd  # runs without a ring load no LAPACK
+
     u, sizes, turned, failed = dgesdd(columns, full_matrices=0)  # half the time of numpy.linalg.svd on so few rows
     if failed:
         raise np.linalg.LinAlgError("SVD did not converge")
