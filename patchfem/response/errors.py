@@ -30,7 +30,8 @@ BETWEEN = {"slip_start_phase": 1.0, "stick_fraction": 0.3}  # over the steps per
 SHARE, LEAST = 0.4, 0.2  # of the typical relative change, that of an irregular and of a regular measure at least
 OF_CHANGE, OF_TYPICAL = 0.15, 0.1  # of runs that a tolerance tells apart
 OF_CELLS = 0.3  # of runs whose cells are half as many
-OF_FLOOR = 0.1  # of the floor of a measure, and its square where steps meet a tolerance: nobody uses the digits below
+OF_FLOOR = 0.1  # of the floor of a measure, and its square where steps meet a tolerance: nobody uses the digits below.
+# Not of GAPS, which are errors themselves and are read by their size
 ROUND = 1e-12  # of a value, the last digits of a long sum
 GAPS = ("energy_balance", "work_check")
 LAST = 1e-13  # of the amplitude, the last digits of a mean over it
@@ -71,7 +72,7 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = 
             kind, grows = of_first(name), GROWS if abs(earlier) < abs(gap) else 1.0
             least = 0.0 if kind in APART else SHARE * typical * value
             out[name] = grows * LOOSE * LOOSER.get(kind, 1.0) * max(sizes[name], least)
-        if sizes[name] > ROUND * value:
+        if sizes[name] > ROUND * value and name not in GAPS:
             out[name] = max(out[name], OF_FLOOR * float(floor_of(name, size)))
         out[name] += row_of(name).grain / steps
     return out
@@ -100,7 +101,7 @@ def tolerance_error(fine: dict, coarse: dict, moved: float = np.inf) -> dict:
     typical = typical_change(fine, gaps)
     size = abs(fine.get("relative_displacement_amplitude", 0.0))
     least = {name: OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])) for name in gaps}
-    return {name: max(OF_CHANGE * gap, least[name], OF_FLOOR**2 * float(floor_of(name, moved)))
+    return {name: max(OF_CHANGE * gap, least[name], 0.0 if name in GAPS else OF_FLOOR**2 * float(floor_of(name, moved)))
             for name, gap in gaps.items()}
 
 

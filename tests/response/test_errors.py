@@ -193,3 +193,10 @@ def test_always_steps_that_meet_a_tolerance_claim_no_digit_far_below_the_floor()
     """Two runs that agree by chance to 1e-18 m: a hundredth of the floor of 1e-10 m stays."""
     assert tolerance_error({NAME: 1e-9}, {NAME: 1e-9 + 1e-18})[NAME] == pytest.approx(1e-12)
     assert tolerance_error({NAME: 1e-3}, {NAME: 1e-3 + 1e-9})[NAME] == pytest.approx(0.15e-9)
+
+
+@pytest.mark.parametrize("name", ["energy_balance", "work_check"])
+def test_exact_bars_of_what_is_an_error_itself_have_no_share_of_its_floor(name):
+    """A balance of 2e-13 is told as such, not as 2e-13 +- 1e-9."""
+    runs = [{"relative_displacement_amplitude": 1.0 + gap, name: 1e-13 * (2 + gap)} for gap in (0.0, 1e-6, 5e-6)]
+    assert step_error(*runs, 400)[name] < 1e-12 and tolerance_error(*runs[:2])[name] < 1e-12
