@@ -1,6 +1,6 @@
 // Draws the cases of a sweep from the page's data: lines with error bands, a map of two keys, or a cloud of points.
 //
-// data.keys:     [{name, label, unit, log, values: [...] per case, texts: [...] per case, grid: bool}]
+// data.keys:     [{name, label, unit, log, values: [...] per case, texts: [...] per case, words}]
 // data.measures: [{name, label, unit, means, values: [...], errors: [...]}]   already in the unit shown
 // data.outcome:  [...] per case; data.settled: outcomes that count as an answer; data.links: [...] per case or null
 "use strict";
@@ -69,6 +69,12 @@
     return out;
   }
 
+  function worded(axis, one) {                   // ticks with the words of a key whose values are words
+    if (!one.words) return;
+    axis.ticker = new Bokeh.FixedTicker({ticks: one.words.map(([v]) => v)});
+    axis.major_label_overrides = new Map(one.words);
+  }
+
   function source(cases, m, more) {
     const column = {case: cases, value: cases.map((i) => m.values[i]),
       said: cases.map((i) => `${within(m.values[i], m.errors[i])} ${m.unit}`),
@@ -114,6 +120,7 @@
 
   function lines(cases, x, beside, m) {
     const fig = figure(x, named(m)), groups = new Map();
+    worded(fig.xaxis, x);
     cases.forEach((i) => {
       const v = beside ? beside.values[i] : 0;
       if (!groups.has(v)) groups.set(v, []);
@@ -142,6 +149,8 @@
 
   function map(cases, x, y, m) {
     const fig = figure(x, named(y), {y_axis_type: y.log ? "log" : "linear"});
+    worded(fig.xaxis, x);
+    worded(fig.yaxis, y);
     const [xs, ys] = [x, y].map((one) => [...new Set(cases.map((i) => one.values[i]))].sort((a, b) => a - b));
     const [ex, ey] = [edges(xs, x.log), edges(ys, y.log)];
     const place = (of, all, one) => cases.map((i) => all[of.indexOf(one.values[i])]);
@@ -162,6 +171,7 @@
 
   function cloud(cases, x, beside, m) {
     const fig = figure(x, named(m));
+    worded(fig.xaxis, x);
     const made = source(cases, m, {x: cases.map((i) => x.values[i]), y: cases.map((i) => m.values[i] ?? NaN),
       colour: cases.map((i) => bad(i) ? ink("--warm") : ink("--accent")),
       shade: cases.map((i) => beside ? beside.values[i] : 0),

@@ -62,15 +62,18 @@ def label(name: str) -> str:
 
 
 def _key(one: dict, drawn) -> dict:
-    """A swept key in the unit in which it was written, where all its values are."""
-    written = [NUMBER.match(str(one["texts"][i])) for i in drawn]
+    """A swept key in the unit in which it was written, where all its values are; `words`: (number, text) of its values
+    where they are words."""
+    texts = [str(one["texts"][i]) for i in drawn]
+    written = [NUMBER.match(text) for text in texts]
     units = {(match[2] or "").strip() if match else None for match in written}
     if len(units) == 1 and None not in units:
         unit, values = units.pop(), [float(match[1]) for match in written]
     else:
         unit, values = one["unit"], np.asarray(one["values"], float)[drawn]
+    words = None if any(written) else list(dict(zip(values, map(brief, texts))).items())
     return {"name": one["name"], "label": one["name"], "unit": "" if unit == "1" else unit, "values": values,
-            "texts": [brief(str(one["texts"][i])) for i in drawn], "log": bool(one["log"])}
+            "texts": [brief(text) for text in texts], "log": bool(one["log"]), "words": words}
 
 
 def _measure(name: str, one: dict, drawn) -> dict:

@@ -25,6 +25,14 @@ def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table)
     assert data["along"] == "contact.tilt.angle" and data["first"] == "relative_displacement_amplitude"
 
 
+def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
+    assert [one["words"] for one in data_of(page(table))["keys"]] == [None, None]
+    table["keys"][0] |= {"name": "friction.law", "values": np.arange(12) % 3.0, "unit": "1", "log": False,
+                         "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)]}
+    law, load = data_of(page(table))["keys"]
+    assert law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]] and load["words"] is None
+
+
 def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
     text = page(table)
     assert len(text.encode()) < 3e6
