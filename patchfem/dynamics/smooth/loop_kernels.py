@@ -269,7 +269,6 @@ def advance(m, k, until, edge, tolerance, travel):
             if other == NOTHING:
                 break
             what = other
-        steps.extended(m, taken)
         watching.watch(m, taken, k)
         accept(m, taken, k)
         if whole and taken == room:

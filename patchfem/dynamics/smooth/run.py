@@ -111,6 +111,11 @@ class Run:
             twin._enter(int(np.searchsorted(twin.wave.ends, twin.time, side="right")))
         return twin
 
+    def ends_only(self, window: int) -> None:
+        """Ask for the phasors of the last cycle and of every `window`-th before it alone, at the start of a run."""
+        left_out = np.arange(self.kept.cycles.shape[1])[::-1] % window > 0
+        self.kept.cycles[2:, left_out] = np.nan
+
     def extremes(self, count: int) -> np.ndarray:
         """Smallest and largest output (c, 2) [m] of the first `count` cycles."""
         return self.kept.cycles[:2, :count].T.copy()
@@ -238,6 +243,7 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     where).
     """
     run, period = Run(modes, drive, element, cycles, tolerance, travel, start), drive.period
+    run.ends_only(window)
     end, kept, shots = cycles * period, [], []
     if progress is not None and run.time < end - max(window, 2) * period:
         for part in np.linspace(run.time, end - max(window, 2) * period, 20)[1:-1]:

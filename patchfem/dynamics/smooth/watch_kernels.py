@@ -1,4 +1,7 @@
-"""What is read off a step by its extension: samples, extremes and harmonics of the cycles, peaks of the last ones."""
+"""What is read off a step: samples, extremes and harmonics of the cycles, peaks of the last ones.
+
+The extension takes three more slopes, so only a step inside which something is read has one (`inside`).
+"""
 
 from math import cos, pi, sin
 
@@ -53,6 +56,13 @@ def output_of(m, y):
 
 
 @njit(error_model="numpy", **INNER)
+def may_turn(m):
+    """Whether the output may turn inside a step: always with several modes; with one it turns where the slide does,
+    which ends a step (`loop_kernels.dips`), and else by round-off alone."""
+    return m.rows.shape[1] > 1 or output_of(m, m.y)[1] * output_of(m, m.work[steps.TRIAL])[1] < 0
+
+
+@njit(error_model="numpy", **INNER)
 def turning(m, k, a, b, rate):
     """Output [m] where its rate, `rate` at the share a of the step, passes zero before the share b."""
     out = 0.0
@@ -70,11 +80,10 @@ def turning(m, k, a, b, rate):
 
 
 @njit(error_model="numpy", **INNER)
-def bounds(m, h, k):
-    """Take the step of h [s] into the extremes of its cycles."""
+def bounds(m, h, k, parts):
+    """Take the step of h [s] into the extremes of its cycles; parts: of it, at whose ends turns are looked for."""
     t, period = m.now[steps.TIME], k.tally[PERIOD]
     cycle = min(max(int((t + 0.5 * h) / period), 0), k.cycles.shape[1] - 1)
-    parts = 1 if m.rows.shape[1] == 1 else 4
     x, w = output_of(m, m.y)
     low, high = x, x
     for part in range(1, parts + 1):
@@ -93,6 +102,26 @@ def bounds(m, h, k):
 
 
 @njit(error_model="numpy", **INNER)
+def next_place(k):
+    """Time [s] of the next place of a phasor, in a cycle whose phasor is asked for (it is not NaN)."""
+    number, cycles = int(k.tally[PLACE]), k.cycles.shape[1]
+    while number // GRID < cycles and np.isnan(k.cycles[2, number // GRID]):
+        number = (number // GRID + 1) * GRID
+    k.tally[PLACE] = number
+    return number * k.tally[PERIOD] / GRID if number // GRID < cycles else np.inf
+
+
+@njit(error_model="numpy", **INNER)
+def inside(m, h, k):
+    """Whether something is to be read inside the step of h [s]: peaks, a sample, a place of a phasor or a turn."""
+    end = m.now[steps.TIME] + h
+    if k.tally[WANTED] > 0 or next_place(k) <= end:
+        return True
+    at = int(k.tally[SAMPLE])
+    return (at < k.samples.shape[0] and k.samples[at, 0] <= end) or may_turn(m)
+
+
+@njit(error_model="numpy", **INNER)
 def marks(m, h, k):
     """Samples and places of the phasors inside the step of h [s], its end included."""
     t, period = m.now[steps.TIME], k.tally[PERIOD]
@@ -102,14 +131,13 @@ def marks(m, h, k):
         steps.between(m, (k.samples[j, 0] - t) / h, k.room[0])
         write(m, k.samples[j, 0], k.room[0], k.samples[j])
         k.tally[SAMPLE] += 1
-    while k.tally[PLACE] * period / GRID <= end:
+    while next_place(k) <= end:
         number = int(k.tally[PLACE])
         steps.between(m, min(max((number * period / GRID - t) / h, 0.0), 1.0), k.room[0])
         x = output_of(m, k.room[0])[0]
         turn, cycle = 2 * pi * (number % GRID) / GRID, number // GRID
-        if cycle < k.cycles.shape[1]:
-            k.cycles[2, cycle] += x * cos(turn) * 2 / GRID
-            k.cycles[3, cycle] -= x * sin(turn) * 2 / GRID
+        k.cycles[2, cycle] += x * cos(turn) * 2 / GRID
+        k.cycles[3, cycle] -= x * sin(turn) * 2 / GRID
         k.tally[PLACE] += 1
 
 
@@ -239,13 +267,17 @@ def stored(m, y):
 
 @njit(error_model="numpy", **INNER)
 def watch(m, h, k):
-    """Take in a step of h [s] whose extension is there, before the state moves on."""
+    """Take in a step of h [s] before the state moves on."""
     work = m.y.size - 3
     k.tally[POWER] += abs(m.work[steps.TRIAL, work] - m.y[work])
     k.tally[STORED] = max(k.tally[STORED], stored(m, m.work[steps.TRIAL]))
     k.tally[DONE] += 1
+    if not inside(m, h, k):
+        bounds(m, h, k, 1)
+        return
+    steps.extended(m, h)
     marks(m, h, k)
-    bounds(m, h, k)
+    bounds(m, h, k, 1 if m.rows.shape[1] == 1 else 4)
     if k.tally[WANTED] > 0:
         peaks(m, h, k)
         holds(m, h, k)

@@ -194,6 +194,28 @@ def test_exact_a_fork_goes_on_as_the_run_would():
     assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.tally[13] == run.kept.tally[13]
 
 
+def test_exact_extremes_are_those_of_steps_read_inside():
+    plain, read = (Run(ONE, SINE, element(SHORT), 6, 1e-9) for _ in range(2))
+    for run, times in ((plain, ()), (read, np.linspace(0, 6, 6001) * SINE.period)):
+        run.ends_only(6)  # places of a phasor lie in nearly every step
+        rows = run.until(6 * SINE.period, times)
+    seen = rows[:-1, 1].reshape(6, 1000)
+    assert np.array_equal(plain.extremes(6), read.extremes(6))
+    assert plain.extremes(6)[1:, 1] == pytest.approx(seen.max(axis=1)[1:], abs=1e-4 * np.ptp(seen))
+
+
+def test_exact_phasors_of_chosen_cycles_are_those_of_every_cycle():
+    every, chosen = (Run(THREE, SINE, element(SHORT), 8, 1e-9) for _ in range(2))
+    chosen.ends_only(3)
+    rows = every.until(8 * SINE.period, np.arange(8 * 64) / 64 * SINE.period)
+    chosen.until(8 * SINE.period)
+    kept = np.array([False, True, False, False, True, False, False, True])
+    assert np.array_equal(chosen.kept.cycles[2:, kept], every.kept.cycles[2:, kept])
+    assert np.isnan(chosen.kept.cycles[2:, ~kept]).all() and np.array_equal(chosen.moving.y, every.moving.y)
+    turned = (rows[:, 1:4] @ THREE.output).reshape(8, 64) @ np.exp(-2j * np.pi * np.arange(64) / 64) / 32
+    assert every.kept.cycles[2] + 1j * every.kept.cycles[3] == pytest.approx(turned, rel=1e-9)
+
+
 def test_always_snapshots_of_the_interface_are_those_of_the_march():
     fine = simulate(ONE, SINE, element(SHORT), 3, 1e-10, 1, frames=4)
     done = march(ONE, SINE, points_model(SHORT, [1.0], [LOAD]), 3, 3200, 1, frames=4)
