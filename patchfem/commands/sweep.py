@@ -129,6 +129,8 @@ class Progress:
 def _answer(found, target: Path, json_: bool, seconds: float) -> None:
     from collections import Counter
 
+    from ..export.pages.sweep import span
+
     counts = dict(Counter(map(str, found.outcome)).most_common())
     failed = sorted(found.messages)
     if json_:
@@ -136,7 +138,10 @@ def _answer(found, target: Path, json_: bool, seconds: float) -> None:
                           "seconds": round(seconds, 3)}, ensure_ascii=False))
     else:
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
-        print(f"results: {target / 'sweep.csv'} {target / 'sweep.nc'}")
+        said = span({name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()})
+        if said:
+            print(said)
+        print(f"page: {target / 'report.html'}\nresults: {target / 'sweep.csv'} {target / 'sweep.nc'}")
     sys.stdout.flush()
     alike = {}
     for number in failed:

@@ -103,21 +103,32 @@ def _explorer(number: int, drawn: int) -> str:
             "JavaScript; the numbers stand in sweep.csv.</p></noscript>")
 
 
+def span(measures: dict) -> str:
+    """From where to where the first measure of interest runs, and its largest numerical error; "" where none has a
+    value. measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none."""
+    for name in FIRST:
+        values, errors, unit = measures.get(name, ((), (), ""))
+        there = np.isfinite(values)
+        if not np.any(there):
+            continue
+        values, errors = np.asarray(values, float)[there], np.asarray(errors, float)[there]
+        unit, scale = axis_unit(values, unit) if unit in LADDERS else (unit, 1.0)
+        low, high = (f"{value * scale:.4g}" for value in (values.min(), values.max()))
+        unit = "" if unit == "1" else f" {unit}"
+        ran = f"is {low}{unit} throughout" if low == high else f"runs from {low} to {high}{unit}"
+        known = errors[np.isfinite(errors)]
+        band = f", numerical error at most {known.max() * scale:.1g}{unit}" if known.size else ""
+        return f"{label(name).capitalize()} {ran}{band}."
+    return ""
+
+
 def _lead(table: dict) -> str:
     """The verdict: how many cases, over what, how they ended, and the span of the first measure."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
     text = f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}."
-    for name in FIRST:
-        found = table["measures"].get(name)
-        if found is None or not np.isfinite(found["values"]).any():
-            continue
-        unit, scale = axis_unit(found["values"], found["unit"]) if found["unit"] in LADDERS else (found["unit"], 1.0)
-        low, high = (f"{value * scale:.4g}" for value in (np.nanmin(found["values"]), np.nanmax(found["values"])))
-        unit = "" if unit == "1" else f" {unit}"
-        text += (f" {escape(label(name).capitalize())} is {low}{unit} throughout." if low == high else
-                 f" {escape(label(name).capitalize())} runs from {low} to {high}{unit}.")
-        break
+    said = span({name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()})
+    text += f" {escape(said)}" if said else ""
     failed = table["messages"]
     fault = ""
     if failed:

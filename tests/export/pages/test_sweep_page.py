@@ -8,7 +8,7 @@ from page_data import data_of, own_part
 
 from patchfem.export.pages import library
 from patchfem.export.pages.document import document, plain
-from patchfem.export.pages.sweep import brief, page
+from patchfem.export.pages.sweep import brief, page, span
 
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
@@ -108,3 +108,12 @@ def test_always_a_browser_draws_it(table, browser, shown):
     assert f"highest 200 um at contact.tilt.angle 1 mrad{where}" in words
     assert "2 of 12 cases did not settle" in words
     assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
+
+
+def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_error():
+    lost = np.nan
+    measures = {"loop_area": ([lost, lost], [lost, lost], "J"), "pressure_peak": ([2e6, 3.1415926e6], [2e3, lost], "Pa")}
+    assert span(measures) == "Pressure peak runs from 2 to 3.142 MPa, numerical error at most 0.002 MPa."
+    measures["loop_area"] = ([1e-3, lost], [lost, lost], "J")
+    assert span(measures) == "Loop area is 1 mJ throughout."
+    assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}) == ""
