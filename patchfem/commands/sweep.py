@@ -138,7 +138,8 @@ def _answer(found, target: Path, json_: bool, seconds: float) -> None:
                           "seconds": round(seconds, 3)}, ensure_ascii=False))
     else:
         print(f"{len(found)} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
-        said = span({name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()})
+        said = span({name: (values, found.errors[name], found.units[name]) for name, values in found.values.items()},
+                    found.outcome)
         if said:
             print(said)
         print(f"page: {target / 'report.html'}\nresults: {target / 'sweep.csv'} {target / 'sweep.nc'}")

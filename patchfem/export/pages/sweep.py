@@ -103,14 +103,17 @@ def _explorer(number: int, drawn: int) -> str:
             "JavaScript; the numbers stand in sweep.csv.</p></noscript>")
 
 
-def span(measures: dict) -> str:
+def span(measures: dict, outcome) -> str:
     """From where to where the first measure of interest runs, and its largest numerical error; "" where none has a
-    value. measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none."""
+    value. measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; outcome (n,): cases that
+    did not settle are left out where others did."""
+    settled = np.isin(np.asarray(outcome, str), SETTLED)
     for name in FIRST:
-        values, errors, unit = measures.get(name, ((), (), ""))
-        there = np.isfinite(values)
-        if not np.any(there):
+        if name not in measures or not np.isfinite(measures[name][0]).any():
             continue
+        values, errors, unit = measures[name]
+        there = np.isfinite(values)
+        there = there & settled if np.any(there & settled) else there
         values, errors = np.asarray(values, float)[there], np.asarray(errors, float)[there]
         unit, scale = axis_unit(values, unit) if unit in LADDERS else (unit, 1.0)
         low, high = (f"{value * scale:.4g}" for value in (values.min(), values.max()))
@@ -127,7 +130,8 @@ def _lead(table: dict) -> str:
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
     text = f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}."
-    said = span({name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()})
+    said = span({name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()},
+                table["outcome"])
     text += f" {escape(said)}" if said else ""
     failed = table["messages"]
     fault = ""
