@@ -27,15 +27,16 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from scipy.constants import lbf as LBF
 
 import patchfem as pf
+from patchfem.core import G_N as G
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "common"))
 RIG = HERE.parent / "rig" / "rig.toml"
 TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # rad
 LOADS, LEVELS = (13.0, 26.0, 52.0), (3.0, 5.0, 10.0)  # lbf, g
-LBF, G = 4.4482216152605, 9.80665
 AROUND = (0.75, 0.875, 1.0, 1.125)  # of 4 g per 26 lbf: levels between which the onset is looked for
 MASS, AXIAL = 0.884, 143.0  # kg, Hz
 
