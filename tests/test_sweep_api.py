@@ -73,6 +73,9 @@ def test_refuses_what_is_no_sweep():
         pf.sweep(RIG)
     with pytest.raises(pf.SceneError, match=r"--over normal.load: .*'lbf'"):
         pf.sweep(RIG, {"normal.load": ["1 lb"]})
+    for draw in ({"draw": 2, "seed": -1}, {"draw": -2}, {"sobol": True}):
+        with pytest.raises(pf.SceneError, match="whole numbers from 0 on"):
+            pf.sweep(RIG, {"normal.load": "1 N..2 N"}, **draw)
 
 
 def test_exact_many_models_are_single_runs():

@@ -184,12 +184,16 @@ def _is_number(key: str) -> bool:
 
 
 def _split(text: str) -> list[str]:
-    """The text cut at its commas, but for those inside brackets and quotes."""
-    pieces, open_, quote, begin = [], [], "", 0
+    """The text cut at its commas, but for those inside brackets and quotes.
+
+    A quote opens a value or stands in brackets; elsewhere it is a sign like others.
+    """
+    pieces, open_, quote, begin, escaped = [], [], "", 0, False
     for place, sign in enumerate(text):
         if quote:
-            quote = "" if sign == quote else quote
-        elif sign in "\"'":
+            quote = "" if sign == quote and not escaped else quote
+            escaped = sign == "\\" and quote == '"' and not escaped
+        elif sign in "\"'" and (open_ or not text[begin:place].strip()):
             quote = sign
         elif sign in "[{":
             open_.append(sign)

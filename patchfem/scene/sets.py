@@ -22,10 +22,20 @@ def assignments(sets: dict[str, Any]) -> tuple[str, ...]:
 
 
 def texts(key: str, values: Any) -> list[str]:
-    """Values of one key as the texts of a scene without quotes: texts as they are, numbers in SI with its unit."""
+    """Values of one key as `--over` reads them between commas: texts as they are, numbers in SI with its unit.
+
+    A number alone is a list of one. A text with signs that say something there, such as a comma, stands in quotes.
+    """
     listed = values.tolist() if hasattr(values, "tolist") else values
-    found = [assignments({key: one})[0].partition("=")[2] for one in listed]
-    return [text[1:-1] if text.startswith('"') and '"' not in text[1:-1] else text for text in found]
+    return [_piece(key, one) for one in ([listed] if isinstance(listed, Real) else listed)]
+
+
+def _piece(key: str, value: Any) -> str:
+    if isinstance(value, str):
+        written = value.startswith(("[", "{", '"', "'"))  # as a value of TOML
+        return value if written or not set(",\"'[{") & set(value) else json.dumps(value, ensure_ascii=False)
+    text = assignments({key: value})[0].partition("=")[2]
+    return text[1:-1] if text.startswith('"') else text
 
 
 def _written(key: str, value: Any) -> str:

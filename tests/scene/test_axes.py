@@ -103,6 +103,15 @@ def test_exact_values_from_python():
     assert texts("contact.load", [26.0, "26 lbf"]) == ["26.0 N", "26 lbf"]
     assert texts("friction.static", np.array([0.1, 0.2])) == ["0.1", "0.2"]
     assert texts("friction.law", ["tanh"]) == ["tanh"]
+    for one in (26.0, np.float64(26), np.array(26.0)):
+        assert texts("contact.load", one) == ["26.0 N"]
+    names = ["plain", "a,b.csv", 'an "inch"', "it's,", "back\\slash,"]
+    found = axis(f"title={','.join(texts('title', names))}")
+    assert [loads(BENCH, "a.toml", [f"title={one}"]).title for one in found.texts] == names
+
+
+def test_exact_a_quote_within_a_value_is_a_sign():
+    assert axis("title=it's,that's,'a,b'").texts == ("it's", "that's", "'a,b'")
 
 
 def test_exact_a_table_of_a_scene_says_the_same():

@@ -44,6 +44,9 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     SceneError names the mistakes of scene and request, also where none of the cases that are looked at is valid.
     """
     parts, wrong = [], []
+    if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
+        raise SceneError([f"a draw of {request.count} cases with seed {request.seed}: whole numbers from 0 on are "
+                          "wanted, and at least one case of Sobol's sequence"])
     if request.file is not None:
         rows, wrong = _rows(request.file)
         parts += [rows] if rows is not None else []
