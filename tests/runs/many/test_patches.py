@@ -51,6 +51,28 @@ def test_exact_together_as_one_by_one_on_a_mesh_chosen_for_them():
     same(family(TILT + SKIN, -1e-4, 1e-3, loads=(100.0,), size=""))
 
 
+def test_exact_cases_of_every_kind_beside_each_other():
+    """Skins, tolerances, tilts and load lines that no group may mix; pieces so tall and pressed so hard that a single
+    run says so, and keys without a use."""
+    soft = SKIN.replace("1e14", "1e13")
+    parts = [(TILT.format(1e-4), ""), (TILT.format(2e-4) + SKIN, ""), (TILT.format(1e-4) + soft, ""),
+             (LINE.format(3e-3), ""), (LINE.format(-2e-3), 'pairs = 2\n')]
+    texts = [TEXT.format(PINNED + more, load, tables) for tables, more in parts for load in (100.0, 600.0)]
+    tall = TEXT.format(PINNED + "pairs = 2\n", 2e7, TILT.format(1e-3)).replace('"6.35 mm"', '"38.1 mm"')
+    texts += [text.replace("1e-2", "1e-5") for text in texts[:2]] + [tall, tall.replace("2e7", "2e6")]
+    texts.append(texts[0] + 'quadrature = "merged"\n')
+    mine = same(meshed([build(scene.loads(text)) for text in texts]))
+    said = [" ".join(mine.warnings.get(case, []) + mine.notes.get(case, [])) for case in range(len(texts))]
+    for part in ("beyond the small strains", "times as tall as long", "accuracy.quadrature = 'merged' has no meaning"):
+        assert any(part in one for one in said), part
+
+
+def test_exact_each_tolerance_has_meshes_of_its_own():
+    texts = [TEXT.format(PINNED, load, "").replace("1e-2", size) for size in ("1e-2", "1e-3") for load in (100, 200)]
+    one, other, finer, finest = (model.patch.meshes for model in meshed([build(scene.loads(text)) for text in texts]))
+    assert one is other and finer is finest and one is not finer
+
+
 def test_exact_contacts_inside_the_interface_are_run_by_themselves():
     same(family(CROWN + TILT, 1e-5, 1e-3))
 
