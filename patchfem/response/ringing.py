@@ -5,6 +5,7 @@ sinusoids are fitted together and the one with the most energy is kept.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,8 @@ MISSED = 0.1  # share of the ring that a fit may leave over
 WIDEST = 0.5  # largest damping ratio of what is called a ring
 WHOLE = 1e-9  # of what the forced sine leaves: a fit that leaves less has found the ring, no other start is tried
 ROUNDING = float(np.finfo(float).eps)
+KERNELS = "response.ringing_kernels"
+STEPS = 60  # of a fit
 SHORT = 0.9  # of LEAST_PERIODS; a WHOLE fit below it is refused, and its last digits are not sought
 
 
@@ -44,18 +47,19 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     if time.size < LEAST_SAMPLES or size == 0:
         return None
     columns = _forced(time, omega)
-    rest = _apart(columns, value)[0]
+    rest = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
     if np.abs(rest).max() <= FAINT * size:
         return None
     if time.size > MOST_SAMPLES:  # of a long stick the first part: later less is left of the ring
         # no more samples than the ring needs
         stride = max(1, int(2 * np.pi / _highest(time, rest) / (time[1] - time[0]) / PER_PERIOD))
-        time, value, columns, rest = (part[::stride][:MOST_SAMPLES] for part in (time, value, columns, rest))
+        time, value, columns, rest = (part[::stride][:MOST_SAMPLES].copy() for part in
+                                      (time, value, columns, rest))
     span = time[-1]
     found = _grown(time, value, columns, rest)
     if found is None:
         return None
-    poles, sigma = found
+    poles, sigma, _ = found
     left, shares = _share(time, value, columns, poles)
     k = int(np.argmax([np.sum(part**2) for part in shares]))
     own, rate = poles[2 * k:2 * k + 2]
@@ -66,7 +70,9 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     if not seen or steady or amplitude <= FAINT * size or not -0.02 < damping < WIDEST \
             or np.sqrt(np.mean(left**2)) > MISSED * np.sqrt(np.mean(shares[k]**2)):
         return None
-    few = _refined(time[::2], value[::2], columns[::2], poles)[0] if time.size >= 2 * LEAST_SAMPLES else poles
+    few = poles
+    if time.size >= 2 * LEAST_SAMPLES:
+        few = _refined(time[::2].copy(), value[::2].copy(), columns[::2], poles).poles
     apart = np.abs(few - poles)[2 * k:2 * k + 2] + 2 * sigma[2 * k:2 * k + 2]
     return Ring(float(own / (2 * np.pi)), damping, amplitude, (float(apart[0] / (2 * np.pi)), float(apart[1] / own)))
 
@@ -116,59 +122,53 @@ def _forced(time, omega: float) -> np.ndarray:
     return np.stack(parts, axis=1)
 
 
-def _columns(time, forced, poles) -> np.ndarray:
-    n = forced.shape[1]
-    out = np.empty((time.size, n + len(poles)), order="F")  # columns stand together, as LAPACK wants them
-    out[:, :n] = forced
-    for k, (own, rate) in enumerate(poles.reshape(-1, 2)):
-        fall, turn = np.exp(np.minimum(np.maximum(-rate * time, -50), 50)), own * time
-        out[:, n + 2 * k], out[:, n + 2 * k + 1] = fall * np.cos(turn), fall * np.sin(turn)
-    return out
+class _Fit(NamedTuple):
+    """Sinusoids fitted to a signal: poles (2 r,), their standard errors, root mean square of what is left over."""
+
+    poles: np.ndarray
+    sigma: np.ndarray
+    rms: float
 
 
-def _apart(columns, value) -> tuple:
-    """Rest of a projection: (what columns (k, c) leave of value (k,), orthonormal basis of those that count, their
-    numbers)."""
-    from ..elasticity.lapack import dgesdd  # runs without a ring load no LAPACK
+def _fitted(time, value, forced, poles, *ends) -> tuple:
+    """(times that a fit was looked at, the sum of squares that the best one leaves, its room as
+    `ringing_kernels.fitted` has it); poles (2 r,) move to the best ones, not at all without `ends`."""
+    from ..compiled import kernels  # runs in which nothing rings load no compiled code
 
-    u, sizes, turned, failed = dgesdd(columns, full_matrices=0)  # half the time of numpy.linalg.svd on so few rows
-    if failed:
-        raise np.linalg.LinAlgError("SVD did not converge")
-    u = u[:, sizes > 1e-12 * sizes[0]]
-    inside = u.T @ value
-    return value - u @ inside, u, turned[:inside.size].T @ (inside / sizes[:inside.size])
+    count, many, samples = forced.shape[1] + poles.size, poles.size, time.size
+    columns = np.empty((3, count, samples))
+    columns[0, :forced.shape[1]] = forced.T
+    room = (columns, np.empty((count + 2, count)), np.empty((many, samples)), np.zeros((many, many + 1)),
+            np.empty((many + 2, many)))
+    ends = np.array([*ends, STEPS] if ends else [0.0] * 4)
+    return *kernels(KERNELS).fitted(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
 
 
 def _share(time, value, forced, poles) -> tuple:
     """Part of each sinusoid: (what is left over (k,), the sinusoids [(k,)])."""
-    columns, n = _columns(time, forced, poles), forced.shape[1]
-    left, _, numbers = _apart(columns, value)
-    return left, [columns[:, n + 2 * k:n + 2 * k + 2] @ numbers[n + 2 * k:n + 2 * k + 2]
-                  for k in range(len(poles) // 2)]
+    n, (columns, few, *_) = forced.shape[1], _fitted(time, value, forced, poles)[2]
+    return columns[2, 0], [few[-1, at:at + 2] @ columns[0, at:at + 2] for at in range(n, n + poles.size, 2)]
 
 
-def _grown(time, value, forced, rest) -> tuple | None:
-    """Poles (2 r,) frequency [rad/s] and decay [1/s] in turn, and their standard errors.
-
-    One sinusoid is added after the other while each halves what is left.
-    """
+def _grown(time, value, forced, rest) -> _Fit | None:
+    """The fit of the sinusoids that there are: one is added after the other while each halves what is left."""
     scale = last = np.sqrt(np.mean(rest**2))
     best = None
     for _ in range(MOST_TERMS):
-        poles = best[0] if best is not None else np.empty(0)
+        poles = best.poles if best is not None else np.empty(0)
         tries = []
         for start in _starts(time, value, forced, poles, rest):
             tries.append(_refined(time, value, forced, np.append(poles, start), WHOLE * scale))
-            if tries[-1][2] < WHOLE * scale:
+            if tries[-1].rms < WHOLE * scale:
                 break
-        new = min(tries, key=lambda one: one[2])
-        if not np.isfinite(new[2]) or new[2] > last / 2:  # less gain is noise
+        new = min(tries, key=lambda one: one.rms)
+        if not np.isfinite(new.rms) or new.rms > last / 2:  # less gain is noise
             break
-        best, last = new, new[2]
-        if last < 1e-6 * scale or time.size < 8 * (len(best[0]) + 2):
+        best, last = new, new.rms
+        if last < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
             break
-        rest = _share(time, value, forced, best[0])[0]
-    return best[:2] if best is not None else None
+        rest = _share(time, value, forced, best.poles)[0]
+    return best
 
 
 def _highest(time, rest) -> float:
@@ -183,48 +183,19 @@ def _starts(time, value, forced, poles, rest) -> list:
     """Starting values around the highest line of what is left: the best of them by projection, with two decays."""
     span, top = time[-1], _highest(time, rest)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
-    sizes = [np.sum(_apart(_columns(time, forced, np.append(poles, (own, 0.5 / span))), value)[0]**2) for own in near]
+    sizes = [_fitted(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near]
     own = near[int(np.argmin(sizes))] if near else top
     return [np.array([own, decay / span]) for decay in (0.1, 2.0)]
 
 
-def _refined(time, value, forced, poles, whole: float = 0.0) -> tuple:
-    """Refined poles, their standard errors and the rms of what is left.
+def _refined(time, value, forced, poles, whole: float = 0.0) -> _Fit:
+    """The fit to which `poles` lead, by Levenberg and Marquardt's method on the projected residual.
 
-    Levenberg and Marquardt's method on the projected residual, with the Jacobian of Kaufman (1975). It ends where the
-    residual is rounding of the signal, where a step gains less than the rounding of the sum of squares it lowers, or
-    where less than `whole` (rms) is left by sinusoids too slow to be a ring.
+    It ends where the residual is rounding of the signal, where a step gains less than the rounding of the sum of
+    squares it lowers, or where less than `whole` (rms) is left by sinusoids too slow to be a ring.
     """
-    scale, damping = np.abs(poles) + 1 / time[-1], 1e-3
-    least, short = (4 * ROUNDING)**2 * (value @ value), SHORT * 2 * np.pi * LEAST_PERIODS / time[-1]
-    left, slopes = _slopes(time, value, forced, poles, scale)
-    for _ in range(60):
-        normal, pull, size = slopes.T @ slopes, slopes.T @ left, left @ left
-        if size <= least or (size < time.size * whole**2 and poles[::2].max() < short):
-            break
-        step = -np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-300), pull, rcond=None)[0]
-        if -pull @ step <= ROUNDING * size:  # whether such a step is taken or not is chance
-            break
-        tried = poles + scale * step
-        new = _slopes(time, value, forced, tried, scale)
-        if new[0] @ new[0] <= size:
-            poles, (left, slopes), damping = tried, new, damping / 10
-            if np.abs(step).max() < 1e-13:
-                break
-        elif damping > 1e9 or np.abs(step).max() < 1e-15:
-            break
-        else:
-            damping *= 10
-    rms = float(np.sqrt(np.mean(left**2)))
-    return poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes.T @ slopes)), 0)) * rms * scale, rms
-
-
-def _slopes(time, value, forced, poles, scale) -> tuple:
-    """Projected residual (k,) and its derivative by poles/scale (k, 2 r)."""
-    columns, n = _columns(time, forced, poles), forced.shape[1]
-    left, basis, numbers = _apart(columns, value)
-    cosines, sines, a, b = columns[:, n::2], columns[:, n + 1::2], numbers[n::2], numbers[n + 1::2]
-    slopes = np.empty((time.size, len(poles)))
-    slopes[:, ::2], slopes[:, 1::2] = b * cosines - a * sines, -(a * cosines + b * sines)
-    slopes *= time[:, None] * scale
-    return left, basis @ (basis.T @ slopes) - slopes
+    poles, scale, short = poles.copy(), np.abs(poles) + 1 / time[-1], SHORT * 2 * np.pi * LEAST_PERIODS / time[-1]
+    _, size, (*_, normal, _) = _fitted(time, value, forced, poles, (4 * ROUNDING)**2 * (value @ value),
+                                       time.size * whole**2, short)
+    rms = float(np.sqrt(size / time.size))
+    return _Fit(poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal[:, :-1])), 0)) * rms * scale, rms)
