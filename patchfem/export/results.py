@@ -60,7 +60,6 @@ class Folder:
             raise Missing(f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
                           f"{self.path.name} beside it") from None
 
-
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
         if not (self.path / STATE).is_file():
@@ -71,19 +70,32 @@ class Folder:
                 shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
 
 
-def _only_ours(place: Path, shown) -> None:
-    """Refuse a place that is no folder, holds foreign files or is being written by a living process."""
+def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> None:
+    """PatchfemError for a place that is no folder or holds files that are not patchfem's.
+
+    shown: the place as the user named it; known: names of files, also with .partial behind them; kind: what they are,
+    in words; dots: whether names that start with a dot are among them.
+    """
     if not place.exists():
         return
     if not place.is_dir():
-        raise PatchfemError(f"{shown}: {place.name} is a file, a results folder would replace it; name another -o")
-    foreign = sorted(p.name for p in place.iterdir()
-                     if p.name.removesuffix(".partial") not in FILES and p.name != LOCK)
-    if foreign:
-        raise PatchfemError(f"{shown}: {place.name} holds files that are not patchfem results ({', '.join(foreign[:3])}"
-                            f"{', ...' if len(foreign) > 3 else ''}); name another -o")
-    lock = place / LOCK
-    if lock.is_file():
-        writer = lock.read_text()
-        if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
-            raise Missing(f"{shown}: another run (process {writer}) is writing it; name another -o or wait")
+        raise PatchfemError(f"{shown}: {place.name} is a file, a folder is wanted; name another -o")
+    others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
+                    and not (dots and one.name.startswith(".")))
+    if others:
+        raise PatchfemError(f"{shown}: {place.name} holds files that are not {kind} ({', '.join(others[:3])}"
+                            f"{', ...' if len(others) > 3 else ''}); name another -o")
+
+
+def refuse_second(lock: Path, shown, kind: str) -> None:
+    """Missing where the process that a lock file names is alive and not this one."""
+    writer = lock.read_text() if lock.is_file() else ""
+    if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
+        raise Missing(f"{shown}: another {kind} (process {writer}) is writing it; name another -o or wait; if that "
+                      f"process is no patchfem, remove {lock.parent.name}/{lock.name}")
+
+
+def _only_ours(place: Path, shown) -> None:
+    """Refuse a place that is no folder, holds foreign files or is being written by a living process."""
+    refuse_others(place, shown, (*FILES, LOCK), "patchfem results")
+    refuse_second(place / LOCK, shown, "run")

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
-from patchfem.export.sweeps.folder import TABLES
+from patchfem.export.summary import summary_of
+from patchfem.export.sweeps.folder import TABLES, Folder
 from patchfem.runs.many import many
 
 RIG = POINT + COULOMB + SHORT
@@ -59,6 +61,12 @@ def test_exact_every_case_is_a_single_run(swept, scene):
         kept = json.loads((out / "cases" / row["case"] / "summary.json").read_text())
         assert kept["case"] == sets and kept["kind"] == "rig" and kept["outcome"] == single.outcome
         assert kept["warnings"] == single.warnings and kept["notes"] == single.notes
+        whole = summary_of(single)
+        for part in ("patchfem", "title", "not_in_scene", "numerics"):
+            assert kept[part] == whole[part]
+        assert [(one["effect"], one["equations"]) for one in kept["effects"]] == \
+            [(one["effect"], one["equations"]) for one in whole["effects"]]
+        assert 0 < kept["seconds"]["total"] < 60
         for name, one in single.measures.items():
             for part, number in (("value", one.value), ("error", one.error)):
                 alike("" if kept["measures"][name][part] is None else kept["measures"][name][part], number, one)
@@ -120,11 +128,12 @@ def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monk
     out = tmp_path / "swept"
     assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
     assert len(ran) == 2
+    (out / "cases" / rows(out)[0]["case"] / "summary.json").write_text('{"patchf')  # as a full disk leaves it
     answer = cli("sweep", scene, *OVER, "-o", out, "--resume")
-    assert answer.code == 3 and len(ran) == 4
+    assert answer.code == 3 and len(ran) == 5
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
-    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 8
+    assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 9
 
 
 def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):
@@ -203,30 +212,41 @@ def test_refuses_a_folder_of_others(scene, tmp_path):
     assert answer.code == 2 and "mine.txt" in answer.err
 
 
-def test_refuses_a_second_writer(scene, tmp_path):
-    (tmp_path / "a").mkdir()
-    (tmp_path / "a" / ".writer").write_text("1")
-    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
-    assert answer.code == 4 and "another sweep (process 1)" in answer.err
+def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
+    words = ("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
+    with monkeypatch.context() as another:
+        another.setattr(os, "getpid", lambda: 1)
+        first = Folder(tmp_path / "a", ()).__enter__()
+    answer = cli(*words)
+    assert answer.code == 4 and "another sweep (process 1)" in answer.err and "remove a/.writer" in answer.err
+    first.__exit__(None, None, None)
+    assert cli(*words).code == 0
+    (tmp_path / "a" / ".writer").write_text("4194305")  # beyond the largest number of a process: it died
+    assert cli(*words).code == 0
 
 
-def test_exact_shards_make_the_same_files(swept, scene, tmp_path):
-    out = tmp_path / "swept"
+def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
+    out, ran, real = tmp_path / "swept", [], many.answers
+    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
     for part in ("2/4", "1/4", "4/4"):
         assert cli("sweep", scene, *OVER, "-o", out, "--shard", part).code == 0
     early = cli("sweep", scene, *OVER, "-o", out, "--collect")
     assert early.code == 4 and "1 of 6 cases have no answer" in early.err and not (out / "sweep.csv").exists()
-    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0
+    count = len(ran)
+    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "2/4").code == 0 and len(ran) == count  # it is done
+    assert cli("sweep", scene, *OVER, "-o", out, "--shard", "3/4").code == 0 and len(ran) == 6
+    (out / "cases" / "0123456789abcdef").mkdir()  # another sweep's, whose shards may still be at work
     assert cli("sweep", scene, *OVER, "-o", out, "--collect").code == 3
+    assert (out / "cases" / "0123456789abcdef").is_dir()
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
 
 
 def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     out = tmp_path / "swept"
-    over = ("--over", "friction.static=0.1,-1")
+    over = ("--over", "friction.static=-1,0.1")
     assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 3
-    good, bad = rows(out)
+    bad, good = rows(out)
     assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {one.name for one in
                                                                    (out / "cases" / good["case"]).iterdir()}
     assert [one.name for one in (out / "cases" / bad["case"]).iterdir()] == ["summary.json"]
@@ -258,6 +278,26 @@ def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
 def test_refuses_words_that_do_not_stand_together(scene, tmp_path, words, says):
     answer = cli("sweep", scene, *words, "-o", tmp_path / "a")
     assert answer.code == 2 and says in answer.err and not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize("ends, code, says", [
+    (["", ""], 0, "2 cases"), (["not_converged", ""], 3, "1 not_converged"), (["", "failed"], 3, "case 2: it broke"),
+    (["failed", "failed"], 2, "no case could be run")])
+def test_exact_the_exit_code_says_how_cases_ended(scene, tmp_path, monkeypatch, ends, code, says):
+    left, real = list(ends), many.answers
+
+    def ended(models, *more):
+        found = real(models, *more)
+        for case in range(len(models)):
+            if (end := left.pop(0)) == "failed":
+                found.fail(case, "it broke")
+            elif end:
+                found.outcome[case] = end
+        return found
+
+    monkeypatch.setattr(many, "answers", ended)
+    answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
+    assert answer.code == code and says in answer.out + answer.err
 
 
 def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):

@@ -19,9 +19,10 @@ from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
 from ..folder import save
+from ..results import LOCK, refuse_others, refuse_second
 from ..summary import summary
 
-CASES, SUMMARY, LOCK, TABLES = "cases", "summary.json", ".writer", ("sweep.csv", "sweep.nc", "report.html")
+CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "report.html")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ class Folder:
         self.target, self.shown, self.keys, self.shared = Path(os.path.abspath(target)), target, keys, shared
 
     def __enter__(self) -> Folder:
-        _only_ours(self.target, self.shown)
+        refuse_others(self.target, self.shown, (CASES, *TABLES), "those of a sweep", dots=True)
         try:
             (self.target / CASES).mkdir(parents=True, exist_ok=True)
             if not self.shared:
@@ -146,11 +147,8 @@ class Folder:
             (self.target / f"{name}.partial").unlink(missing_ok=True)
 
     def _claim(self) -> None:
-        lock = self.target / LOCK
-        writer = lock.read_text() if lock.is_file() else ""
-        if writer.isdigit() and int(writer) != os.getpid() and Path(f"/proc/{writer}").exists():
-            raise Missing(f"{self.shown}: another sweep (process {writer}) is writing it; name another -o or wait")
-        lock.write_text(str(os.getpid()))
+        refuse_second(self.target / LOCK, self.shown, "sweep")
+        (self.target / LOCK).write_text(str(os.getpid()))
 
 
 def _read(found: Answers, case: int, one: dict) -> None:
@@ -160,17 +158,3 @@ def _read(found: Answers, case: int, one: dict) -> None:
     found.put(case, one["outcome"], measures, one["seconds"]["total"])
     if one["outcome"] == FAILED:
         found.fail(case, one.get("message", ""))
-
-
-def _only_ours(place: Path, shown: Path) -> None:
-    """Refuse a place that is no folder or holds files that no sweep writes."""
-    if not place.exists():
-        return
-    if not place.is_dir():
-        raise PatchfemError(f"{shown}: {place.name} is a file, a sweep is a folder; name another -o")
-    foreign = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in (CASES, *TABLES)
-                     and not one.name.startswith("."))
-    if foreign:
-        raise PatchfemError(f"{shown}: {place.name} holds files that are not of a sweep ({', '.join(foreign[:3])}"
-                            f"{', ...' if len(foreign) > 3 else ''}); name another -o")
-

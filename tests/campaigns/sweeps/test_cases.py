@@ -67,6 +67,8 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     assert one.keys(chosen) == cases("contact.load=2 N,1e-3 kN").keys(chosen)[::-1]
     sets = Asked(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
     assert one.keys(sets)[0] == two.keys(sets)[0]
+    sizes = [cases(f"contact.element_size=1 mm,{other} mm").keys(chosen)[0] for other in (2, 3)]
+    assert sizes[0] == sizes[1]  # each case pins its own
 
 
 @pytest.mark.parametrize("other", [Asked(Path("a.toml"), BENCH.replace("5 mm/s", "6 mm/s")),
@@ -74,6 +76,13 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
 def test_exact_another_scene_has_other_names(other):
     found = cases("normal.load=1 N,2 N")
     assert not set(found.keys(other)) & set(found.keys(Asked(Path("a.toml"), BENCH)))
+
+
+def test_exact_another_version_has_other_names(monkeypatch):
+    asked, found = Asked(Path("a.toml"), BENCH), cases("normal.load=1 N,2 N")
+    before = found.keys(asked)
+    monkeypatch.setattr("patchfem.campaigns.sweeps.asked.__version__", "0.0.0")
+    assert not set(found.keys(asked)) & set(before)
 
 
 def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):

@@ -1,0 +1,33 @@
+"""What a sweep would take, beside the plans of its cases and what one leaves on disk."""
+
+from pathlib import Path
+
+import pytest
+from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
+
+from patchfem.campaigns.sweeps.ask import Request, cases_of
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.estimate import ONCE, estimate
+from patchfem.campaigns.sweeps.executors.here import Here
+from patchfem.export.sweeps.run import Place, sweep_into
+from patchfem.runs.plan import plan
+
+
+@pytest.mark.parametrize("text, over", [(SMALL_PATCH, "contact.element_size=0.3 mm,1 mm,0.5 mm"),
+                                        (BENCH, "slide.cycles=1,400,20")])
+def test_exact_a_sweep_takes_what_its_cases_take_but_for_what_is_done_once(text, over):
+    asked = Asked(Path("a.toml"), text)
+    cases = cases_of(asked, Request([over]))
+    told, plans = estimate(asked, cases), [plan(asked.model(cases.sets(number))) for number in range(3)]
+    seconds, least = [one.seconds for one in plans], 0.05  # of the work that is in no plan
+    assert max(seconds) <= told["seconds"] + least and told["seconds"] <= sum(seconds) + least
+    assert sum(seconds) - 3 * ONCE <= told["seconds"] + least
+    assert told["bytes"] == max(one.bytes for one in plans) > min(one.bytes for one in plans)
+
+
+def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
+    asked = Asked(Path("a.toml"), POINT + COULOMB + SHORT)
+    cases = cases_of(asked, Request(["friction.static=0.05..0.6:40lin"]))
+    sweep_into(asked, cases, Place(tmp_path / "a"), Here())
+    files = [one.stat().st_size for one in (tmp_path / "a").rglob("*") if one.is_file() and one.suffix != ".html"]
+    assert 0.5 < estimate(asked, cases)["disk_bytes"] / sum(files) < 2
