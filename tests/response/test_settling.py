@@ -53,6 +53,25 @@ def test_exact_slow_endless_growth_is_not_steady():
     assert settling.classify(1 + 1e-4 * np.arange(6), 1e-3) is Outcome.GROWS
 
 
+def test_exact_growth_that_no_tolerance_notices_is_steady():
+    """A change below a twentieth of the tolerance, or of the floor, would take very long to count."""
+    assert settling.classify(1 + 1e-6 * np.arange(6), 1e-3) is Outcome.STEADY
+    tiny = 1e-7 + 1e-10 * np.arange(6)
+    assert settling.classify(tiny, 1e-6) is Outcome.GROWS
+    assert settling.classify(tiny, 1e-6, 1e-8) is Outcome.STEADY
+
+
+def test_exact_windows_that_rise_by_unlike_steps_do_not_grow():
+    assert settling.classify([1.0, 1.1, 1.11, 1.6, 1.61, 2.2], 1e-3) is Outcome.TRANSIENT
+    assert settling.classify([1.0, 1.1, 1.2, 1.31, 1.42, 1.55], 1e-3) is Outcome.GROWS
+
+
+def test_exact_what_would_grow_twenty_times_has_no_estimate():
+    for size, known in ((1.8, True), (1.99, False)):
+        a = 2 - size * 0.995**np.arange(6)
+        assert (settling.steady_amplitude(a, a)[0] is not None) == known == bool(20 * a[-1] > 2)
+
+
 @settings(max_examples=200)
 @given(st.lists(st.floats(-4e-7, 4e-7), min_size=2, max_size=8), st.floats(0.1, 10))
 def test_always_noise_is_steady(noise, size):
@@ -89,6 +108,14 @@ def test_exact_what_is_left_of_a_short_beat(beat, decay):
     assert 0.4 * (amplitude[-1] - 1) < left < 3 * (amplitude[-1] - 1)
     value, error = settling.mean_amplitude(extremes, 10)
     assert abs(value - 1) < error < 0.3 if value is not None else decay == 0.06  # None: the last window is nearer
+
+
+@pytest.mark.parametrize("size", [0.3, 0.1])
+def test_exact_the_mean_of_a_beat_is_as_uncertain_as_its_square(size):
+    """A beat that turns by 2 pi 3/10 per cycle has the same mean in every window of ten."""
+    high = 1 + size * np.cos(0.6 * np.pi * CYCLES)
+    value, error = settling.mean_amplitude(np.column_stack([-high, high]), 10)
+    assert value == pytest.approx(1.0, rel=1e-12) and error == pytest.approx(size**2, rel=1e-9)
 
 
 @pytest.mark.parametrize("beat", [0.05, 0.02])
@@ -223,3 +250,6 @@ def test_exact_slips_that_are_too_few_have_no_period():
     assert settling.slip_period(time, 0 * time) == 0.0
     assert settling.slip_period(time, np.where(time % 4 < 1, 0.0, 1.0)) == pytest.approx(4.0, abs=1e-12)
     assert settling.slip_period(time, np.where((time % 2 < 1) | (time > 4), 0.0, 1.0)) == 0.0  # it came to hold
+    time = np.arange(0, 12, 0.01)
+    late = np.isin(np.floor(time / 0.5), (2, 16, 18, 20, 22))  # slips at 1, 8, 9, 10 and 11 s
+    assert settling.slip_period(time, late * 1.0) == pytest.approx(1.0, rel=1e-9)

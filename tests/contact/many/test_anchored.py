@@ -7,7 +7,7 @@ import pytest
 
 from patchfem.contact import edges
 from patchfem.contact.many.anchored import Anchored
-from patchfem.contact.unilateral import press
+from patchfem.contact.unilateral import press, residuals
 
 X = np.concatenate([np.linspace(-5e-3, 0, 40), np.linspace(0, 5e-3, 12)[1:]])
 
@@ -46,12 +46,13 @@ def test_exact_as_one_solve_each_with_a_free_rotation(spring):
         assert found.theta[k] == pytest.approx(one.rotation, rel=1e-12)
 
 
-def test_exact_edges_and_stiffnesses_are_those_of_the_set():
+@pytest.mark.parametrize("load, least, most", [(300.0, 4, X.size - 1), (70.0, 2, 2), (10.0, 1, 1)])
+def test_exact_edges_and_stiffnesses_are_those_of_the_set(load, least, most):
     gap = 1e-4 * (X - X[0])
     body = Anchored(C, X)
-    found = body.press(gap[None], np.array([300.0]))
+    found = body.press(gap[None], np.array([load]))
     force, count = found.force[0], int(found.count[0])
-    assert 3 < count < X.size
+    assert least <= count <= most
     [end] = edges.ends(C, X, force, found.opening[0], None, 1e-4)
     share = body.shares(found)
     assert share[0] == pytest.approx(end.share, rel=1e-11)
@@ -59,6 +60,32 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
     for lever, motion in ((False, np.ones(X.size)), (True, X)):
         wanted = edges.stiffness(C, force > 0, motion, [end])
         assert body.stiffness(found.count, share, lever)[0] == pytest.approx(wanted, rel=1e-11)
+
+
+def swapped(force):
+    """The first two forces in each other's place: their sum is right, their moment is not."""
+    return np.concatenate([force[1::-1], force[2:]])
+
+
+WRONG = {  # residual of `unilateral.residuals` -> (forces, closing, rotation) that are wrong in it
+    "force_balance": lambda force, closing, theta: (1.01 * force, closing, theta),
+    "complementarity": lambda force, closing, theta: (force, 0.99 * closing, theta),
+    "penetration": lambda force, closing, theta: (np.where(np.arange(X.size) == 5, 0.0, force), closing, theta),
+    "tension": lambda force, closing, theta: (np.where(np.arange(X.size) == 5, -0.1 * force, force), closing, theta),
+    "moment_balance": lambda force, closing, theta: (swapped(force), closing, theta),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_exact_a_wrong_contact_has_the_flaw_of_its_residual(name):
+    body, gap, load, moment, spring = Anchored(C, X), np.zeros(X.size), np.array([100.0]), np.array([-0.3]), 50.0
+    good = body.press(gap[None], load, moment, spring)
+    force, closing, theta = WRONG[name](good.force[0], good.closing[0], good.theta[0])
+    given = force[None], np.array([closing]), np.array([theta])
+    opening, target = body._opening(gap, *given), np.stack([load, moment])
+    flaw = body._flaw(gap[None], given[0], opening, *given[1:], target, spring, True)
+    wanted = residuals(C, X, gap, force, closing, theta, load[0], moment[0], spring)
+    assert good.flaw < 1e-13 and 1e-4 < wanted[name] <= flaw[0] * (1 + 1e-9) <= max(wanted.values()) * (1 + 2e-9)
 
 
 def test_always_what_does_not_begin_at_the_end_is_told():
