@@ -7,7 +7,7 @@ nothing else in the package knows which laws there are.
 A law is carried by the bench, by a rig of one interface under a constant load, and by what its record names: "shear"
 of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw), "varying-load" in a rig,
 "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events, "pieces" of it (elements that
-stick or slip, exact from yield to yield). Traits: "set-valued" (it holds
+stick or slip, exact from yield to yield), "grooves" whose flanks the load climbs. Traits: "set-valued" (it holds
 without a stretch), "bonds" (the sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point),
 "timeless" (no rate of the slide changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds),
 "cells" (a density cut into elements).
@@ -44,6 +44,7 @@ def _law(module: str, equations: str, keys: tuple, carries: str, traits: str = "
 
 
 _SIZE = "acceleration displacement force"
+CLIMB = "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 
 
 def _wave(equations: str, keys: tuple, traits: str = "", module: str = "patchfem.structure.drives") -> Effect:
@@ -74,12 +75,14 @@ EFFECTS = {
     "contact.profile": Effect("patchfem.surface.nodes", "g += z(x), levelled, averaged over each node's cells"),
     "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R_j q - g - roll y_j per strip, one holder q"),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
+    "contact.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
+    "normal.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
     "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
-                                 ("", "kinetic"), "shear joints varying-load comparison exact pieces",
+                                 ("", "kinetic"), "shear joints varying-load comparison exact pieces grooves",
                                  "set-valued timeless memoryless"),
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
-                              "joints varying-load harmonic comparison", "memoryless creeps"),
+                              "joints varying-load harmonic comparison grooves", "memoryless creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
                                          "reversal)", ("bond_length", ""),
                                          "shear joints varying-load harmonic comparison pieces", "timeless"),

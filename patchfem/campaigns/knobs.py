@@ -105,7 +105,9 @@ def _middle(model: Model, knob: str) -> int:
     if knob != "steps_per_cycle":
         return _pinned(model, knob) or MIDDLE[knob]
     if model.kind == "bench":
-        return model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
+        from ..runs.bench.engine import steps_of
+
+        return steps_of(model)
     from ..runs.rig.numerics import choose
 
     return choose(model).steps

@@ -1,11 +1,17 @@
 """The load of [normal]: constant or N = max(0, load + amplitude cos(2 pi f t + phase)), and a bench's samples of it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core import Missing
 from .slide import SlidePath
+
+if TYPE_CHECKING:
+    from ..friction.grooves import Grooves
 
 MOST_SAMPLES = 5_000_000
 
@@ -51,6 +57,18 @@ class PointLoad:
         if slide.kind == "sine":
             return grid, slide.amplitude * np.sin(2 * np.pi * slide.frequency * grid)
         return grid, np.interp(grid, time, place)
+
+
+def grooves_asked(scene) -> Grooves | None:
+    """The grooves of [contact] or [normal] that the load climbs; None without them, and where they are flat."""
+    for name in ("contact", "normal"):
+        table = getattr(scene, name)
+        if table is not None and table.grooves is not None and table.grooves.amplitude:
+            from ..friction.grooves import Grooves
+
+            g = table.grooves
+            return Grooves(g.wavelength, g.amplitude, g.phase, g.lifted_mass, f"{name}.grooves")
+    return None
 
 
 def point_asked(scene) -> PointLoad | None:

@@ -17,6 +17,7 @@ from .source import Source
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
+    from ..friction.grooves import Grooves
     from .load import PointLoad
     from .patch import PatchModel
     from .rig import Rig
@@ -31,7 +32,8 @@ class Model:
     kind: "patch", "bench", "rig" or "linear". patch or point, whichever carries the load, the other None. friction:
     keys of the law as they act, of the first interface; heat: surface temperature table or None; spread [m] of the pad
     (2.15) or None; pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
-    reading factor) or None. wear: over many cycles, or None. absent: effects that the scene does not name.
+    reading factor) or None. wear: over many cycles, or None. absent: effects that the scene does not name. grooves:
+    that the load climbs, or None.
     """
 
     source: Source
@@ -48,6 +50,7 @@ class Model:
     measured: tuple | None
     wear: WearModel | None
     absent: tuple
+    grooves: Grooves | None = None
 
     def __repr__(self) -> str:
         return f"Model of {self.source.path.name}: {self.kind}; {shorten(', '.join(self.source.effects), 160)}"
@@ -102,15 +105,15 @@ def build(scene: Scene) -> Model:
         count = prod(len(axis.texts) for axis in scene.sweep)
         raise PatchfemError(f"{scene.where('sweep')}: one run cannot hold its {count} cases; use `patchfem sweep`, or "
                             "leave [sweep] out")
-    patch = point = slide = rig = None
+    patch = point = slide = rig = grooves = None
     if scene.contact is not None:
         from .patch import patch_asked
 
         patch = patch_asked(scene.contact, scene.kind, scene.beside)
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
-        from .load import point_asked
+        from .load import grooves_asked, point_asked
 
-        point = point_asked(scene)
+        point, grooves = point_asked(scene), grooves_asked(scene)
     if scene.slide is not None:
         from .slide import slide_asked
 
@@ -125,7 +128,7 @@ def build(scene: Scene) -> Model:
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
                   (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
-                  _wear(scene), _absent(named))
+                  _wear(scene), _absent(named), grooves)
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks))
     return replace(found, source=source)
 

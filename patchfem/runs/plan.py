@@ -100,6 +100,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
 
         chain |= law.link(model)
         groups |= law.groups(model)
+        said[2] = [*said[2], *law.words(model)]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2), size,
                 chain, groups, tuple(_verdict(model, groups, size, said)))
 

@@ -5,6 +5,7 @@ no loop. Where the pressure of a point changes on the way, a law is stepped samp
 """
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from ...friction.bonds.parameters import LONGEST
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE = range(7)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
          STEPPED: "law step by step", PLANE: "two directions"}
+MOST_STEPS = 200_000  # per cycle over grooves
+FLANK = 20  # samples over a radian of grooves
 PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide needs no search for the increment
 
 
@@ -60,6 +63,16 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
     if not has(f.law, "bonds"):
         return Engine(ELEMENTS, 1e-7)
     return _summed(model, slide, points, choice or sum_of(model, slide))
+
+
+def steps_of(model) -> int:
+    """Steps per cycle of a bench: those of the scene, else what the tolerance asks for, and what grooves ask for."""
+    slide, accuracy = model.slide, model.accuracy
+    steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
+    if model.grooves is None or accuracy.steps_per_cycle is not None:
+        return steps
+    turns = model.grooves.wave * float(np.abs(np.diff(slide.samples(steps)[1])).sum()) / max(1.0, slide.cycles or 1.0)
+    return max(steps, min(4 * ceil(FLANK * turns / 4), MOST_STEPS))
 
 
 def changes(model) -> bool:

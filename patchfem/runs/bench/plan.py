@@ -1,13 +1,12 @@
 """What a bench would cost, before it runs."""
 
 from ...model.model import Model
-from .engine import engine_of
+from .engine import engine_of, steps_of
 
 
 def cost(model: Model, unknowns: dict) -> tuple:
     """(engine, steps of all passes, seconds) of a bench."""
-    accuracy = model.accuracy
-    per_cycle = model.slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
+    per_cycle = steps_of(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refined(model.slide, time, slide, per_cycle)

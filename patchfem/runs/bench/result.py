@@ -9,6 +9,7 @@ from ..results.notes import of_growth, two_books, unbounded, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import FAR, ended, reach, travelled
 from . import bench
+from .engine import steps_of
 from .errors import errors_of
 from .watch import Watch
 
@@ -21,7 +22,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         if f.reading == "report" and model.load_varies:
             warnings = [*warnings, "as printed a bond keeps the pressure it formed under: while the load falls the "
                         "friction may exceed mu_s N; reading = \"stretch\" keeps to it"]
-    steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, f.bond_length)
+    steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
     seconds["bench"] = fine.seconds

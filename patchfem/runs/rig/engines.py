@@ -79,7 +79,8 @@ def _met(model: Model, steady: bool = False) -> tuple:
     rig = model.rig
     laws = [one.numbers.law for one in rig.interfaces]
     spring = "[structure.stiffening]" if rig.cubic is not None else \
-        "structure.bonded.wavelength" if rig.interlock is not None else ""
+        "structure.bonded.wavelength" if rig.interlock is not None else \
+        f"[{model.grooves.key}]" if model.grooves is not None else ""
     waveform = "" if steady or rig.kind == "free" else rig.waveform
     return (laws, model.soft, "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, waveform,
             spring)

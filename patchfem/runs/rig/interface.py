@@ -18,11 +18,14 @@ from .strips import strip_loads
 
 
 def model_of(model: Model, numerics: Numerics, patch):
-    """The contact that a march takes: a ContactModel, or a JointsModel where interfaces or springs stand beside it.
+    """The contact that a march takes: a ContactModel, a JointsModel where interfaces or springs stand beside it, or a
+    GroovesModel.
 
     patch: the solved Patch or None under [normal]. PatchfemError for a law that cannot stand beside others.
     """
     rig, many = model.rig, len(model.rig.modes.interfaces) > 1
+    if model.grooves is not None:
+        return _climbing(model, patch)
     alone = None if many else contact_model(model, numerics, patch)
     if not many and not rig.bends:
         return alone
@@ -41,6 +44,15 @@ def model_of(model: Model, numerics: Numerics, patch):
     size = rig.modes.mass * omega_of(rig.drive) * rig.speed
     beside = alone if alone is not None and alone.limit > 0 else None
     return joints.JointsModel(beside, tuple(found), np.array(rows), size)
+
+
+def _climbing(model: Model, patch):
+    """The GroovesModel of a rig whose load climbs grooves."""
+    from ...dynamics.grooves.run import model_of
+
+    f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
+    speed = None if has(f.law, "set-valued") else f.reference_speed
+    return model_of(model.grooves, load, f.static, f.static if f.kinetic is None else f.kinetic, speed, model.rig.modes)
 
 
 def _element(one: Rubbing, load: float, speed: float) -> Element:

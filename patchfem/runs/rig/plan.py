@@ -14,6 +14,7 @@ from .smooth.choice import smooth_cost
 
 STEADY = {"events": "the map from event to event, exact", "yields": "the map from yield to yield, exact",
           "balance": "harmonic balance"}
+CLIMB = 3e-6  # seconds of a sample over grooves
 
 
 def chain(rig) -> dict:
@@ -35,7 +36,9 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
         return "harmonic", points, 0.3 + 0.05 * points
     steps = int(numerics.cycles * numerics.steps)
     each, points = 1e-6, unknowns.get("interface_points", 1)
-    if f is not None and has(f.law, "bonds"):
+    if model.grooves is not None:
+        each = CLIMB
+    elif f is not None and has(f.law, "bonds"):
         if quadrature_of(model, numerics).engine != "recursion":
             entries, seconds = list_cost(model, numerics)
             each, unknowns["bond_list_about"] = seconds / steps, int(entries)

@@ -123,6 +123,15 @@ class Shear(Table):
     """Tangential compliance of the pieces; it has no keys."""
 
 
+class Grooves(Table):
+    """Matched grooves whose flanks the load climbs."""
+
+    wavelength: Length
+    amplitude: quantity("length", ge=0)
+    phase: quantity("angle") = 0.0
+    lifted_mass: quantity("mass", ge=0) = 0.0
+
+
 def outermost(width: float, count: int) -> float:
     """Place [m] of the middle of the outermost of `count` equal strips over `width` [m]; a load line lies within it."""
     return width / 2 * (1 - 1 / count)
@@ -161,6 +170,7 @@ class Contact(Table):
     asperities: Asperities | None = None
     shear: Shear | None = None
     strips: Strips | None = None
+    grooves: Grooves | None = None
 
     @property
     def shapes(self) -> dict:

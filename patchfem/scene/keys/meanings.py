@@ -67,6 +67,12 @@ MEANINGS = {
         "roll": "rotation of the holder about x, which shifts the pressure sideways",
         "offset": "lateral place of the load line; the upper piece is then free to roll",
     },
+    "Grooves": {
+        "wavelength": "distance of the grooves along x",
+        "amplitude": "half the height of their flanks, peak to peak; 0 is the law of friction itself",
+        "phase": "place of the bottom of a groove, 2 pi x/wavelength, from where the run begins",
+        "lifted_mass": "mass that rises with the load as it climbs; its inertia counts, its weight is part of the load",
+    },
     "Normal": {
         "load": "normal force on the point, its mean where it oscillates",
         "amplitude": "amplitude of an oscillating load, load + amplitude cos(2 pi frequency t + phase), never below 0",

@@ -12,7 +12,7 @@ from pydantic import Field, field_validator
 
 from ...effects import LAWS, WAVEFORMS
 from .accuracy import Accuracy
-from .contact import Contact
+from .contact import Contact, Grooves
 from .quantities import format_si, parse
 from .types import (
     Acceleration,
@@ -46,6 +46,7 @@ class Normal(Table):
     frequency: Frequency | None = None
     phase: quantity("angle") | None = None
     width: Length | None = None
+    grooves: Grooves | None = None
 
 
 class Temperature(Table):

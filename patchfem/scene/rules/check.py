@@ -13,6 +13,7 @@ from .contact import _contact, _load_line
 from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
 from .friction import _frictions
+from .grooves import check_grooves
 from .structure import check_structure
 from .wear import check_wear
 
@@ -22,7 +23,7 @@ def check(draft: Draft) -> str:
     for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive):
         rule(draft)
     kind = _kind(draft)
-    for rule in (_quadrature, _sliding, check_length, check_wear):
+    for rule in (_quadrature, _sliding, check_length, check_wear, check_grooves):
         rule(draft, kind)
     return kind
 

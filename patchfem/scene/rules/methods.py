@@ -13,8 +13,8 @@ KEY = "accuracy.method"
 
 class Motion(NamedTuple):
     """What an engine meets: laws of all interfaces; soft: what lets the patch slip part by part; varies: how the load
-    changes; apart: strips slide each by themselves; spring that bends; drive as its table; lower: the key that puts the
-    pressure on the lower piece. Texts are empty where there is nothing."""
+    changes; apart: strips slide each by themselves; spring that bends, or grooves; drive as its table; lower:
+    the key that puts the pressure on the lower piece. Texts are empty where there is nothing."""
 
     laws: list
     soft: str
@@ -53,7 +53,8 @@ def motion(tables: Tables, kind: str) -> Motion:
     lower = [f"contact.{name}.on = 'lower'" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]
     return Motion(laws, contact.gives_way if rubs and contact is not None else "", beside_load(cause), apart,
-                  bending(structure), tables.drive, lower[0] if rubs and lower else "")
+                  bending(structure) or (climbed(tables) if rubs else ""), tables.drive,
+                  lower[0] if rubs and lower else "")
 
 
 def bending(structure) -> str:
@@ -64,6 +65,15 @@ def bending(structure) -> str:
         return "[structure.stiffening]"
     bends = structure.bonded is not None and structure.bonded.wavelength is not None
     return "structure.bonded.wavelength" if bends else ""
+
+
+def climbed(tables: Tables) -> str:
+    """The grooves that the load climbs, as the scene writes them; empty where there are none, or they are flat."""
+    for name in ("contact", "normal"):
+        table = getattr(tables, name)
+        if table is not None and table.grooves is not None and table.grooves.amplitude:
+            return f"[{name}.grooves]"
+    return ""
 
 
 def turning(tables: Tables) -> str:

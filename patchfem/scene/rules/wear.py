@@ -2,6 +2,7 @@
 
 from ...effects import has, unbuilt
 from .draft import Draft
+from .grooves import grooves_of
 
 LATER = "leave out [wear] or {}"
 
@@ -26,6 +27,8 @@ def check_wear(draft: Draft, kind: str) -> None:
 def _beside(tables, kind: str):
     """Tables and values that wear does not go with, each with what to do."""
     contact, structure, drive, method = tables.contact, tables.structure, tables.drive, tables.accuracy.method
+    if grooves := grooves_of(tables):
+        yield f"[{grooves[0]}]", LATER.format("the grooves")
     if contact is not None and contact.strips is not None:
         yield "contact.strips", LATER.format("the strips")
     if tables.normal is not None and tables.normal.amplitude and kind == "rig":

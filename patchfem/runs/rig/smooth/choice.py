@@ -23,7 +23,7 @@ def not_smooth(model: Model) -> str:
     pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
     if pinned or accuracy.quadrature not in ("auto", "recursion"):
         return f"with {pinned or 'accuracy.quadrature'}"
-    if model.friction is None or len(rig.modes.interfaces) > 1 or rig.bends:
+    if model.friction is None or len(rig.modes.interfaces) > 1 or rig.bends or model.grooves is not None:
         return "beside other forces"
     if rig.levels:
         return "level by level"

@@ -1,0 +1,113 @@
+"""Matched grooves: the load climbs their flanks z = A (1 - cos(k q - phase)), slope t = dz/dq = A k sin(k q - phase).
+
+Let R be the force normal to the flank and f the friction along it, against the slide. On a flank of angle a, t = tan a,
+the force against the slide and the vertical one are
+
+    F = R sin a + f cos a,    V = R cos a - f sin a,    so  F/V = (t + phi)/(1 - phi t)  with  phi = f/R.
+
+The vertical force carries the load N and what rises with the height, V = N + m (t q'' + t' q'^2), t' = dt/dq. Hence
+F = V t + f sqrt(1 + t^2): the work F dq is V dz, which is stored in the height of the load and the speed of what
+rises, and f ds, which is friction's own along the flank ds = sqrt(1 + t^2) dq. Coulomb's law holds f between -mu R and
+mu R, so F lies between V (t - mu)/(1 + mu t) and V (t + mu)/(1 - mu t) at rest and is one of them in motion. A flank
+with mu t >= 1 locks: no force moves the load over it.
+"""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+SMALL = 0.1  # mu t below which the series of the friction's work is used; the closed form loses digits there
+TERMS = 18  # of it: 0.1^18 is round-off
+
+
+@dataclass(frozen=True, slots=True)
+class Grooves:
+    """Grooves of a wavelength [m] and an amplitude [m], half peak to peak, whose bottom lies at q = phase/k, phase
+    [rad]; lifted_mass [kg] rises with the load; key: of their table in the scene."""
+
+    wavelength: float
+    amplitude: float
+    phase: float = 0.0
+    lifted_mass: float = 0.0
+    key: str = "normal.grooves"
+
+    @property
+    def wave(self) -> float:
+        """Wave number k = 2 pi/wavelength [rad/m]."""
+        return 2 * pi / self.wavelength
+
+    @property
+    def steepest(self) -> float:
+        """Largest slope A k of a flank [1]."""
+        return self.amplitude * self.wave
+
+    def height(self, q):
+        """Height z = A (1 - cos(k q - phase)) [m] at slides q [m], 0 at the bottom of a groove."""
+        return 2 * self.amplitude * np.sin(0.5 * (self.wave * np.asarray(q, float) - self.phase))**2
+
+    def slope(self, q):
+        """Slope t = A k sin(k q - phase) [1] at slides q [m]."""
+        return self.steepest * np.sin(self.wave * np.asarray(q, float) - self.phase)
+
+    def ratio(self, q, way, friction: float):
+        """Force against the slide over the vertical force, (t + way mu)/(1 - way mu t) [1], at slides q [m].
+
+        way: sign of the motion, 0 for a slide held by the flank alone; friction: coefficient mu [1].
+        """
+        t, part = self.slope(q), np.asarray(way) * friction
+        return (t + part) / (1 - part * t)
+
+    def stiffness(self, load: float) -> float:
+        """Stiffness N k^2 A [N/m] of small motions about the bottom under a load [N]."""
+        return load * self.wave**2 * self.amplitude
+
+    def capacity(self, load: float, friction: float) -> float:
+        """Largest force N (A k + mu)/(1 - mu A k) [N] that the steepest flank holds under a load [N]; infinite where it
+        locks."""
+        locks = friction * self.steepest >= 1
+        return float("inf") if locks else load * (self.steepest + friction) / (1 - friction * self.steepest)
+
+    def rise(self, q0, q1):
+        """Height gained from slides q0 to q1 [m]; it loses no digits where they are close."""
+        half, middle = 0.5 * self.wave * (q1 - q0), 0.5 * self.wave * (q1 + q0) - self.phase
+        return 2 * self.amplitude * np.sin(middle) * np.sin(half)
+
+    def lost(self, q0, q1, friction: float):
+        """Energy [J/N] per vertical force that Coulomb friction dissipates from slides q0 to q1 [m], any way: int mu
+        (1 + t^2)/(1 - way mu t) |dq|, in closed form."""
+        q0, q1 = np.asarray(q0, float), np.asarray(q1, float)
+        way = np.sign(q1 - q0)
+        turn, start, end = self.wave, self.wave * q0 - self.phase, self.wave * q1 - self.phase
+        span, c = end - start, way * friction
+        if friction * self.steepest < SMALL:
+            parts = _powers(start, end, TERMS + 2)
+            total = sum((c * self.steepest)**j * (parts[j] + self.steepest**2 * parts[j + 2]) for j in range(TERMS))
+            return c * total / turn
+        b = c * self.steepest
+        root = np.sqrt(1 - b * b)
+        whole = np.trunc(span / (2 * pi))
+        half = 0.5 * (span - 2 * pi * whole)
+        middle = 0.5 * (start + end) - pi * whole
+        arc = np.arctan2(root * np.sin(half), np.cos(half) - b * np.sin(middle))  # int d theta/(1 - b sin theta)
+        c = np.where(way == 0, 1.0, c)
+        total = -self.steepest * 2 * np.sin(0.5 * span) * np.sin(0.5 * (start + end)) / c - span / c**2 \
+            + (1 + 1 / c**2) * 2 / root * (arc + pi * whole)
+        return np.where(way == 0, 0.0, c * total / turn)
+
+    def least_mass(self, friction: float) -> float:
+        """Least of t (t - mu)/(1 + mu t) [1] on the flanks: the lifted mass times it, where it is below zero, is taken
+        from the mass that the interface moves."""
+        # its derivative is zero where mu t^2 + 2 t - mu = 0
+        flank = (np.sqrt(1 + friction**2) - 1) / friction if friction > 0 else 0.0
+        flank = min(flank, self.steepest)
+        return flank * (flank - friction) / (1 + friction * flank)
+
+
+def _powers(start, end, count: int) -> list:
+    """Integrals of sin^j over the angles from start to end (k,) [rad], j = 0 .. count - 1."""
+    out = [end - start, 2 * np.sin(0.5 * (end - start)) * np.sin(0.5 * (end + start))]
+    for j in range(2, count):
+        edge = np.cos(start) * np.sin(start)**(j - 1) - np.cos(end) * np.sin(end)**(j - 1)
+        out.append((edge + (j - 1) * out[j - 2]) / j)
+    return out

@@ -1,0 +1,77 @@
+"""Rules of [contact.grooves] and [normal.grooves]: flanks that do not lock, laws that act along them."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+from ...effects import carries, listed, named, refusal, unbuilt
+from .draft import Draft
+from .methods import changing_load, turning
+
+
+def check_grooves(draft: Draft, kind: str) -> None:
+    """Say every mistake of the grooves of a scene; silent where there are none."""
+    found = grooves_of(draft.tables)
+    if found is None:
+        return
+    at, grooves = found
+    law = draft.tables.friction
+    if kind not in ("bench", "rig"):
+        if kind:
+            draft.say(at, f"[{at}] is climbed by what slides: add [friction] and [slide], or [structure] with [drive]")
+        return
+    if law is None or law.law is None:
+        return
+    _locks(draft, at, grooves, law)
+    if kind == "bench" and grooves.lifted_mass:
+        draft.remark(f"{at}.lifted_mass has no meaning beside [slide], whose motion is slow, and is not used")
+    if grooves.amplitude:
+        _beside(draft, at, law)
+
+
+def grooves_of(tables: Any) -> tuple | None:
+    """(key of the table, the table) of the grooves of a scene, as far as it could be read; None without them."""
+    for name in ("contact", "normal"):
+        table = getattr(tables, name)
+        grooves = table and table.grooves
+        if grooves is not None:
+            return f"{name}.grooves", grooves
+    return None
+
+
+def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
+    """Friction on a flank as steep as 1/mu holds against any force along x."""
+    if grooves.wavelength is None or grooves.amplitude is None or law.static is None:
+        return
+    wave = 2 * pi / grooves.wavelength
+    if law.static * wave * grooves.amplitude >= 1:
+        most = 1 / (wave * law.static)
+        draft.say(f"{at}.amplitude", f"{grooves.amplitude:.6g} m makes flanks of slope {wave * grooves.amplitude:.6g}, "
+                  f"which lock with static = {law.static:g}: no force moves the load over them; an amplitude below "
+                  f"wavelength/(2 pi static) = {most:.6g} m is wanted, or a smaller static")
+
+
+def _beside(draft: Draft, at: str, law: Any) -> None:
+    """Grooves are climbed as a whole by one interface under a constant load."""
+    contact, structure = draft.tables.contact, draft.tables.structure
+    beside = f"beside [{at}]"
+    if listed(law) or not carries(law, "grooves"):
+        draft.say("friction.law", f"{named(law)} {beside}: {refusal('grooves')}")
+    if contact is not None and contact.gives_way:
+        draft.say(at, unbuilt(f"beside {contact.gives_way}", "either"))
+    if contact is not None and contact.strips is not None and turning(draft.tables):
+        draft.say(at, unbuilt("beside strips that yaw", "either"))
+    cause = changing_load(draft.tables)
+    if cause:
+        draft.say(cause, unbuilt(beside, "either"))
+    lower = [f"contact.{name}.on" for name, one in (contact.shapes if contact is not None else {}).items()
+             if one.on == "lower"]
+    if lower:
+        draft.say(lower[0], unbuilt(f"'lower' {beside}", "shapes"))
+    if structure is None:
+        return
+    if structure.stiffening is not None:
+        draft.say("structure.stiffening", unbuilt(beside, "either"))
+    if structure.bonded is not None and structure.bonded.wavelength is not None:
+        draft.say("structure.bonded.wavelength", unbuilt(beside, "either"))

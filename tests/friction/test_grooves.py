@@ -1,0 +1,45 @@
+"""Grooves that the load climbs: height, slope, limits and work by quadrature and by statics."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from patchfem.friction.grooves import Grooves
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-4, 0.05, 0.4, 1.2])
+@pytest.mark.parametrize("steep", [0.01, 0.8])
+def test_exact_friction_work_by_quadrature(mu, steep):
+    """Both branches of the closed form, over many waves and over a hundredth of one."""
+    rng = np.random.default_rng(1)
+    g = Grooves(80e-6, steep * 80e-6 / (2 * np.pi), rng.uniform(0, 6))
+    for q0, q1 in (*rng.uniform(-3e-4, 3e-4, (3, 2)), (1e-5, 1.1e-5), (1e-5, 1e-5)):
+        way, edges = np.sign(q1 - q0), np.linspace(q0, q1, 30)
+        true = sum(way * quad(lambda q, way=way: mu * (1 + g.slope(q)**2) / (1 - way * mu * g.slope(q)), a, b,
+                              epsabs=0, epsrel=1e-12)[0] for a, b in pairwise(edges))
+        assert g.lost(q0, q1, mu) == pytest.approx(true, rel=1e-9, abs=1e-22)
+        assert g.rise(q0, q1) == pytest.approx(g.height(q1) - g.height(q0), abs=1e-18)
+
+
+@pytest.mark.parametrize("way", [-1, 1])
+def test_exact_ratio_by_the_statics_of_the_flank(way):
+    """Normal force R and friction mu R on a flank of angle a carry V upwards and F along x: the angle of friction."""
+    g, q, mu = Grooves(80e-6, 7.5e-6, 0.7), np.linspace(-1e-4, 1e-4, 9), 0.35
+    angle = np.arctan(g.slope(q))
+    push = np.sin(angle) + way * mu * np.cos(angle)
+    carried = np.cos(angle) - way * mu * np.sin(angle)
+    np.testing.assert_allclose(g.ratio(q, way, mu), push / carried, rtol=1e-13)
+    np.testing.assert_allclose(g.ratio(q, way, mu), np.tan(angle + way * np.arctan(mu)), rtol=1e-12)
+
+
+def test_exact_slope_stiffness_and_capacity():
+    g, load, mu, d = Grooves(80e-6, 7.5e-6), 115.65, 0.4, 1e-10
+    q = np.linspace(0, 80e-6, 2001)
+    np.testing.assert_allclose(g.slope(q), (g.height(q + d) - g.height(q - d)) / (2 * d), atol=1e-5)
+    assert g.stiffness(load) == pytest.approx(load * (g.slope(d) - g.slope(-d)) / (2 * d), rel=1e-9)
+    assert g.capacity(load, mu) == pytest.approx(load * g.ratio(q, 1, mu).max(), rel=1e-6)
+    assert Grooves(80e-6, 7.5e-6).capacity(load, 2.0) == np.inf
+    t = g.slope(q)
+    assert g.least_mass(mu) == pytest.approx((t * (t - mu) / (1 + mu * t)).min(), rel=1e-5)

@@ -1,0 +1,181 @@
+"""Scenes with [normal.grooves] and [contact.grooves]: loops by their closed form, plans, refusals, nothing unasked."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.core import Outcome
+from patchfem.scene.scene import SceneError, loads
+
+GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
+BENCH = f"""
+[normal]
+load = "115 N"
+{GROOVES}
+[friction]
+law = "coulomb"
+static = 0.4
+[slide]
+kind = "triangle"
+amplitude = "30 um"
+speed = "1 mm/s"
+"""
+RIG = f"""
+[normal]
+load = "115 N"
+{GROOVES}
+[friction]
+law = "coulomb"
+static = 0.4
+[structure]
+moving_mass = "1.2 kg"
+mode = [{{name = "axial", frequency = "143 Hz", damping = 0.003, slide = 1.0}}]
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 30
+[accuracy]
+steps_per_cycle = 100
+"""
+WAVE = 2 * np.pi / 80e-6
+
+
+def flat(text):
+    return text.replace(GROOVES, "")
+
+
+def run(text, **keys):
+    return pf.run(loads(text, sets=[f"{key}={value}" for key, value in keys.items()]))
+
+
+def value(result, name):
+    return result.measures[name].value
+
+
+def area(load, mu, amplitude, reach):
+    """Loop of a slow slide between +-reach: N times the integral of the two limits' difference."""
+    q = np.linspace(-reach, reach, 200_001)
+    t = amplitude * WAVE * np.sin(WAVE * q)
+    return load * np.trapezoid((t + mu) / (1 - mu * t) - (t - mu) / (1 + mu * t), q)
+
+
+@pytest.mark.parametrize("reach", [30e-6, 200e-6])
+def test_exact_the_loop_of_a_slow_slide(reach):
+    found = run(BENCH, **{"slide.amplitude": f"{reach} m"})
+    assert value(found, "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, reach), rel=1e-9)
+    assert value(found, "energy_dissipated") == pytest.approx(value(found, "friction_work"), rel=1e-9)
+    assert value(found, "energy_balance") < 1e-12 and value(found, "work_check") < 1e-3
+    steep = 7.5e-6 * WAVE
+    assert value(found, "friction_force_peak") == pytest.approx(115 * (steep + 0.4) / (1 - 0.4 * steep), rel=1e-3)
+
+
+def test_exact_the_height_of_the_load_is_stored():
+    """From the bottom to the crest: N 2 A."""
+    found = run(BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "40 um"'))
+    assert value(found, "energy_stored") == pytest.approx(115 * 15e-6, rel=1e-12)
+    work, lost = value(found, "friction_work"), value(found, "energy_dissipated")
+    assert work - lost == pytest.approx(115 * 15e-6, rel=1e-9)
+
+
+def test_exact_a_slow_slide_of_a_force_that_follows_the_speed():
+    """Far above v_0 it is Coulomb's; far below v_0 it is a dashpot along the flank: c ds/dt with c = mu N/v_0."""
+    rate = BENCH.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 um/s"')
+    assert value(run(rate), "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, 30e-6), rel=1e-9)
+    slow = run(rate.replace('"1 um/s"', '"1000 m/s"'))
+    q = np.linspace(-30e-6, 30e-6, 20_001)
+    t = 7.5e-6 * WAVE * np.sin(WAVE * q)
+    dashpot = 115 * 0.4 / 1000 * 1e-3 * np.trapezoid(2 * (1 + t**2)**1.5, q)
+    assert value(slow, "loop_area") == pytest.approx(dashpot, rel=1e-6)
+
+
+def test_always_a_rig_keeps_its_books_and_says_its_vertical_force():
+    found = run(RIG, **{"normal.grooves.lifted_mass": "0.5 kg"})
+    assert found.outcome in (Outcome.STEADY, Outcome.TRANSIENT)
+    assert value(found, "energy_balance") < 1e-9 and value(found, "work_check") < 1e-3
+    assert value(found, "normal_load_least") < 115 < value(found, "normal_load_peak")
+    assert found.extra["engine"] == "march"
+
+
+def test_exact_a_patch_under_a_rigid_slide_is_the_point():
+    pieces = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6 mm"
+load = "115 N"
+substrate = "Ti-8Al-1Mo-1V"
+element_size = "1 mm"
+""" + GROOVES
+    point = f'[normal]\nload = "115 N"\n{GROOVES}'
+    for text, names in ((RIG, ("relative_displacement_amplitude", "loop_area")), (BENCH, ("loop_area",))):
+        there, here = (run(one, **{"accuracy.steps_per_cycle": "40"}) for one in (text.replace(point, pieces), text))
+        for name in names:
+            assert value(there, name) == pytest.approx(value(here, name), rel=1e-8)
+
+
+@pytest.mark.parametrize("text", [BENCH, RIG])
+def test_exact_flat_grooves_are_the_law_itself(text):
+    """Amplitude 0 gives every number of the scene without grooves."""
+    there, here = run(text, **{"normal.grooves.amplitude": "0 um"}), run(flat(text))
+    assert {name: one.value for name, one in there.measures.items()} == \
+        {name: one.value for name, one in here.measures.items()}
+
+
+def test_exact_the_plan_prints_stiffness_and_capacity():
+    found = pf.plan(loads(RIG))
+    assert found.chain["grooves"] == pytest.approx(115 * WAVE**2 * 7.5e-6)
+    steep = WAVE * 7.5e-6
+    said = next(line for line in found.verdict if "grooves" in line)
+    assert f"{115 * (steep + 0.4) / (1 - 0.4 * steep):.4g} N" in said and "mu N = 46 N" in said
+    assert found.engine == "march"
+
+
+@pytest.mark.parametrize(("text", "sets", "key", "words"), [
+    (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "which lock with static = 2"),
+    (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is wanted"),
+    (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists beside [normal.grooves]"),
+    (RIG, ["accuracy.method=harmonic"], "accuracy.method", "beside [normal.grooves]"),
+    (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
+    (RIG, ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
+     "friction.law", "beside [normal.grooves]: use law 'coulomb'"),
+    (RIG, ["normal.amplitude=10 N", "normal.frequency=50 Hz"], "normal.amplitude", "beside [normal.grooves]"),
+    (RIG, ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"], "structure.bonded.wavelength",
+     "beside [normal.grooves]"),
+    (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"], "wear", "beside [normal.grooves]"),
+    (BENCH, ["normal.grooves.amplitude=-1 um"], "normal.grooves.amplitude", ""),
+])
+def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):
+    with pytest.raises(SceneError) as told:
+        loads(text, sets=sets)
+    assert any(f" {key}: " in line and words in line for line in told.value.mistakes), told.value.mistakes
+
+
+def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
+    patch = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6 mm"
+load = "115 N"
+substrate = "Ti-8Al-1Mo-1V"
+""" + GROOVES
+    with pytest.raises(SceneError, match=r"contact\.grooves: .*climbed by what slides"):
+        loads(patch)
+    with pytest.raises(SceneError, match=r"contact\.grooves: beside \[contact\.shear\]"):
+        loads(BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]"))
+
+
+def test_always_a_lifted_mass_of_a_bench_is_remarked():
+    assert any("lifted_mass has no meaning" in one
+               for one in loads(BENCH, sets=["normal.grooves.lifted_mass=1 kg"]).remarks)
+
+
+def test_always_nothing_of_grooves_is_imported_unasked():
+    code = "import patchfem as pf, sys\nfrom patchfem.scene.scene import loads\npf.run(loads('''" + flat(BENCH) + \
+        "'''))\nprint([m for m in sys.modules if 'grooves' in m and 'rules' not in m])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
