@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem import closed_forms
 from patchfem.response import loops
@@ -16,26 +17,7 @@ from patchfem.scene.scene import loads
 
 OMEGA = 2 * pi * 143
 PERIOD = 2 * pi / OMEGA
-BLOCK = """\
-[normal]
-load = "26 lbf"
-[friction]
-law = "coulomb"
-static = 0.3
-{more}
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "{drive}"
-cycles = {cycles}
-"""
+BLOCK = POINT + COULOMB + "{more}\n" + MODE + DRIVE.replace('"5 g"', '"{drive}"').replace("30", "{cycles}")
 
 
 def evenly(count, steps):

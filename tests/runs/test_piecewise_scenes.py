@@ -4,41 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.scene_texts import COATED, COULOMB, DRIVE, KILOGRAM, MODE, PLASTIC, POINT, SECOND, SHEAR, only
+from support.scene_texts import (
+    COATED,
+    COULOMB,
+    DRIVE,
+    FORCED,
+    KILOGRAM,
+    MODE,
+    PAIR,
+    PLASTIC,
+    POINT,
+    SECOND,
+    SHEAR,
+    SWEEP,
+    only,
+)
 
 import patchfem as pf
 from patchfem.effects import LAWS
 
 IWAN = '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5\n'
 RIG = POINT + PLASTIC + MODE + DRIVE
-PAIR = """\
-[structure]
-masses = ["1 kg", "0.7 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "4e5 N/m"
-[[structure.spring]]
-between = [2, 1]
-stiffness = "2e5 N/m"
-[[structure.damper]]
-between = [2, 0]
-coefficient = "40 N s/m"
-[[structure.interface]]
-between = [1, 0]
-law = "elastic-plastic"
-static = 0.3
-bond_length = "5 um"
-load = "60 N"
-[[structure.interface]]
-between = [2, 1]
-law = "elastic-plastic"
-static = 0.2
-bond_length = "20 um"
-load = "40 N"
-"""
-FORCED = '[drive]\nkind = "force"\nmass = 2\nforce = "30 N"\nfrequency = "90 Hz"\ncycles = 25\n'
-SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n' \
-        'rate = "80 Hz/s"\n'
 ROUND = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")  # of the same size as round-off
 
 

@@ -2,31 +2,12 @@
 
 import numpy as np
 import pytest
+from scene_texts import DRIVE, MODE, NONLOCAL, POINT
 
 import patchfem as pf
 from patchfem.runs.rig.numerics import choose
 
-SCENE = """
-[normal]
-load = "26 lbf"
-[friction]
-law = "nonlocal"
-static = 0.3
-bond_length = "5 um"
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-waveform = "sine"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 30
-"""
+SCENE = POINT + NONLOCAL.replace("1 um", "5 um") + MODE + DRIVE.replace("frequency", 'waveform = "sine"\nfrequency')
 GROWTH = 'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
 LENGTH = 'bond_length = "5 um"'
 SLIP = ("slip_start_phase", "stick_fraction")

@@ -2,48 +2,13 @@
 
 import numpy as np
 import pytest
+from scene_texts import COULOMB, DRIVE, MODE, PATCH, POINT, SECOND
 
 from patchfem.api import load
 from patchfem.scene.changed import Base
 from patchfem.scene.scene import SceneError, loads, with_files
 
-RIG = """
-[normal]
-load = "100 N"
-[friction]
-law = "coulomb"
-static = 0.3
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[[structure.mode]]
-name = "second"
-frequency = "400 Hz"
-damping = 0.01
-slide = 0.1
-[drive]
-kind = "base"
-frequency = "140 Hz"
-acceleration = "5 g"
-cycles = 200
-"""
-PATCH = """
-[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.coating]
-material = "WC-Co"
-thickness = "6 mil"
-[contact.tilt]
-angle = "0.1 mrad"
-"""
+RIG = POINT + COULOMB + MODE + SECOND + DRIVE
 CHANGES = [  # scene, strings as --set takes them
     (RIG, ["normal.load=101 N"]), (RIG, ["normal.load=0 N", "normal.load=3 lbf"]), (RIG, []),
     (RIG, ["structure.mode.second.damping=0.02"]), (RIG, ["structure.mode.1.damping=0.02"]),

@@ -38,6 +38,36 @@ slide = 1.0
 KILOGRAM = MODE.replace("0.884 kg", "1 kg")
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
 
+# two masses, an elastic-plastic interface between the first and the base, one between them
+PAIR = """\
+[structure]
+masses = ["1 kg", "0.7 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "4e5 N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "2e5 N/m"
+[[structure.damper]]
+between = [2, 0]
+coefficient = "40 N s/m"
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "5 um"
+load = "60 N"
+[[structure.interface]]
+between = [2, 1]
+law = "elastic-plastic"
+static = 0.2
+bond_length = "20 um"
+load = "40 N"
+"""
+FORCED = '[drive]\nkind = "force"\nmass = 2\nforce = "30 N"\nfrequency = "90 Hz"\ncycles = 25\n'
+SWEEP = '[drive]\nkind = "base"\nwaveform = "sweep"\nacceleration = "3 g"\nfrom = "120 Hz"\nto = "150 Hz"\n' \
+        'rate = "80 Hz/s"\n'
+
 # whole scenes
 BENCH = POINT + COULOMB + SLIDE
 SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'

@@ -2,30 +2,15 @@
 
 import numpy as np
 import pytest
+from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.lumped import lumped
 from patchfem.scene.sets import assignments
 
-SCENE = """
-[normal]
-load = "30 N"
-[friction]
-{law}
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "{kind}"
-{kind_size}
-frequency = "140 Hz"
-cycles = 40
-"""
+DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
+SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + DRIVE
 LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2'}
 SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
 DIFFERENCES = ("drift_per_cycle", "energy_balance", "work_check")  # of larger terms: known to their round-off
