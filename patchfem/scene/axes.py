@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -222,8 +221,6 @@ def _value(key: str, text: str) -> float | str:
         for error in caught.errors(include_url=False):
             if error["loc"][0] == alias and error["type"] not in ("missing", *LIMITS):
                 raise ValueError(_message(model, name, error, given)) from None
-    if number and not math.isfinite(given):
-        raise ValueError(f"'{text}' is not a finite number")
     return float(given) if number else text
 
 
@@ -254,7 +251,7 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
     first, last, unit = _ends(key, low, high)
     number = int(count) if count else 0
     if not 2 <= number <= MOST:
-        raise ValueError(f"{low}..{high}: the number of values is wanted behind a colon, from 2 on, such as :9")
+        raise ValueError(f"{low}..{high}: the number of values is wanted behind a colon, from 2 to {MOST}, such as :9")
     if first == last:
         raise ValueError(f"{low}..{high}: both ends are the same value")
     log = _is_log(first, last, how)

@@ -200,3 +200,21 @@ def test_exact_bars_of_what_is_an_error_itself_have_no_share_of_its_floor(name):
     """A balance of 2e-13 is told as such, not as 2e-13 +- 1e-9."""
     runs = [{"relative_displacement_amplitude": 1.0 + gap, name: 1e-13 * (2 + gap)} for gap in (0.0, 1e-6, 5e-6)]
     assert step_error(*runs, 400)[name] < 1e-12 and tolerance_error(*runs[:2])[name] < 1e-12
+
+
+def test_exact_what_counts_samples_is_open_by_some_of_them():
+    """Runs that agree to the last digit: a share of time still hangs on four samples of a cycle."""
+    same = {"open_fraction": 0.25, NAME: 1.0}
+    assert step_error(same, same, same, 400) == {"open_fraction": pytest.approx(4 / 400), NAME: 0.0}
+
+
+def test_exact_a_bar_knows_what_kind_of_number_it_belongs_to():
+    """Error of the parts and a share of the value; a phase modulo pi is at most a quarter turn off; a balance is 0 but
+    for its error; a drift is a difference of means with digits of the amplitude."""
+    values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
+    parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
+    found = {name: one.error for name, one in with_errors(values, parts, least=1e-9).items()}
+    assert found == {NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12), "slip_start_phase": np.pi / 2,
+                     "energy_balance": 4e-9, "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9)}
+    least = with_errors(values, parts)["drift_per_cycle"].error
+    assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import COULOMB, DRIVE, MODE, PATCH, POINT, SECOND
+from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PATCH, POINT, SECOND
 
 from patchfem.api import load
 from patchfem.scene.changed import Base
@@ -51,6 +51,14 @@ def test_exact_changed_scene_of_one_that_has_sets_already():
     assert told(lambda: base.changed(["structure.mode.second.damping=0.2"])) == own
     assert told(lambda: base.changed(["normal.load=-2 N"])) == \
         told(lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N")))  # a mistake at a key set before
+
+
+def test_exact_a_mistake_knows_that_its_key_was_set_when_its_table_was_read_before():
+    text = RIG.replace(COULOMB, NONLOCAL)
+    base = Base(loads(text, "scene.toml"))
+    base.changed(["friction.spread=1 um", "normal.width=1 mm"])
+    own = told(lambda: loads(text, "scene.toml", ["friction.spread=1 um"]))
+    assert own[0] == "refused" and told(lambda: base.changed(["friction.spread=1 um"])) == own
 
 
 def test_always_a_change_leaves_the_scene_and_later_changes_alone():
