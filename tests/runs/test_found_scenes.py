@@ -46,6 +46,8 @@ DRAWN = [  # random scene, measure, truth of the independent program, half a uni
     (7062, "slip_start_phase", 2.089609, 5e-7),
     (5046, "relative_displacement_amplitude", 8.20190559e-6, 5e-15),  # 768 cells for the density of Iwan's law
     (5046, "equivalent_stiffness", -74645.1102, 5e-5),
+    (9256, "relative_displacement_amplitude", 6.689247147339e-5, 5e-18),  # the rise at v_s lay between the stages
+    (9256, "equivalent_stiffness", 4188.7310127, 5e-8),
 ]
 
 

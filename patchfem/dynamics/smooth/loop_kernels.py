@@ -269,6 +269,12 @@ def advance(m, k, until, edge, tolerance, travel):
             if other == NOTHING:
                 break
             what = other
+        if what != NOTHING:  # the stages of the step that was tried may have passed by what bends beside its end
+            error = steps.missed(m, taken, tolerance)
+            if error > 1:
+                m.now[steps.STEP] = taken * max(0.9 * error**-0.125, SLOWER)
+                k.tally[watching.REFUSED] += 1
+                continue
         watching.watch(m, taken, k)
         accept(m, taken, k)
         if whole and taken == room:

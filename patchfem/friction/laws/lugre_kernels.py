@@ -8,11 +8,12 @@ from math import exp, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import shape
-from ..flags_kernels import LEAN, closed, knee, middle
+from ..flags_kernels import LEAN, closed, middle
 
 __all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
 
 
+FADED = 6.0  # times v_s: beyond it the limit is the kinetic one to the last digit, e^-36
 TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0
 
 
@@ -94,6 +95,12 @@ def flow(num, e, z, dq, dt):
     """(z [m] after a slide dq [m] in dt [s] from the stretch z [m], its slopes over z, dq [1] and dt [m/s])."""
     after, _, by_slide, _, kept, by_time = relaxed(num, e, z, dq, dt)
     return after, kept, by_slide, by_time
+
+
+@njit(error_model="numpy", **LEAN)
+def knee(num):
+    """Speed [m/s] below which the limit rises: no step from beyond it sees the rise inside itself."""
+    return FADED * num[0, 4] if num[0, 3] > num[0, 2] else 0.0
 
 
 @njit(error_model="numpy", **LEAN)
