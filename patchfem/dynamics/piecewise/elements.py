@@ -121,6 +121,11 @@ def virgin(table: Table, slide) -> Memory:
                   np.zeros((faces, wide + 1)), *zero[1:])
 
 
+def books_begin(memory: Memory) -> Memory:
+    """The same stretches with no work counted yet: for a run that begins here."""
+    return memory._replace(worked=np.zeros_like(memory.worked), lost=np.zeros_like(memory.lost))
+
+
 def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
     """Stretch (a,) [m] of every element as given to `elements_of`, of the interface `face`; 0 where it carries
     nothing."""

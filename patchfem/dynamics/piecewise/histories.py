@@ -114,6 +114,8 @@ class _Run:
         self.before, self.outcome, self.snapshots = np.zeros(len(self.groups)), None, []
         self.passed = False
         self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
+        still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, self.memory)
+        self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))  # [J] from before the books began
 
     def until(self, cycles: float, whole: bool, progress=None) -> list:
         """Rows up to a time in cycles: all of them, or where not `whole` only turning points and slips."""
@@ -254,7 +256,7 @@ class _Run:
         accel = -np.outer(push, modes.base) - v @ self.plant.damping.T - z * self.plant.square \
             - forces @ self.plant.faces / modes.mass
         work, lost = works.sum(axis=1), losses.sum(axis=1)
-        extra = {"ledger": np.stack([work, work - lost, lost, 0 * lost])}
+        extra = {"ledger": np.stack([work, self.stretched + work - lost, lost, 0 * lost])}
         if len(self.groups) > 1:
             extra |= {"slides": slides, "slide_rates": rates, "forces": forces, "slips": slips}
         return Response(time, z, v, *(part[:, 0].copy() for part in (slides, rates)), z @ modes.output,

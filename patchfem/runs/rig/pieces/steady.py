@@ -11,6 +11,7 @@ import numpy as np
 
 from ....core import Outcome
 from ....dynamics.piecewise import histories
+from ....dynamics.piecewise.elements import books_begin
 from ....dynamics.piecewise.steady import steady
 from ..solution import drives_of, largest_of
 from .run import Interfaces, solution_of
@@ -30,7 +31,7 @@ class Yields:
         begin = perf_counter()
         one = steady(self.modes, drive, self.found.groups, near)
         done = histories.simulate(self.modes, drive, self.found.groups, 2.0, 1, np.inf, self.frames, None, one.start,
-                                  one.memory)
+                                  books_begin(one.memory))
         few = replace(self.numerics, cycles=2.0, window=1)
         raw = solution_of(self.model, few, self.patch, drive, self.found, done, perf_counter() - begin)
         stable = np.abs(one.multipliers).max(initial=0.0) <= 1
