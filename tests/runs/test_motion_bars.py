@@ -1,6 +1,6 @@
 """Do the bars of a motion hold? Random rigs of every law, drive and structure against the truth of `motion_bars`.
 
-`python tests/support/motion_bars.py 5000 300 FILE` is the whole campaign, tests/README.md has its result.
+`python tests/support/motion_bars.py 9300 300 FILE` is the whole campaign, tests/README.md has its result.
 """
 
 import numpy as np

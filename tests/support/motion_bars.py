@@ -13,7 +13,7 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
-from motion_read import measures
+from motion_read import measures, works
 from motion_reference import Motion, TooLong
 from motion_scenes import spec, written
 from motion_steady import periodic
@@ -50,7 +50,7 @@ def truth_of(s: dict, path, result) -> tuple:
     model = build(load(path))
     if referable(s):
         try:
-            return _steady(s, model) if s.get("method") == "harmonic" else _moved(s, model)
+            return _steady(s, model, cycles_kept(model, result)) if s.get("method") == "harmonic" else _moved(s, model)
         except TooLong:
             pass
     return _finer(s, path, model, result.extra)
@@ -66,28 +66,54 @@ def _moved(s: dict, model) -> tuple:
     return runs[-1], doubts(*runs), "reference"
 
 
-def _steady(s: dict, model) -> tuple:
-    """Truth of a steady motion by the independent program: its periodic state, or a run that has settled."""
+def cycles_kept(model, result) -> int:
+    """Cycles that a steady motion keeps, over which its works are told."""
+    time = result.response.time
+    return round(float(time[-1] - time[0]) / model.rig.drive.period)
+
+
+def _steady(s: dict, model, kept: int) -> tuple:
+    """Truth of a steady motion by the independent program: its periodic state, or a run that has settled.
+
+    kept: cycles over which the works are told.
+    """
     period, motion = model.rig.drive.period, Motion(s)
     start = periodic(motion, period)
     if start is not None:
-        return measures(motion, motion.run(period, 1e-11, start), period, 1.0, 1), {}, "reference"
+        stretches = motion.run(kept * period, 1e-11, start)
+        return measures(motion, stretches, period, kept, 1) | works(motion, stretches, 0.0, kept * period), {}, \
+            "reference"
     motion = Motion(s)
     each = 25 * max(1.0, motion.plant.fastest / s["frequency"])
-    cycles = next((k for k in (320, 160, 80) if k * each < MOST_STEPS), 40)
+    cycles, runs = next((k for k in (320, 160, 80) if k * each < MOST_STEPS), 40), []
     stretches = motion.run(cycles * period, 1e-10, most=MOST_STEPS)
-    runs = [measures(motion, stretches, period, cycles, 1)]
-    before = Motion(s)
-    runs.append(measures(before, before.run(cycles / 2 * period, 1e-10), period, cycles / 2, 1))
-    whole = {"friction_work", "energy_dissipated"}  # of all cycles here, of one in a balance
-    return {name: v for name, v in runs[0].items() if name not in whole}, doubts(*runs[::-1]), "reference"
+    for count in (cycles // 4, cycles // 2, cycles - 3, cycles - 2, cycles - 1, cycles):
+        end = count * period
+        runs.append(measures(motion, stretches, period, count, 1) | works(motion, stretches, end - kept * period, end))
+    last = runs[-1]
+    open_ = [unsettled(*runs[:2], last), *(change(last, one) for one in runs[2:-1])]  # what swings from cycle to cycle
+    return last, doubts(last) | {name: max(one.get(name, 0.0) for one in open_) for name in last}, "reference"
+
+
+def unsettled(quarter: dict, half: dict, whole: dict) -> dict:
+    """What is left of a decay after a run, by name, from its values after a quarter, half and all of it: with r the
+    decay over a quarter, two changes are as r (1 + r), and r^2/(1 - r^2) of the last one is left."""
+    out, early = change(whole, half), change(half, quarter)
+    for name, last in out.items():
+        rate = min((np.sqrt(1 + 4 * last / max(early.get(name, last), 1e-300)) - 1) / 2, 0.99)
+        out[name] = last * max(1.0, 2 * rate**2 / (1 - rate**2))
+    return out
 
 
 def _finer(s: dict, path, model, extra: dict) -> tuple:
     """Truth by the program itself: elements from yield to yield where it marched, else many more steps."""
     sets = [f"accuracy.tolerance={model.accuracy.tolerance / 10:g}"]
+    if extra.get("map") == "yields":  # its density in more cells
+        return _values(load(path, sets)), {}, "cells"
     if s.get("method") == "harmonic":
-        return _values(load(path, [*sets, "accuracy.harmonics=129"])), {}, "harmonics"
+        found = run(load(path, [*sets, "accuracy.harmonics=129"])).measures
+        known = {name: m for name, m in found.items() if m.value is not None}
+        return {k: m.value for k, m in known.items()}, {k: m.error or 0.0 for k, m in known.items()}, "harmonics"
     if extra["engine"] == "march" and not no_pieces(model):
         return _values(load(path, [*sets, "accuracy.method=exact"])), {}, "pieces"
     steps = extra.get("steps_per_cycle") or 400

@@ -28,7 +28,7 @@ class Law:
         return [self.mode * v]
 
     def turned(self, k: int, s, v, accel: float):
-        self.mode = -self.mode if accel * self.mode <= 0 else self.mode
+        self.mode = -self.mode  # its speed is beyond zero at the next look, whatever round-off says of its gain
         return s
 
     def scale(self) -> float:
@@ -236,9 +236,9 @@ class Iwan(Law):
 
     def turned(self, k, s, v, accel):
         if k == 0:
-            if accel * self.mode <= 0:
+            if len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top:  # a start to the other side is no turn
                 self.turns.append((float(s[0]), float(self.force(s, v, 0.0)), float(self.reversible(s))))
-                self.mode = -self.mode
+            self.mode = -self.mode
             return s
         self.turns = self.turns[:-2] if len(self.turns) > 2 else self.turns[:1]
         return s
@@ -277,9 +277,8 @@ class Report(Law):
         return 0.0
 
     def turned(self, k, s, v, accel):
-        if accel * self.mode <= 0:
-            turns, old = [*self.turns, (float(s[1]), float(s[0]))], s[1] - 60 * self.keys["bond_length"]
-            self.turns, self.mode = [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:], -self.mode
+        turns, old = [*self.turns, (float(s[1]), float(s[0]))], s[1] - 60 * self.keys["bond_length"]
+        self.turns, self.mode = [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:], -self.mode
         return s
 
 

@@ -114,16 +114,29 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
         out["drift_per_cycle"] = (means[1] - means[0]) / (window - 1)
     else:
         out["drift_per_cycle"] = w.q[-1, 0] - w.q[0, 0]
-    if len(motion.laws) == 1:
-        out["friction_work"] = float(w.y[-1, -1])
-        stored = motion.laws[0].energy(w.y[-1, motion.parts[0]])
-        if motion.laws[0].set_valued or s["law"] == "tanh":
-            stored = 0.0
-        if stored is not None:
-            out["energy_dissipated"] = out["friction_work"] - stored
+    out |= works(motion, stretches, 0.0, end)
     if sine:
         out |= _periodic(w, motion, period, window)
     return out
+
+
+def works(motion: Motion, stretches, begin: float, end: float) -> dict:
+    """Work that a single interface takes between two times [s], and what of it is lost; the latter where the law knows
+    what it stores."""
+    if len(motion.laws) > 1:
+        return {}
+    law, (first, last) = motion.laws[0], (at(stretches, t) for t in (begin, end))
+    out = {"friction_work": float(last[-1] - first[-1])}
+    if law.set_valued or motion.s["law"] == "tanh":
+        return out | {"energy_dissipated": out["friction_work"]}
+    stored = [law.energy(y[motion.parts[0]]) for y in (first, last)]
+    return out if None in stored else out | {"energy_dissipated": out["friction_work"] - stored[1] + stored[0]}
+
+
+def at(stretches, time: float) -> np.ndarray:
+    """State at a time [s]."""
+    one = next((one for one in stretches if one.times[-1] >= time), stretches[-1])
+    return one.solution(max(time, one.times[0]))
 
 
 def _stuck(w: Window, law, k: int) -> tuple:
@@ -158,15 +171,36 @@ def _stuck(w: Window, law, k: int) -> tuple:
     return below / (w.end - w.begin), np.array(starts)
 
 
-def _secant(w: Window, motion: Motion, period: float, window: int) -> float:
+def _secant(w: Window, motion: Motion, period: float, window: int) -> float | None:
     """Force at the largest slide of a cycle less that at the smallest over their distance, the mean over the cycles; of
-    laws whose force does not jump."""
+    laws whose force does not jump. None where a cycle ends before the slide turns."""
     out = []
     for c in range(window):
         mine = np.flatnonzero((w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period))
-        low, high = mine[np.argmin(w.q[mine, 0])], mine[np.argmax(w.q[mine, 0])]
-        out.append((w.f[high, 0] - w.f[low, 0]) / (w.q[high, 0] - w.q[low, 0]))
+        ends = [_turn(w, motion, mine[np.argmax(sign * w.q[mine, 0])]) for sign in (-1, 1)]
+        if None in ends:
+            return None
+        low, high = ends
+        out.append((high[1] - low[1]) / (high[0] - low[0]))
     return float(np.mean(out))
+
+
+def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
+    """(slide, force) where the slide turns beside the node k; None where it does not."""
+    each, face = NODES.size + 2, motion.plant.faces[0]
+    if w.v[k, 0] == 0:
+        return w.q[k, 0], w.f[k, 0]
+    for low in (k - 1, k):
+        if low < 0 or low // each != (low + 1) // each or w.v[low, 0] * w.v[low + 1, 0] >= 0:
+            continue
+        one, t = w.parts[low // each]
+        w.restore(one)
+        turn = brentq(lambda x, one=one: face @ one.solution(x)[motion.n:2 * motion.n], t[low % each],
+                      t[low % each + 1], xtol=1e-16)
+        y = one.solution(turn)
+        return face @ y[:motion.n], motion.forces(turn, y)[0]
+    rest = 1e-9 * np.abs(w.v[:, 0]).max()  # an event of a turn lies at a node
+    return (w.q[k, 0], w.f[k, 0]) if abs(w.v[k, 0]) <= rest else None
 
 
 def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
@@ -181,8 +215,9 @@ def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
     if np.ptp(q) == 0:
         return out
     out["equivalent_stiffness"] = float((part(f) / first).real)
-    if not motion.laws[0].set_valued and motion.s["law"] != "tanh":  # its force changes by much where the slide turns
-        out["secant_stiffness"] = _secant(w, motion, period, window)
+    if not motion.laws[0].set_valued:
+        secant = _secant(w, motion, period, window)
+        out |= {} if secant is None else {"secant_stiffness": secant}
     if motion.plant.first > 0:
         each, face = [], motion.plant.faces[0]
         for c in range(window):

@@ -110,7 +110,7 @@ def stretched(motion, t: float, y, stop: float, guards, rtol: float, atol) -> tu
         parts.append(part)
         for at in np.linspace(begin, solver.t, LOOKS + 1)[1:]:
             after = np.array([guard[2](at, part(at)) for guard in guards])
-            fell = np.flatnonzero((before >= 0) & (after <= 0))
+            fell = np.flatnonzero((before > 0) & (after <= 0) | (before == 0) & (after < 0))
             if fell.size:
                 roots = [brentq(lambda x, g=guards[k][2], y=part: g(x, y(x)), begin, at, xtol=4e-16, rtol=4e-15)
                          if before[k] > 0 else begin for k in fell]
@@ -226,8 +226,8 @@ class Motion:
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
             way = 30 * self.share * min(law.scale() for law in self.laws)  # |v| h + |a| h^2/2
             out = min(out, 2 * way / (speed + np.sqrt(speed**2 + 2 * gain * way)))
-        elif self.s["law"] == "tanh":
-            unit = self.s["keys"]["reference_speed"]
+        if self.s["law"] in ("tanh", "lugre"):
+            unit = self.s["keys"]["reference_speed" if self.s["law"] == "tanh" else "stribeck_speed"]
             out = min(out, max(speed - 5 * unit, 12 * self.share * unit) / gain)
         return out
 
