@@ -245,7 +245,8 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
 def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     out = tmp_path / "swept"
     over = ("--over", "friction.static=-1,0.1")
-    assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 3
+    assert cli("sweep", scene, *over, "-o", out).code == 3  # summaries are no results folders: --resume makes those
+    assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "results").code == 3
     bad, good = rows(out)
     assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {one.name for one in
                                                                    (out / "cases" / good["case"]).iterdir()}

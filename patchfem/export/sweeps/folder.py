@@ -117,15 +117,18 @@ class Folder:
         except OSError as error:
             raise Missing(f"{self.shown}: a case cannot be written ({error.strerror}); what is whole is kept") from None
 
-    def answers(self, numbers: Iterable[int]) -> tuple[list[int], Answers]:
-        """(numbers, Answers) of the cases whose summary is there and can be read."""
+    def answers(self, numbers: Iterable[int], whole: bool = False) -> tuple[list[int], Answers]:
+        """(numbers, Answers) of the cases whose summary is there and can be read; whole: of those alone that have their
+        results folder, or failed."""
         read = []
         for number in numbers:
+            place = self.target / CASES / self.keys[number]
             try:
-                text = (self.target / CASES / self.keys[number] / SUMMARY).read_text(encoding="utf-8")
-                read.append((number, json.loads(text)))
+                one = json.loads((place / SUMMARY).read_text(encoding="utf-8"))
             except (OSError, ValueError):
                 continue
+            if not whole or one["outcome"] == FAILED or (place / "scene.resolved.toml").is_file():
+                read.append((number, one))
         found = Answers.blank(len(read))
         for case, (_, one) in enumerate(read):
             _read(found, case, one)

@@ -21,8 +21,8 @@ from .tables import contents, write_csv
 class Place:
     """Where a sweep is kept, and how.
 
-    resume: answers that are there are taken as they are; whole: the results folder of each case is kept; shard: (i, n)
-    to answer the i-th of n parts only, into a folder that the parts share.
+    resume: answers that are there are taken as they are; whole: the results folder of each case is kept, and one that
+    is not there is no answer; shard: (i, n) to answer the i-th of n parts only, into a folder that the parts share.
     """
 
     target: Path
@@ -43,7 +43,7 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         wanted = _part(len(cases), place.shard)
         total, there = Answers.blank(len(cases)), []
         if place.resume or place.shard is not None:
-            there, found = folder.answers(sorted(set(folder.there()) & set(wanted)))
+            there, found = folder.answers(sorted(set(folder.there()) & set(wanted)), place.whole)
             total.place(there, found)
         done = len(there)
         if told is not None:
