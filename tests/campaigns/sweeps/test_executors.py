@@ -43,6 +43,7 @@ def all_of(asked: Work, executor) -> tuple:
 
 def same(found: Answers, want: Answers, cases) -> None:
     at = list(cases)
+    assert found.values.keys() == want.values.keys() >= {"loop_area"}
     assert found.outcome[at].tolist() == want.outcome[at].tolist()
     for name in want.values:
         np.testing.assert_array_equal(found.values[name][at], want.values[name][at])

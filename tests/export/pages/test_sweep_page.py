@@ -70,10 +70,22 @@ def test_always_many_cases_are_thinned_and_it_is_said(table):
         one["values"], one["texts"] = np.arange(many, dtype=float), [f"{value} N" for value in range(many)]
     for one in table["measures"].values():
         one["values"] = one["errors"] = np.linspace(1e-5, 2e-5, many)
-    table |= {"outcome": ["steady"] * many, "messages": {}, "grid": False, "folders": None}
+    table |= {"outcome": ["steady" if case % 3 else "grows" for case in range(many)], "messages": {}, "grid": False,
+              "folders": [f"cases/{case}" for case in range(many)]}
     text = page(table)
     assert len(text.encode()) < 3e6 + 40 * 20_000 * 3 and "Drawn are 20000 of 50000 cases" in text
-    assert len(data_of(text)["outcome"]) == 20_000
+    data = data_of(text)
+    cases = [int(value) for value in data["keys"][0]["values"]]
+    assert len(set(cases)) == 20_000 and (cases[0], cases[-1]) == (0, many - 1)
+    assert data["outcome"] == ["steady" if case % 3 else "grows" for case in cases]
+    assert data["links"] == [f"cases/{case}" for case in cases]
+
+
+def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(table):
+    load = table["keys"][1]
+    load["texts"] = ["10 N" if value == 10 else f"{value / 1e3:g} kN" for value in load["values"]]
+    shown = data_of(page(table))["keys"][1]
+    assert shown["unit"] == "N" and shown["values"] == load["values"].tolist()
 
 
 @pytest.mark.parametrize("text, shown", [("3.16227766016838e-06 rad", "3.16228e-06 rad"), ("26 lbf", "26 lbf"),
