@@ -85,11 +85,11 @@ EFFECTS = {
                               "joints varying-load harmonic comparison grooves", "memoryless creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = mu N v/eps, |F| <= mu N (3.12 with its "
                                          "reversal)", ("bond_length", ""),
-                                         "shear joints varying-load harmonic comparison pieces", "timeless"),
+                                         "shear joints varying-load harmonic comparison pieces grooves", "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
                                    "initial_bonds breakaway spread temperature"),
-                                  "shear joints varying-load harmonic two-directions", "bonds"),
+                                  "shear joints varying-load harmonic two-directions grooves", "bonds"),
     "friction.law=convolution": _law("laws.convolution", "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds "
                                      "(Oden, Pires)", ("bond_length", "order spread"), "exact",
                                      "averaged set-valued timeless memoryless"),

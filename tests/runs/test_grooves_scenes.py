@@ -92,6 +92,21 @@ def test_exact_a_slow_slide_of_a_force_that_follows_the_speed():
     assert value(slow, "loop_area") == pytest.approx(dashpot, rel=1e-6)
 
 
+@pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
+def test_always_a_law_with_memory_acts_along_the_flank(law):
+    """Books close; with bonds far shorter than the flank the loop of a slow slide is Coulomb's."""
+    def text(of, length):
+        return of.replace('law = "coulomb"', f'law = "{law}"\nbond_length = "{length}"')
+
+    found = run(text(BENCH, "0.1 um"), **{"accuracy.steps_per_cycle": "4000"})
+    assert value(found, "energy_balance") < 1e-10 and value(found, "work_check") < 1e-3
+    assert value(found, "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, 30e-6), rel=0.01)
+    assert value(found, "friction_work") - value(found, "energy_stored") == \
+        pytest.approx(value(found, "energy_dissipated"), rel=1e-9)
+    found = run(text(RIG, "1 um"), **{"normal.grooves.lifted_mass": "0.3 kg", "accuracy.steps_per_cycle": "400"})
+    assert value(found, "energy_balance") < 1e-10 and value(found, "work_check") < 2e-3
+
+
 def test_always_a_rig_keeps_its_books_and_says_its_vertical_force():
     found = run(RIG, **{"normal.grooves.lifted_mass": "0.5 kg"})
     assert found.outcome in (Outcome.STEADY, Outcome.TRANSIENT)
@@ -142,6 +157,10 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
     (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
     (RIG, ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
      "friction.law", "beside [normal.grooves]: use law 'coulomb'"),
+    (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.order=2"], "friction.order",
+     "beside [normal.grooves]"),
+    (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.quadrature=direct"], "accuracy.quadrature",
+     "'direct' beside [normal.grooves]"),
     (RIG, ["normal.amplitude=10 N", "normal.frequency=50 Hz"], "normal.amplitude", "beside [normal.grooves]"),
     (RIG, ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"], "structure.bonded.wavelength",
      "beside [normal.grooves]"),

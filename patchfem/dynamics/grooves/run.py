@@ -64,14 +64,26 @@ class GroovesModel:
 
 
 def model_of(grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes) -> GroovesModel:
-    """The model of grooves below these modes; PatchfemError where the lifted mass takes all of the slide's own."""
+    """The model of grooves below these modes; PatchfemError as of `refuse_heavy`."""
+    refuse_heavy(grooves, static, modes)
+    return GroovesModel(grooves, load, static, kinetic, speed)
+
+
+def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
+    """Raise PatchfemError where friction under the lifted mass takes all of the mass that slides, 1 + m s t (t - mu)/(1
+    + mu t) <= 0 on some flank, s [1/kg] the slide's acceleration per newton."""
     own = modes.mass / float(modes.slide @ modes.slide)
     taken = -grooves.lifted_mass * grooves.least_mass(static)
     if taken >= own:
         raise PatchfemError(f"{grooves.lifted_mass:.6g} kg press so hard while they are let down a flank that friction "
                             f"takes more than the {own:.6g} kg that slide, and no motion follows from the forces; less "
                             f"than {own / -grooves.least_mass(static):.6g} kg is wanted", f"{grooves.key}.lifted_mass")
-    return GroovesModel(grooves, load, static, kinetic, speed)
+
+
+def lifts(grooves: Grooves, time: float) -> str:
+    """The sentence on a lifted mass that leaves its grooves at a time [s]."""
+    return (f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: its inertia takes "
+            f"all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load")
 
 
 class GroovesRun(Run):
@@ -129,10 +141,8 @@ class GroovesRun(Run):
     def _judge(self, status: int) -> None:
         super()._judge(status)
         if status == 5:
-            g, place = self.model.grooves, self.done * self.prop.dt
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"the lifted mass of {g.lifted_mass:.3g} kg leaves the grooves at {place:.6g} s: its "
-                            f"inertia takes all of the load; lower {g.key}.lifted_mass or the drive, or raise the load")
+            self.message = lifts(self.model.grooves, self.done * self.prop.dt)
 
     def check(self) -> None:
         """Mark the run not_converged when steps did not meet their error; what was computed is kept."""

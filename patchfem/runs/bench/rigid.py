@@ -4,6 +4,8 @@ Every point shares the slide and the laws are linear in the pressure, so all poi
 carries the load, times their own share of it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
@@ -28,16 +30,28 @@ def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
     done = follow(one_point(model, load, engine), time, slide, frames, watch, paced)
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
     loads = np.full(time.size, load)
-    if engine.kind == ELEMENTS:
+    if engine.kind == ELEMENTS or model.grooves is not None:
         slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
     else:
         slip, local = elastic_slip(model, slide, done.force, loads), local_slip(model, slide[done.at], tau, sigma)
     return Slid(done.force, loads, slip, done.ledger, done.at, tau, local)
 
 
+def climbing(model, load: float):
+    """The model of a law with memory along the flanks of grooves, under a load [N]; in a bench no mass is lifted."""
+    from ...dynamics.grooves.climbing import model_of
+
+    f = model.friction
+    law = model.bonds if has(f.law, "bonds") else None
+    return model_of(model.grooves if model.rig is not None else replace(model.grooves, lifted_mass=0.0), load,
+                    f.static, f.bond_length, law, model.rig.modes if model.rig is not None else None)
+
+
 def one_point(model, load: float, engine: Engine) -> ContactModel:
     """One point that carries the whole load [N], as a contact of the compiled loops."""
     f = model.friction
+    if model.grooves is not None:
+        return climbing(model, load)
     if engine.kind == ELEMENTS:
         return element_model(law_from(f, load).element(load))
     law, found = model.bonds, engine.choice

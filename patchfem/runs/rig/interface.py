@@ -18,8 +18,8 @@ from .strips import strip_loads
 
 
 def model_of(model: Model, numerics: Numerics, patch):
-    """The contact that a march takes: a ContactModel, a JointsModel where interfaces or springs stand beside it, or a
-    GroovesModel.
+    """The contact that a march takes: a ContactModel, a JointsModel where interfaces or springs stand beside it, or one
+    that climbs grooves.
 
     patch: the solved Patch or None under [normal]. PatchfemError for a law that cannot stand beside others.
     """
@@ -47,10 +47,14 @@ def model_of(model: Model, numerics: Numerics, patch):
 
 
 def _climbing(model: Model, patch):
-    """The GroovesModel of a rig whose load climbs grooves."""
+    """The model of a rig whose load climbs grooves."""
+    f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
+    if not has(f.law, "memoryless"):
+        from ..bench.rigid import climbing
+
+        return climbing(model, load)
     from ...dynamics.grooves.run import model_of
 
-    f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     speed = None if has(f.law, "set-valued") else f.reference_speed
     return model_of(model.grooves, load, f.static, f.static if f.kinetic is None else f.kinetic, speed, model.rig.modes)
 

@@ -223,7 +223,8 @@ def rig_fields(model, numerics, patch, raw) -> dict:
     shots = raw.snapshots
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
-    if has(f.law, "bonds") and not listed(f) and (shear or numerics.per_point):
+    pointed = shear or (numerics.per_point and model.grooves is None)
+    if has(f.law, "bonds") and not listed(f) and pointed:
         tau, local = point_fields(patch, model.bonds, raw.contact.reduction, [(s["slide"], s["bonds"]) for s in shots])
     elif shear:
         length = 0.0 if raw.contact.reduction is None else law_from(f).element(1.0).length

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from ...effects import carries, listed, named, refusal, unbuilt
+from ...effects import carries, has, listed, named, refusal, unbuilt
 from .draft import Draft
 from .methods import changing_load, turning
 
@@ -56,8 +56,14 @@ def _beside(draft: Draft, at: str, law: Any) -> None:
     """Grooves are climbed as a whole by one interface under a constant load."""
     contact, structure = draft.tables.contact, draft.tables.structure
     beside = f"beside [{at}]"
-    if listed(law) or not carries(law, "grooves"):
+    if has(law.law, "bonds") and (listed(law) or law.breakaway):
+        key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
+        draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
+    elif not carries(law, "grooves"):
         draft.say("friction.law", f"{named(law)} {beside}: {refusal('grooves')}")
+    if has(law.law, "bonds") and draft.tables.accuracy.quadrature not in (None, "auto", "recursion"):
+        draft.say("accuracy.quadrature", unbuilt(f"'{draft.tables.accuracy.quadrature}' {beside}",
+                                                 "use 'recursion' or 'auto'"))
     if contact is not None and contact.gives_way:
         draft.say(at, unbuilt(f"beside {contact.gives_way}", "either"))
     if contact is not None and contact.strips is not None and turning(draft.tables):

@@ -1,0 +1,99 @@
+"""The contact of a law with memory along the flanks of grooves, for marches and for slides that are given."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...compiled import load as compiled
+from ...core import Outcome
+from ...friction.grooves import Grooves
+from ..contacts.arrays import sheared
+from ..march.march import Run
+from ..march.varying_load import PLASTIC, POINTS, Rubbing, bonds, plastic
+from .run import lifts, refuse_heavy
+
+HERE = "dynamics.grooves.contact_kernels"
+RISE, VERTICAL, LIFTS = 0, 1, 4  # of Climbing.now_at
+
+
+def model_of(grooves: Grooves, load: float, static: float, length: float, law, modes) -> "ClimbingModel":
+    """The model of the elastic-plastic law of a length [m], or of the bonds `law` (friction.bonds.parameters.Bonds).
+
+    modes: of the rig, None of a bench; PatchfemError as of `run.refuse_heavy`.
+    """
+    if modes is not None:
+        refuse_heavy(grooves, static, modes)
+    return ClimbingModel(grooves, load, plastic(static, length) if law is None else bonds(law))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ClimbingModel:
+    """What `march.march` needs to know: grooves under a load [N], and the law as under a load that changes."""
+
+    grooves: Grooves
+    load: float
+    law: Rubbing
+
+    @property
+    def kind(self) -> tuple:
+        """(contact, law): what the hub takes an instance of its loop for."""
+        return HERE, ""
+
+    @property
+    def limit(self) -> float:
+        """Scale of the residuals [N]: the largest force of the steepest flank."""
+        return self.grooves.capacity(self.load, self.law.static)
+
+    @property
+    def length(self) -> float:
+        """Bond length [m]."""
+        return self.law.length
+
+    @property
+    def reduction(self):
+        """None: no shear modes."""
+
+    @property
+    def set_valued(self) -> bool:
+        """Whether the law holds without any stretch: it stretches."""
+        return False
+
+    @property
+    def runner(self):
+        """The class that marches it."""
+        return ClimbingRun
+
+    def build(self, hub=None) -> tuple:
+        """(Climbing, None) with arrays of their own, at rest at the slide 0."""
+        g, law = self.grooves, self.law
+        normal = np.array([self.load * np.hypot(1.0, float(g.slope(0.0)))])
+        memory = np.zeros((3, 1))
+        memory[1 if law.kind == PLASTIC else 0] = normal * (1.0 if law.kind == PLASTIC else law.force[3])
+        weight = np.array([law.static / (law.length if law.kind == POINTS else 1.0)])
+        at = np.zeros(12)
+        at[VERTICAL] = self.load
+        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind])
+        kernels = compiled(HERE)
+        return kernels.Climbing(flank, at, np.array(law.force, float), memory, normal.copy(), normal, np.zeros((0, 1)),
+                                np.arange(1), **sheared(weight, law.length, law.growth, np.zeros((1, 0)), ())), None
+
+    def shown(self, contact) -> dict:
+        """Nothing: one point has no field."""
+        return {}
+
+
+class ClimbingRun(Run):
+    """The arrays of a march over grooves, and its clock."""
+
+    def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
+        super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
+        q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
+        self.contact.now_at[RISE] = float(model.grooves.slope(q) * v)
+        self.ledger[0] += self.strained()
+
+    def _judge(self, status: int) -> None:
+        super()._judge(status)
+        if self.contact.now_at[LIFTS] and self.outcome is None:
+            self.outcome = Outcome.NOT_CONVERGED
+            self.message = lifts(self.model.grooves, self.done * self.prop.dt)
+

@@ -1,0 +1,169 @@
+"""A contact that climbs flanks under a law with memory along them, for the loops of `march.hub`.
+
+Over a step of dq the path ds = int sqrt(1 + t^2) dq runs along the flank and the height rises by dz. The law acts over
+ds under a normal force that goes from R0 to R1, R = V sqrt(1 + t^2) + f t, and pulls with f on the mean; then the force
+against the slide is U = (V dz + f ds)/dq, which does exactly the work that height, lifted mass and law take. What rises
+keeps its own speed w, dz = dt (w0 + w1)/2, so V = N + m (w1 - w0)/dt takes exactly what its kinetic energy gains. The
+functions are those that `march.loop_kernels` asks of every contact.
+"""
+
+from math import cos, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled.inner import njit
+from ...friction.flags_kernels import LEAN
+from ..contacts.shear_solve_kernels import halfway
+from ..march.varying_friction_kernels import press_all, rub_commit, rub_force, rub_state
+from ..modal_kernels import narrowed
+
+SET_VALUED = False
+LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND = range(6)  # of Climbing.flank
+RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE = range(12)  # of now
+INNER = sqrt(0.6)  # outer points of Gauss's rule of three
+STEEP = 1e-4  # radians of a groove below which sines are series
+
+
+class Climbing(NamedTuple):
+    """flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
+    `march.varying_friction_kernels`; now_at (12,): speed of what rises [m/s], vertical force of the step before [N],
+    the last two slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried
+    last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and 1 where
+    a slide was kept; the rest is as of `march.varying_friction_kernels.Rub`, with the normal force for the load."""
+
+    flank: np.ndarray
+    now_at: np.ndarray
+    force: np.ndarray
+    memory: np.ndarray
+    before: np.ndarray
+    now: np.ndarray
+    modes: np.ndarray
+    under: np.ndarray
+    weight: np.ndarray
+    eps: np.ndarray
+    growth: np.ndarray
+    psi: np.ndarray
+    kappa: np.ndarray
+    b: np.ndarray
+    points: np.ndarray
+    count: np.ndarray
+    y: np.ndarray
+    last: np.ndarray
+    scale: np.ndarray
+    room: np.ndarray
+    hess: np.ndarray
+    ready: np.ndarray
+
+
+@njit(error_model="numpy", **LEAN)
+def steep(flank, q):
+    """Slope t [1] of the flank at the slide q [m]."""
+    return flank[AMPLITUDE] * flank[WAVE] * sin(flank[WAVE] * q - flank[PHASE])
+
+
+@njit(error_model="numpy", **LEAN)
+def over(flank, q, dq):
+    """(mean slope dz/dq, mean of sqrt(1 + t^2), ds/dq) over the slide dq [m] from q [m]."""
+    half, middle = 0.5 * flank[WAVE] * dq, flank[WAVE] * (q + 0.5 * dq) - flank[PHASE]
+    share = sin(half) / half if abs(half) > STEEP else 1 - half * half / 6
+    path = 0.0
+    for k in range(-1, 2):
+        t = steep(flank, q + 0.5 * dq * (1 + k * INNER))
+        path += (4 / 9 if k == 0 else 5 / 18) * sqrt(1 + t * t)
+    return flank[AMPLITUDE] * flank[WAVE] * sin(middle) * share, path
+
+
+@njit(error_model="numpy", **LEAN)
+def pull(dq, q, dt, c):
+    """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at; c.now is the normal
+    force at its end. c.before is that at its start, and the force of the law there stands in c.now_at[PLACE]."""
+    flank, at, kind = c.flank, c.now_at, int(c.flank[KIND])
+    slope, path = over(flank, q, dq)
+    vertical = flank[LOAD]
+    if flank[LIFTED] > 0.0:
+        vertical += flank[LIFTED] * 2 * (slope * dq / dt - at[RISE]) / dt
+    end = steep(flank, q + dq)
+    flat, pulled, gain = max(vertical, 0.0) * sqrt(1 + end * end), 0.0, 0.0
+    for _ in range(60):
+        before = c.now[0]
+        press_all(kind, c)
+        pulled, gain = rub_force(path * dq, kind, c, 0.5 * (c.before[0] + before), dt)
+        bound = c.force[0] * before
+        after = min(max(2 * pulled - at[PLACE], -bound), bound)
+        c.now[0] = max(flat + after * end, 0.0)
+        if abs(c.now[0] - before) <= 1e-14 * flank[LOAD]:
+            break
+    at[PULL], at[ALONG], at[MEAN_SLOPE], at[PATH], at[HELD] = vertical * slope + pulled * path, pulled, slope, path, \
+        vertical
+    bend = 0.5 * flank[AMPLITUDE] * flank[WAVE] * flank[WAVE] * cos(flank[WAVE] * (q + 0.5 * dq) - flank[PHASE])
+    at[PULL_SLOPE] = gain * path * path + vertical * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
+
+
+@njit(error_model="numpy", **LEAN)
+def solve(free, beta, q, v, dt, c, goal):
+    """(dq [m], mean force [N], iterations) of a step with dq = free - beta force, as of `contacts.element_kernels`."""
+    at, low, high = c.now_at, -np.inf, np.inf
+    t = steep(c.flank, q)
+    halfway(v * sqrt(1 + t * t), dt, c)
+    dq = 2 * at[LAST] - at[LAST_BUT_ONE]
+    for count in range(1, 200):
+        pull(dq, q, dt, c)
+        miss = dq - free + beta * at[PULL]
+        digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(at[PULL]))
+        if abs(miss) <= 0.01 * goal * beta + digit:
+            return dq, at[PULL], count
+        gain = max(1 + beta * at[PULL_SLOPE], 0.1)
+        low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
+        if high - low <= digit:
+            pull(dq, q, dt, c)
+            return dq, at[PULL], count if abs(miss) <= goal * beta + 8 * gain * digit else -count
+    return dq, at[PULL], -200
+
+
+@njit(error_model="numpy", **LEAN)
+def given(dq, q, v, dt, c, goal):
+    """(mean force [N], True) over a slide dq [m] in dt [s] that is prescribed."""
+    t = steep(c.flank, q)
+    halfway(v * sqrt(1 + t * t), dt, c)
+    pull(dq, q, dt, c)
+    return c.now_at[PULL], True
+
+
+@njit(error_model="numpy", **LEAN)
+def commit(dq, force, q, v0, v1, dt, c):
+    """Keep the solved step of mean force [N]; (energy dissipated along the flank [J], True)."""
+    at, kind = c.now_at, int(c.flank[KIND])
+    t0, t1 = steep(c.flank, q), steep(c.flank, q + dq)
+    along = (force - at[HELD] * at[MEAN_SLOPE]) / at[PATH]
+    lost = rub_commit(at[PATH] * dq, along, v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1), dt, kind, c)
+    if c.flank[LIFTED] > 0.0:
+        at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
+        at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
+    at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD], at[LAST], dq
+    c.before[0] = c.now[0]
+    at[PLACE] = rub_state(kind, c, 0.0, 0.0)[0]
+    return lost, True
+
+
+@njit(error_model="numpy", **LEAN)
+def state(c, q, v):
+    """(force against the slide [N], energy stored in height, lifted mass and law [J], irreversible slip [m]) at the
+    slide q [m] and the speed v [m/s]."""
+    flank, at, t = c.flank, c.now_at, steep(c.flank, q)
+    along, energy, kept = rub_state(int(flank[KIND]), c, q, 0.0)
+    turn = sin(0.5 * (flank[WAVE] * q - flank[PHASE]))
+    energy += 2 * flank[LOAD] * flank[AMPLITUDE] * turn * turn + 0.5 * flank[LIFTED] * at[RISE] * at[RISE]
+    length = sqrt(1 + t * t)
+    return at[VERTICAL] * t + along * length, energy, q - (q - kept) / length
+
+
+@njit(error_model="numpy", **LEAN)
+def passed(free, rate, beta, gamma, share, v, dt, c, top):
+    """Nothing: only a set-valued contact is asked for the speed at the end of a step."""
+    return 0.0, 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def hold(c, force):
+    """Nothing to do: what holds is in the law."""
