@@ -137,9 +137,10 @@ def joined(tables: list, names: list) -> dict:
                 "texts": [name for name, count in zip(names, counts) for _ in range(count)]}]
     for key in keys[0]:
         own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
-        columns.append({"name": key, "unit": own[0]["unit"], "log": own[0]["log"],
-                        "texts": [text for one in own for text in one["texts"]],
-                        "values": np.concatenate([one["values"] for one in own])})
+        texts = [text for one in own for text in one["texts"]]
+        words = not any(map(sweep.NUMBER.match, texts))  # each table numbered them in its own order
+        columns.append({"name": key, "unit": own[0]["unit"], "log": own[0]["log"], "texts": texts, "values":
+                        numbers(texts) if words else np.concatenate([one["values"] for one in own])})
     measures, shift = {}, np.cumsum([0, *counts])
     for name in dict.fromkeys(name for table in tables for name in table["measures"]):
         own = [table["measures"].get(name) for table in tables]

@@ -9,6 +9,7 @@ from page_data import data_of, own_part
 from patchfem.export.pages import library
 from patchfem.export.pages.document import document, plain
 from patchfem.export.pages.sweep import brief, page, span
+from patchfem.export.sweeps.page import joined, wide
 
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
@@ -133,3 +134,35 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_error(
     assert span({"pressure_peak": ([lost, lost, 9e6], [0.0] * 3, "Pa")}, outcome) == \
         "Pressure peak is 9 MPa throughout, numerical error at most 0 MPa."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, ["steady"]) == ""
+
+
+def test_exact_sweeps_side_by_side_keep_the_numbers_of_their_cases(table):
+    own = {"contact_fraction": table["measures"]["contact_fraction"]}
+    other = table | {"measures": own, "outcome": ["steady"] * 12, "messages": {0: "another"},
+                     "keys": table["keys"][::-1]}
+    found = joined([table, other], ["one", "other"])
+    assert found["messages"] == {7: "normal.load: <refused>", 12: "another"}
+    assert found["outcome"] == table["outcome"] + other["outcome"]
+    amplitude = table["measures"]["relative_displacement_amplitude"]["values"]
+    np.testing.assert_array_equal(found["measures"]["relative_displacement_amplitude"]["values"],
+                                  np.concatenate([amplitude, np.full(12, np.nan)]))
+    for name in ("contact.tilt.angle", "normal.load"):
+        own, both = (next(one for one in some["keys"] if one["name"] == name) for some in (table, found))
+        np.testing.assert_array_equal(both["values"], np.tile(own["values"], 2))
+        assert list(both["texts"]) == list(own["texts"]) * 2
+
+
+def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
+    """Each sweep numbers its words as they come: with coulomb first in one and tanh in the other both were 0."""
+    laws = [{"name": "friction.law", "unit": "1", "log": False, "texts": list(words), "values": np.arange(12) % 2.0}
+            for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)]
+    found = joined([table | {"keys": [one]} for one in laws], ["one", "other"])
+    values = dict(zip(found["keys"][1]["texts"], found["keys"][1]["values"]))
+    assert values == {"coulomb": 0, "tanh": 1, "iwan": 2}
+    assert [values[text] for text in found["keys"][1]["texts"]] == list(found["keys"][1]["values"])
+
+
+@pytest.mark.parametrize("values, log", [((1.0, 10.0), True), ((1.0, 9.9), False), ((-1.0, 10.0), False),
+                                         ((0.0, 1.0), False), (("a", "b"), False), ((5, 1, 60), True)])
+def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
+    assert wide(values) is log
