@@ -7,8 +7,8 @@ from ...compiled.inner import njit
 from . import window_kernels as plain
 from .event_kernels import COMPILED, compiled_copy, enter, march
 
-_SCOPE = compiled_copy(plain, ("fading", "place", "integrals", "integral", "acceleration", "peaks", "refined", "held",
-                               "noted", "force_beside", "ranges", "window", "cycle_parts"), (), COMPILED)
+_SCOPE = compiled_copy(plain, ("fading", "place", "integrals", "integral", "means", "acceleration", "peaks", "refined",
+                               "held", "noted", "force_beside", "ranges", "window", "cycle_parts"), (), COMPILED)
 window, cycle_parts = _SCOPE["window"], _SCOPE["cycle_parts"]
 
 

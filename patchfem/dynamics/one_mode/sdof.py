@@ -199,13 +199,19 @@ class _Run:
         """Means of the slide over the first and the last cycle of the window, None where it holds none."""
         if end - first < self.period * (1 - 1e-9):
             return None
-        return tuple(self._mean(begin) for begin in (first, end - self.period))
+        return tuple(self._mean(ahead) for ahead in (end - first, self.period))
 
-    def _mean(self, begin: float) -> float:
-        end, block = begin + self.period, self.block
-        rows = self.recent[(self.recent[:, 0] < end) & (self.recent[:, 0] + self.recent[:, 2] > begin)]
-        part, *ends = stretches(np.maximum(rows[:, 0], begin) - rows[:, 0],
-                                np.minimum(rows[:, 0] + rows[:, 2], end) - rows[:, 0], rows, block)
+    def _mean(self, ahead: float) -> float:
+        """Mean of the slide over the cycle that begins `ahead` [s] before the end.
+
+        The phases are placed by their lengths: in their times, 2e-16 of a long run, two means would differ.
+        """
+        rows, block = self.recent, self.block
+        left = np.cumsum(rows[::-1, 2])[::-1]  # from the start of each phase to the end
+        low, high = np.maximum(left - ahead, 0.0), np.minimum(left - ahead + self.period, rows[:, 2])
+        met = high > low
+        rows = rows[met]
+        part, *ends = stretches(low[met], high[met], rows, block)
         owner, tau, weight = panels(*ends)
         return block.slide * float(weight @ position(tau, rows, part[owner], block)) / self.period
 

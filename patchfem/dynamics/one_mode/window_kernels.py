@@ -83,6 +83,22 @@ def integral(row, low, high, rate, o):
     return row[4] * (high - low) + row[3] * half * out
 
 
+def means(rows, first, used, sizes, o, out):
+    """Means of z in the first and the last cycle of a window to `out`; sizes: (cycle, window [s], rate [rad/s]).
+
+    The phases are placed by their lengths before the end: in their times, 2e-16 of a long run, two means would differ.
+    """
+    per, left = sizes[0], 0.0
+    for p in range(used - 1, first - 1, -1):
+        span = rows[p, 2]
+        left += span
+        for k in range(2):
+            ahead = sizes[1] if k == 0 else per
+            a, b = max(left - ahead, 0.0), min(left - ahead + per, span)
+            if b > a:
+                out[FIRST + k] += integral(rows[p], a, b, sizes[2], o) / per
+
+
 def acceleration(row, u, rig, o):
     """Absolute acceleration [m s-2] of the coordinate at u [s] after the start of a phase, and its first two rates."""
     turn = row[1] + o[5] * u
@@ -205,6 +221,7 @@ def window(rows, used, begin, cycles, rig, room, out):
     out[:] = 0.0
     found[:] = 0.0
     out[LOW], out[HIGH] = inf, -inf
+    means(rows, first, used, (per, cycles * per, fast), o, out)
     for p in range(first, used):
         row = rows[p]
         low, high = max(row[0], begin) - row[0], min(row[0] + row[2], end) - row[0]
@@ -232,11 +249,6 @@ def window(rows, used, begin, cycles, rig, room, out):
                 out[STARTS] += 1.0
                 out[START_COS] += cos(2 * row[1])
                 out[START_SIN] += sin(2 * row[1])
-        for k in range(2):
-            start = begin if k == 0 else end - per
-            a, b = max(low, start - row[0]), min(high, start + per - row[0])
-            if b > a:
-                out[FIRST + k] += integral(row, a, b, fast, o) / per
     out[ACCELERATION] = found[1]
     if found[0] > TURNS:
         return False
