@@ -23,6 +23,9 @@ kink and 1 above, 0 below the speed of the knee; dq [m] is the slide since the m
 path to the next kink sets y from the memory; rate(num, mem, turn, dq, v, y, out) -> force [N] writes dy/dt into out;
 shown(num, mem, turn, dq, q, v, y) -> (force, stored energy, irreversible part of q); finish(num, mem, turn, dq, v, y)
 -> energy dissipated [J], or nan, moves the memory; knee(num) -> speed [m/s] at which the rates have a kink, 0 for none.
+One without states may offer its force without branches, for motions side by side: ahead(num, mem, way) -> four numbers
+of a motion that begins, along(*four, dq, v) -> force [N], and layer(num) -> speed [m/s] over which the force turns with
+the slide, 0 for none.
 """
 
 from typing import NamedTuple

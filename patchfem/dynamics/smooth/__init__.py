@@ -4,5 +4,6 @@ In: `core.ModalBasis`, a drive, an `Element` whose law offers its rates (`fricti
 the march gives it. Between two reversals of the slide the motion is smooth: eq. 3.4 with the law in its rate form, or
 with its exponentials of the slide where the bond length is constant. Every reversal, every kink of a law and of the
 drive is the end of a step. Read `run`, then `loop_kernels`: steps, their length and where they end; `step_kernels`: one
-step; `watch_kernels`: what is read off it.
+step; `watch_kernels`: what is read off it. One mode under one sine moves in a lane beside seven others until its last
+cycles: `lanes`, `lane_step`, `lane_kernels`.
 """

@@ -30,7 +30,7 @@ def left(m, what, y, slopes, travel):
     for i in range(n):
         gain += m.rows[steps.SLIDE, i] * slopes[n + i]
     if what == STOP:
-        return way * v, way * gain, 4e-16 * (m.now[steps.CREST_SPEED] + m.now[steps.PACE] * m.now[steps.CREST])
+        return way * v, way * gain, still(m)
     if what == KINK:
         path = way * (q - m.now[steps.ORIGIN])
         return m.turn[1] - path, -way * v, 1e-15 * (m.now[steps.CREST] + m.turn[1])
@@ -101,9 +101,17 @@ def dips(m, h):
     """Share [1] of the step of h [s] at which the speed, > 0 at both ends, has a least value below zero; 0 for none."""
     a, p, _ = left(m, STOP, m.y, m.work[0], np.inf)
     b, r, _ = left(m, STOP, m.work[steps.TRIAL], m.work[12], np.inf)
+    return dip_of(a, p * h, b, r * h)
+
+
+@njit(error_model="numpy", **INNER)
+def dip_of(a, p, b, r):
+    """Share of a step at which a cubic from a to b, both > 0, has a least value below zero; 0 for none.
+
+    p, r: its slopes at the ends over the step.
+    """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
-    p, r = p * h, r * h
     big, mid = 2 * (a - b) + p + r, 3 * (b - a) - 2 * p - r  # a + p s + mid s^2 + big s^3
     root = mid * mid - 3 * big * p
     if root <= 0:
@@ -112,6 +120,12 @@ def dips(m, h):
     if s <= 0 or s >= 1:
         return 0.0
     return s if a + s * (p + s * (mid + s * big)) < 0 else 0.0
+
+
+@njit(error_model="numpy", **INNER)
+def still(m):
+    """Round-off [m/s] of the speed of the slide, below which it rests."""
+    return 4e-16 * (m.now[steps.CREST_SPEED] + m.now[steps.PACE] * m.now[steps.CREST])
 
 
 @njit(error_model="numpy", **INNER)

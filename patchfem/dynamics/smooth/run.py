@@ -2,32 +2,31 @@
 
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cache
 from math import ceil
 
 import numpy as np
 
-from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ..march.march import MarchResult
 from ..second_book import sampled_work
 from .arrays import Kept, Moving
+from .lanes import OF_KEPT, OF_MOVING, advance, fits, loops_of, stacked
 from .waves import wave_of
 
-HERE = "dynamics.smooth"
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # samples of a run that has no cycles
 ROOM = 4096  # reversals kept in one call
 MOST_KEPT = 400_000  # reversals kept outside the last cycles
 CLOSER = 0.01  # of the tolerance, that of the last cycles, which are read between the ends of the steps
+TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
 # of Moving.now
 TIME, STEP, TURNED, PACE, MASS, KIND, PIECE, MOVES = 0, 1, 2, 7, *range(10, 14)
 # of Kept.tally
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST = range(6)
-WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PLACE, WANTED, PERIOD = 6, *range(10, 20)
-HELD, START, STARTS, SIDE = 20, 21, 23, 24
+WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD = 6, *range(10, 19)
+HELD, START, STARTS, SIDE = 19, 20, 22, 23
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
 
 
@@ -61,15 +60,6 @@ class SmoothResult(MarchResult):
     turned: Response | None = None
 
 
-@cache
-def loops_of(law: str, say=None):
-    """The compiled loops for the law of this module; say: told before they are compiled."""
-    law = compiled.load(law, say)
-    steps = compiled.instance(f"{HERE}.step_kernels", {"law": law})
-    watching = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
-    return compiled.instance(f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watching": watching})
-
-
 class Run:
     """A motion as it stands: the arrays that its loops move, and what was read off it."""
 
@@ -84,7 +74,7 @@ class Run:
             state[:n], state[n:2 * n] = start.z, start.v
         pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
                    2 * np.pi / drive.period)
-        now, tally, work = np.zeros(14), np.zeros(25), np.zeros((26, size))
+        now, tally, work = np.zeros(14), np.zeros(24), np.zeros((26, size))
         now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
         now[[KIND, MOVES]], tally[PERIOD] = (self.wave.kind, drive.moving), drive.period
         work[24, 2 * n:-3] = element.sizes
@@ -97,6 +87,7 @@ class Run:
         self.kept = Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), tally,
                          np.zeros((2, size)), np.zeros((10, 6)))
         self.turns, self.begun, self.outcome, self.message = [], 0.0, None, ""
+        self.swift = fits(modes, element, self.wave, travel)
         self.until(0.0)
         self.first, self.begun = self.settled()[0], float(self.kept.tally[STORED])
 
@@ -107,13 +98,16 @@ class Run:
         twin.kept, twin.turns = type(self.kept)(*(array.copy() for array in self.kept)), list(self.turns)
         if drive is not self.drive:
             twin.drive, twin.wave = drive, wave_of(drive)
+            twin.swift = fits(twin.modes, twin.element, twin.wave, twin.travel)
             twin.moving = twin.moving._replace(pieces=twin.wave.pieces)
             twin._enter(int(np.searchsorted(twin.wave.ends, twin.time, side="right")))
         return twin
 
     def ends_only(self, window: int) -> None:
-        """Ask for the phasors of the last cycle and of every `window`-th before it alone, at the start of a run."""
-        left_out = np.arange(self.kept.cycles.shape[1])[::-1] % window > 0
+        """Ask for the phasors of the last cycle and of the TAIL windows of `window` cycles before alone, at the start
+        of a run."""
+        back = np.arange(self.kept.cycles.shape[1])[::-1]
+        left_out = (back % window > 0) | (back >= TAIL * window)
         self.kept.cycles[2:, left_out] = np.nan
 
     def extremes(self, count: int) -> np.ndarray:
@@ -138,16 +132,23 @@ class Run:
         samples = np.zeros((times.size, self.kept.turns.shape[1]))
         samples[:, 0], self.kept = times, self.kept._replace(samples=samples)
         self.kept.tally[SAMPLE], self.kept.tally[WANTED] = 0, peaks
+        swift = self.swift and not (times.size or peaks) and self.time < time
         while self.outcome is None:
             end = float(self.wave.ends[int(self.moving.now[PIECE])])
             if self.time >= end:
                 self._enter(int(self.moving.now[PIECE]) + 1)
                 continue
-            status = self.loops.advance(self.moving, self.kept, float(time), end, self.tolerance, float(self.travel))
+            status = self._beside(float(time)) if swift else \
+                self.loops.advance(self.moving, self.kept, float(time), end, self.tolerance, float(self.travel))
             self._judge(status)
             if status == FINISHED and self.time >= time:
                 break
         return self.kept.samples[:int(self.kept.tally[SAMPLE])]
+
+    def _beside(self, time: float) -> int:
+        """Move on to a time [s] where nothing is read inside a step, in one of the lanes of `lanes`."""
+        many, kept = stacked(self.moving, OF_MOVING), stacked(self.kept, OF_KEPT)
+        return int(advance(self.element.kernels, many, kept, np.array([time]), np.array([self.tolerance]))[0])
 
     def _judge(self, status: int) -> None:
         count = int(self.kept.tally[TURNS])

@@ -8,18 +8,19 @@ from math import cos, pi, sin
 import numpy as np
 
 from ...compiled.inner import njit
+from ...compiled.series_kernels import sine
 from ...friction.flags_kernels import INNER
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 
-GRID = 64  # places of a cycle at which its phasor is summed
+PLACES, SHARES = np.polynomial.legendre.leggauss(4)  # of the part of a step in a cycle, for its phasor
 PARTS = 8  # of a step, among which its peaks are looked for
 NEAR = 0.05  # of what a number changes by in a step, by which its peak may lie above the places looked at
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST, SLOTS = range(7)  # of the peaks
 # of Kept.tally
-PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PLACE, WANTED, PERIOD = 0, 6, *range(10, 20)
-HELD, START, STARTS, SIDE = 20, 21, 23, 24
+PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD = 0, 6, *range(10, 19)
+HELD, START, STARTS, SIDE = 19, 20, 22, 23
 SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
 BESIDE = 1e-3  # of a step, over which the share is taken
 STILL = 1e-14  # of the slide, below which it does not slide
@@ -82,8 +83,6 @@ def turning(m, k, a, b, rate):
 @njit(error_model="numpy", **INNER)
 def bounds(m, h, k, parts):
     """Take the step of h [s] into the extremes of its cycles; parts: of it, at whose ends turns are looked for."""
-    t, period = m.now[steps.TIME], k.tally[PERIOD]
-    cycle = min(max(int((t + 0.5 * h) / period), 0), k.cycles.shape[1] - 1)
     x, w = output_of(m, m.y)
     low, high = x, x
     for part in range(1, parts + 1):
@@ -97,48 +96,69 @@ def bounds(m, h, k, parts):
             top = turning(m, k, (part - 1) / parts, part / parts, w)
             low, high = min(low, top), max(high, top)
         w = w1
-    k.cycles[0, cycle] = min(k.cycles[0, cycle], low)
-    k.cycles[1, cycle] = max(k.cycles[1, cycle], high)
+    extremes(k.cycles, k.tally[PERIOD], m.now[steps.TIME] + 0.5 * h, low, high)
 
 
 @njit(error_model="numpy", **INNER)
-def next_place(k):
-    """Time [s] of the next place of a phasor, in a cycle whose phasor is asked for (it is not NaN)."""
-    number, cycles = int(k.tally[PLACE]), k.cycles.shape[1]
-    while number // GRID < cycles and np.isnan(k.cycles[2, number // GRID]):
-        number = (number // GRID + 1) * GRID
-    k.tally[PLACE] = number
-    return number * k.tally[PERIOD] / GRID if number // GRID < cycles else np.inf
+def extremes(cycles, period, time, x, y):
+    """Take two outputs [m] into the extremes of the cycle of a time [s]."""
+    cycle = min(max(int(time / period), 0), cycles.shape[1] - 1)
+    cycles[0, cycle] = min(cycles[0, cycle], x, y)
+    cycles[1, cycle] = max(cycles[1, cycle], x, y)
+
+
+@njit(error_model="numpy", **INNER)
+def phasor(cycles, period, t, h, begin, end):
+    """Take the step of h [s] from the time t [s] into the parts at the drive's frequency of the cycles that are asked
+    for (not NaN); begin, end: output [m], its rate and acceleration there.
+
+    2/T int x exp(-i omega t) dt of the quintic through both, h^6/46080 of its sixth derivative.
+    """
+    first, last = int(t / period), min(int((t + h) / period), cycles.shape[1] - 1)
+    for cycle in range(first, last + 1):
+        low, high = max(t, cycle * period), min(t + h, (cycle + 1) * period)
+        if np.isnan(cycles[2, cycle]) or high <= low:
+            continue
+        p, q, a, b, rise = begin[1] * h, end[1] * h, begin[2] * h * h / 2, end[2] * h * h / 2, end[0] - begin[0]
+        one, two, three = rise - p - a, q - p - 2 * a, 2 * (b - a)
+        cube, fourth, fifth = 10 * one - 4 * two + three / 2, -15 * one + 7 * two - three, 6 * one - 3 * two + three / 2
+        for j in range(PLACES.size):
+            time, weight = low + 0.5 * (1 + PLACES[j]) * (high - low), SHARES[j] * (high - low) / period
+            s, turn = (time - t) / h, 2 * pi * (time / period - cycle)
+            x = begin[0] + s * (p + s * (a + s * (cube + s * (fourth + s * fifth))))
+            cycles[2, cycle] += weight * x * sine(turn + pi / 2)
+            cycles[3, cycle] -= weight * x * sine(turn)
+
+
+@njit(error_model="numpy", **INNER)
+def phasors(m, h, k):
+    """Take the step of h [s] into the phasors."""
+    n, gain, after = m.rows.shape[1], 0.0, 0.0
+    for i in range(n):
+        gain += m.rows[steps.OUTPUT, i] * m.work[0, n + i]
+        after += m.rows[steps.OUTPUT, i] * m.work[12, n + i]
+    (x, w), (y, v) = output_of(m, m.y), output_of(m, m.work[steps.TRIAL])
+    phasor(k.cycles, k.tally[PERIOD], m.now[steps.TIME], h, (x, w, gain), (y, v, after))
 
 
 @njit(error_model="numpy", **INNER)
 def inside(m, h, k):
-    """Whether something is to be read inside the step of h [s]: peaks, a sample, a place of a phasor or a turn."""
-    end = m.now[steps.TIME] + h
-    if k.tally[WANTED] > 0 or next_place(k) <= end:
-        return True
+    """Whether something is to be read inside the step of h [s]: peaks, a sample or a turn."""
     at = int(k.tally[SAMPLE])
-    return (at < k.samples.shape[0] and k.samples[at, 0] <= end) or may_turn(m)
+    sampled = at < k.samples.shape[0] and k.samples[at, 0] <= m.now[steps.TIME] + h
+    return k.tally[WANTED] > 0 or sampled or may_turn(m)
 
 
 @njit(error_model="numpy", **INNER)
 def marks(m, h, k):
-    """Samples and places of the phasors inside the step of h [s], its end included."""
-    t, period = m.now[steps.TIME], k.tally[PERIOD]
+    """Samples inside the step of h [s], its end included."""
+    t = m.now[steps.TIME]
     end = t + h
     while k.tally[SAMPLE] < k.samples.shape[0] and k.samples[int(k.tally[SAMPLE]), 0] <= end:
         j = int(k.tally[SAMPLE])
         steps.between(m, (k.samples[j, 0] - t) / h, k.room[0])
         write(m, k.samples[j, 0], k.room[0], k.samples[j])
         k.tally[SAMPLE] += 1
-    while next_place(k) <= end:
-        number = int(k.tally[PLACE])
-        steps.between(m, min(max((number * period / GRID - t) / h, 0.0), 1.0), k.room[0])
-        x = output_of(m, k.room[0])[0]
-        turn, cycle = 2 * pi * (number % GRID) / GRID, number // GRID
-        k.cycles[2, cycle] += x * cos(turn) * 2 / GRID
-        k.cycles[3, cycle] -= x * sin(turn) * 2 / GRID
-        k.tally[PLACE] += 1
 
 
 @njit(error_model="numpy", **INNER)
@@ -272,6 +292,7 @@ def watch(m, h, k):
     k.tally[POWER] += abs(m.work[steps.TRIAL, work] - m.y[work])
     k.tally[STORED] = max(k.tally[STORED], stored(m, m.work[steps.TRIAL]))
     k.tally[DONE] += 1
+    phasors(m, h, k)
     if not inside(m, h, k):
         bounds(m, h, k, 1)
         return

@@ -10,10 +10,12 @@ exponentials of the slide, and (eps, m, z, s2) where it grows.
 from math import exp, expm1, inf, nan
 
 from ...compiled.inner import njit
+from ...compiled.series_kernels import gone
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import LEAN, closed
+from ..flags_kernels import LEAN, closed, layer
 
-__all__ = ["begin", "closed", "commit", "finish", "flow", "knee", "mean", "middle", "pull", "rate", "shown", "state"]
+__all__ = ["ahead", "along", "begin", "closed", "commit", "finish", "flow", "knee", "layer", "mean", "middle", "pull",
+           "rate", "shown", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage
@@ -112,9 +114,9 @@ def slid(num, mem, turn, dq):
     if turn[1] < inf:
         return m, z + m * dq
     x = way * dq / eps
-    gone = -expm1(-x)  # exact for slides far below the bond length, too
-    kept = 1 - gone
-    return m + (1 - m) * gone, z * kept + way * eps * (gone - (1 - m) * x * kept)
+    broken = -expm1(-x)  # exact for slides far below the bond length, too
+    kept = 1 - broken
+    return m + (1 - m) * broken, z * kept + way * eps * (broken - (1 - m) * x * kept)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -172,3 +174,19 @@ def finish(num, mem, turn, dq, v, y):
     if num[0, FREE] > 0 and dq != 0:
         mem[0, 5] = turn[0]
     return 0.5 * num[0, WEIGHT] * lost
+
+
+@njit(error_model="numpy", **LEAN)
+def ahead(num, mem, way):
+    """The four numbers of `along` for a motion in the direction `way` at a constant bond length eps: way/eps [1/m], the
+    force [N] at its start, way mu N [N] towards which it goes, and that times the share of bonds still to form."""
+    limit = way * num[0, WEIGHT] * mem[0, 0]
+    return way / mem[0, 0], num[0, WEIGHT] * mem[0, 2], limit, limit * (1 - mem[0, 1])
+
+
+@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
+def along(pace, start, limit, fresh, dq, v):
+    """Force [N] after a slide dq [m] without branches, as `slid` has it."""
+    x = pace * dq
+    broken = gone(x)
+    return start + broken * (limit - start) - fresh * x * (1 - broken)

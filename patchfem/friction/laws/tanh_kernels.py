@@ -6,9 +6,11 @@ num: limit [N], v_0 [m/s]; no memory.
 from math import inf, nan, tanh
 
 from ...compiled.inner import njit
+from ...compiled.series_kernels import gone
 from ..flags_kernels import LEAN, closed, knee, middle
 
-__all__ = ["at_end", "begin", "closed", "commit", "finish", "knee", "mean", "middle", "rate", "shown", "state"]
+__all__ = ["ahead", "along", "at_end", "begin", "closed", "commit", "finish", "knee", "layer", "mean", "middle",
+           "rate", "shown", "state"]
 
 
 @njit(error_model="numpy", **LEAN)
@@ -66,3 +68,24 @@ def shown(num, mem, turn, dq, q, v, y):
 def finish(num, mem, turn, dq, v, y):
     """There is no memory; nan, as only the work tells what is dissipated."""
     return nan
+
+
+@njit(error_model="numpy", **LEAN)
+def layer(num):
+    """Speed [m/s] over which the force turns with the slide: v_0."""
+    return num[0, 2]
+
+
+@njit(error_model="numpy", **LEAN)
+def ahead(num, mem, way):
+    """The four numbers of `along`: limit [N], 1/v_0 [s/m]; no others."""
+    return num[0, 1], 1 / num[0, 2], 0.0, 0.0
+
+
+@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
+def along(limit, scale, none, nothing, dq, v):
+    """Force [N] of eq. 2.4 at the speed v [m/s] without branches: tanh u = g/(2 - g) with g = 1 - exp(-2 u)."""
+    u = abs(v) * scale
+    g = gone(2 * u)
+    force = limit * g / (2 - g)
+    return force if v > 0 else -force

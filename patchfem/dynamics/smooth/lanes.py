@@ -1,0 +1,63 @@
+"""Motions of one mode under a sine side by side: which may move so, and how they are handed to compiled code."""
+
+from functools import cache
+
+import numpy as np
+
+from ... import compiled
+from .lane_step import LANES, SIZE, step_of
+from .waves import SINES
+
+HERE = "dynamics.smooth"
+FREE = 7  # of the numbers of points of bonds: share of the bond length that stretches without damage
+NUMBERS = 25  # of a lane
+
+
+@cache
+def parts_of(law: str, say=None) -> dict:
+    """The compiled modules for the law of a module, by the name under which others import them."""
+    law = compiled.load(law, say)
+    steps = compiled.instance(f"{HERE}.step_kernels", {"law": law})
+    watching = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
+    loop = compiled.instance(f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watching": watching})
+    return {"law": law, "steps": steps, "watching": watching, "loop": loop}
+
+
+def loops_of(law: str, say=None):
+    """The compiled loops for the law of this module; say: told before they are compiled."""
+    return parts_of(law, say)["loop"]
+
+
+@cache
+def lanes_of(law: str):
+    """The compiled loop over motions side by side for the law of this module."""
+    parts = parts_of(law)
+    return compiled.instance(f"{HERE}.lane_kernels", parts | {"stepping": step_of(parts["law"])})
+
+
+def fits(modes, element, wave, travel: float = np.inf) -> bool:
+    """Whether a motion may move side by side with others: one mode with its own damping, one sine without an end, no
+    stop at a travel [m], a law without states of its own and without kinks."""
+    plain = element.form == "speed" or (element.form == "points" and not element.numbers[FREE])
+    sine = wave.kind == SINES and len(wave.pieces) == 1 and wave.pieces[0, 2] != 0
+    return bool(plain and element.sizes == () and modes.omega.size == 1 and modes.damping is None and sine
+                and np.isinf(travel))
+
+
+def advance(law: str, many, kept, until, tolerance) -> np.ndarray:
+    """Move n motions on to the times `until` (n,) [s]: codes (n,) of how they ended, as `loop_kernels` has them.
+
+    many, kept: Moving and Kept with one more dimension of n in front, but for damping, work, samples, room and table;
+    tolerance (n,): of a step, relative.
+    """
+    codes = np.zeros(len(until), np.int64)
+    lanes_of(law).advance(many, kept, np.zeros(SIZE), np.zeros((LANES, NUMBERS)), until, tolerance, codes)
+    return codes
+
+
+def stacked(parts, shared: tuple):
+    """A Moving or Kept of one motion as one of many, in the same memory; shared: names of what all have together."""
+    return parts._replace(**{name: array[None] for name, array in parts._asdict().items() if name not in shared})
+
+
+OF_MOVING, OF_KEPT = ("damping", "work"), ("samples", "room", "table")

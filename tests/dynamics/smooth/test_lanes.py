@@ -1,0 +1,152 @@
+"""Motions of one mode side by side: the same as alone to the last bit, and as the loop that reads inside its steps."""
+
+import numpy as np
+import pytest
+from march_paths import OMEGA, one_mode
+from test_smooth import LOAD, MASS, ONE, SINE, THREE, element, numpy_step
+
+from patchfem import compiled
+from patchfem.core import BaseSine, Start
+from patchfem.dynamics.smooth import lane_step, lanes
+from patchfem.dynamics.smooth.arrays import Kept, Moving
+from patchfem.dynamics.smooth.run import Run
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws.tanh import Rate
+
+LAWS = {"bonds": Bonds(0.3, 5e-6), "fresh": Bonds(0.3, 5e-5, initial=0.3), "tanh": Rate(0.3, 1e-2),
+        "stiff": Rate(0.3, 1e-4)}
+PERIOD = SINE.period
+
+
+def test_exact_series_are_sine_and_exponential():
+    from patchfem.compiled import series_kernels as series
+
+    x = np.linspace(-20, 20, 4001)
+    assert np.array([series.sine(one) for one in x]) == pytest.approx(np.sin(x), rel=0, abs=4e-16)
+    x = np.array([0.0, 1e-12, 1e3 + 0.2, 1e5 + 0.3, -1e6])
+    assert np.array([series.sine(one) for one in x]) == pytest.approx(np.sin(x), rel=3e-16, abs=4e-16)
+    x = np.concatenate([np.linspace(-7, 70, 3001), np.geomspace(1e-15, 1, 50), [0.0, 500.0]])
+    assert np.array([series.gone(one) for one in x]) == pytest.approx(-np.expm1(-x), rel=4e-15)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_exact_forces_without_branches_are_those_of_the_law(name):
+    law = element(LAWS[name])
+    kernels = compiled.load(law.kernels).module()
+    num, mem, turn, none = law.numbers[None], law.memory[None], np.array([1.0, np.inf, 1.0]), np.zeros(0)
+    for way in (1.0, -1.0):
+        turn[0], turn[1] = way, kernels.begin(num, mem, way, none)
+        four = kernels.ahead(num, mem, way)
+        for slide in np.concatenate([[0.0], np.geomspace(1e-12, 1e-3, 30)]) * way:
+            speed = 300 * slide
+            found = kernels.along(*four, slide, speed)
+            assert found == pytest.approx(kernels.rate(num, mem, turn, slide, speed, none, none), rel=1e-14,
+                                           abs=1e-14 * law.limit)
+        kernels.finish(num, mem, turn, 3e-5 * way, 0.0, none)
+
+
+def test_exact_a_step_of_eight_is_the_method_in_numpy():
+    law, h = element(LAWS["bonds"]), 0.02 * PERIOD
+    rows = np.zeros((len(lane_step.ROWS), lane_step.LANES))
+    at = {name: rows[row] for name, row in lane_step.ROWS.items()}
+    weight = 0.3 * LOAD / 5e-6
+    given = {"stiff": OMEGA**2, "damp": 6e-3 * OMEGA, "gain": 1 / MASS, "push": SINE.acceleration,
+             "pace": OMEGA, "slide": 1.0, "n0": 1 / 5e-6, "n2": weight * 5e-6, "h": h, "allowed": 1.0}
+    for name, value in given.items():
+        at[name][:] = value
+    at["v0"][:] = np.linspace(0.01, 0.4, 8)
+    start = np.stack([at["z0"], at["v0"]], axis=1)
+
+    def slope(t, y):
+        force = weight * 5e-6 * -np.expm1(-y[0] / 5e-6)
+        return np.array([y[1], -6e-3 * OMEGA * y[1] - OMEGA**2 * y[0] - float(SINE.values(t)) - force / MASS])
+
+    at["a0"][:] = [slope(0.0, one)[1] for one in start]
+    flat = rows.ravel()
+    lane_step.step_of(compiled.load(law.kernels)).module().step(flat)
+    for lane, one in enumerate(start):
+        end = numpy_step(slope, 0.0, one, h)
+        assert [at["z12"][lane], at["v12"][lane]] == pytest.approx(end, rel=1e-12)
+        assert at["a12"][lane] == pytest.approx(slope(h, end)[1], rel=1e-11)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("slide", [1.0, -0.7])
+def test_exact_a_lane_moves_as_the_loop_does(name, slide):
+    modes = one_mode(OMEGA, 0.003, MASS)
+    modes = type(modes)(modes.names, modes.omega, modes.zeta, np.array([slide]), modes.base, modes.output, MASS)
+    start = Start(np.array([1e-5]), np.array([0.02]))
+    beside, alone = (Run(modes, SINE, element(LAWS[name]), 12, 1e-11, start=start) for _ in range(2))
+    alone.swift = False
+    assert beside.swift
+    for run in (beside, alone):
+        run.until(11.3 * PERIOD)
+    size = abs(alone.kept.cycles[:2]).max()
+    assert abs(beside.moving.y[0] - alone.moving.y[0]) < 1e-9 * size
+    assert beside.moving.y[2:] == pytest.approx(alone.moving.y[2:], rel=1e-8)
+    assert beside.kept.cycles[:2, :11] == pytest.approx(alone.kept.cycles[:2, :11], abs=1e-9 * size)
+    assert beside.kept.cycles[2:, :11] == pytest.approx(alone.kept.cycles[2:, :11], abs=1e-9 * size)
+    one, other = (np.concatenate(run.turns) for run in (beside, alone))
+    assert len(one) == len(other) > 20
+    assert np.all(abs(one - other).max(axis=0) <= 1e-7 * np.maximum(abs(other).max(axis=0), 1e-9))
+    one, other = beside.book(), alone.book()
+    for key in ("work_in", "viscous", "power", "friction", "peak_stored"):
+        assert one[key] == pytest.approx(other[key], rel=0.1 if key == "peak_stored" else 1e-7), key
+
+
+def together(runs):
+    """The motions of Runs as one Moving and one Kept of many."""
+    moving, kept = ([getattr(run, name) for run in runs] for name in ("moving", "kept"))
+    pairs = ((Moving, moving, lanes.OF_MOVING), (Kept, kept, lanes.OF_KEPT))
+    return [kind(*(getattr(parts[0], name) if name in shared else np.stack([getattr(one, name) for one in parts])
+                   for name in kind._fields)) for kind, parts, shared in pairs]
+
+
+@pytest.mark.parametrize("name", ["bonds", "tanh"])
+def test_exact_one_of_many_moves_as_alone_to_the_last_bit(name):
+    """More motions than lanes, of other loads, lengths and tolerances."""
+    def runs():
+        law = LAWS[name]
+        made = [law.element(load) if name == "tanh" else lanes_element(law, load) for load in np.geomspace(5, 200, 19)]
+        return [Run(ONE, BaseSine(10.0 + 3 * k, OMEGA * (0.7 + 0.03 * k)), one, 20, 1e-9) for k, one in enumerate(made)]
+
+    def lanes_element(law, load):
+        from patchfem.friction.laws.stretch import points_element
+
+        return points_element(law, [1.0], [load])
+
+    alone, group = runs(), runs()
+    until = np.array([(3 + k % 5) * 1.1 / 143 for k in range(19)])
+    many, kept = together(group)
+    codes = lanes.advance(group[0].element.kernels, many, kept, until, np.full(19, 1e-9))
+    assert not codes.any()
+    for k, run in enumerate(alone):
+        run.until(until[k])
+        assert np.array_equal(run.moving.y, many.y[k]) and np.array_equal(run.moving.now, many.now[k])
+        assert np.array_equal(run.kept.cycles, kept.cycles[k]) and np.array_equal(run.moving.mem, many.mem[k])
+
+
+def test_exact_a_call_without_room_for_turns_goes_on_where_it_ended():
+    whole, parts = (Run(ONE, SINE, element(LAWS["bonds"]), 9, 1e-9) for _ in range(2))
+    parts.kept = parts.kept._replace(turns=np.zeros((3, 9)))
+    for run in (whole, parts):
+        run.until(8 * PERIOD)
+    one, other = np.concatenate(parts.turns), np.concatenate(whole.turns)
+    assert one == pytest.approx(other, abs=1e-8 * abs(other).max(axis=0).max()) and len(parts.turns) > 4
+    assert one[:, 1] == pytest.approx(other[:, 1], rel=1e-7)
+
+
+@pytest.mark.parametrize("modes, law, drive, travel", [
+    (THREE, LAWS["bonds"], SINE, np.inf), (ONE, Bonds(0.3, 5e-6, breakaway=0.2), SINE, np.inf),
+    (ONE, LAWS["tanh"], SINE, 1e-3),
+    (ONE, Bonds(0.3, 5e-6, rest_growth=10.0, slip_growth=1e-6, rest_speed=1e-4), SINE, np.inf)])
+def test_always_other_motions_stay_with_the_loop(modes, law, drive, travel):
+    assert not Run(modes, drive, element(law), 2, 1e-6, travel).swift
+
+
+def test_always_a_force_of_the_speed_is_met_without_refused_tries():
+    """tanh with v_0 four thousandths of the peak speed: more than one try in two was refused."""
+    run = Run(ONE, BaseSine(49.0, OMEGA * 0.98), Rate(0.3, 5e-3).element(30.0), 60, 1e-9)
+    run.until(50 * PERIOD)
+    done, refused = run.kept.tally[13:15]
+    assert refused < 0.25 * done
