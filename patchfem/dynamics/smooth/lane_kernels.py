@@ -187,7 +187,8 @@ def judged(rows, own, lane, cycles):
 
 @njit(error_model="numpy", **INNER)
 def searched(rows, own, lane, cycles):
-    """Take in a step that looks for a reversal, by Newton's method on its length: GOING, or TURNS where it is there."""
+    """Take in a step that looks for a reversal, by Newton's method on its length: TURNS where it is there, else as
+    `next_try`."""
     h, full = rows[H + lane], own[FIRST]
     value, rate = own[WAY] * rows[V1 + lane], own[WAY] * rows[A1 + lane]
     if value > 0:
@@ -200,6 +201,9 @@ def searched(rows, own, lane, cycles):
         rows[Z1 + lane] += rest * (rows[V1 + lane] + 0.5 * rest * rows[A1 + lane])
         rows[H + lane], found = new, True
     found |= own[HIGH] - own[LOW] <= 1e-15 * full or abs(rest) <= 2e-16 * (rows[T + lane] + h) or own[TRIES] >= 60
+    if found and rows[ERROR + lane] > 1:  # the stages of the first try may have passed by what bends beside the end
+        own[NEXT], own[REFUSED] = h * max(rows[CHANGE + lane], loop.SLOWER), own[REFUSED] + 1
+        return next_try(rows, own, lane)
     if found:
         rows[V1 + lane] = 0.0  # to the last digit
         accepted(rows, own, lane, cycles)
