@@ -77,6 +77,16 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     return Ring(float(own / (2 * np.pi)), damping, amplitude, (float(apart[0] / (2 * np.pi)), float(apart[1] / own)))
 
 
+def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict:
+    """ring_frequency [Hz] and ring_damping [1] of a decaying sinusoid known in closed form; {} where it is too faint.
+
+    amplitude [m s-2]: its largest, 0 where nothing rings; own [rad/s]; size [m s-2] of the whole signal.
+    """
+    if not amplitude > FAINT * size:
+        return {}
+    return {"ring_frequency": float(own / (2 * np.pi)), "ring_damping": float(damping)}
+
+
 def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     """Frequency [Hz] and damping ratio [1] of what rings in a signal, and their errors: medians over the sticks.
 

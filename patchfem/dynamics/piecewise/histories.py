@@ -9,10 +9,11 @@ import numpy as np
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ..events.event_list import RELEASE, ROOM, STOP, EventLog
+from ..piecewise_one import room as one
 from .elements import stretches, table_of, virgin
 from .plant import books_of, clock_of, place, plant_of, room_of
 
-HERE = "dynamics.piecewise"
+HERE, ALONE = "dynamics.piecewise", "dynamics.piecewise_one"
 SAMPLES = 400  # per drive cycle in the kept window
 LEAST = 101  # of a run that has no cycles
 CHUNK = 4096  # rows held at once
@@ -46,7 +47,8 @@ class PieceRun:
     acceleration: largest at the output in the window; log: events; snapshots: of the elements in the last cycle;
     events: how many pieces; swing, drift: half the range of the output in the window and the motion of the slide's
     mean per cycle [m]; waves: first and third harmonic of the absolute acceleration in the window [m s-2]; end:
-    (Start, memory) to go on from.
+    (Start, memory) to go on from; ring: (amplitude [m s-2], frequency [rad/s], damping ratio) of what rings while a
+    single element holds, with an amplitude of 0 where nothing does, None where the samples have to tell.
     """
 
     response: Response
@@ -66,6 +68,7 @@ class PieceRun:
     waves: tuple
     cycles_done: float
     end: tuple
+    ring: tuple | None = None
 
 
 def warm_up(say=None) -> tuple:
@@ -109,6 +112,8 @@ class _Run:
         wanted = np.zeros(count)
         wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
         self.books, self.cycles, self.period = books_of(count, wanted, travel), cycles, drive.period
+        self.alone = one.rig_of(self.plant) if one.serves(self.plant, self.clock, travel) else None
+        self.lines = one.room_of() if self.alone is not None else None
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.kept, self.events, self.count = [], 0, [], 0
         self.before, self.outcome, self.snapshots = np.zeros(len(self.groups)), None, []
@@ -123,8 +128,7 @@ class _Run:
         rows = np.empty((CHUNK, self.width))
         code = self.kernels.FULL
         while code == self.kernels.FULL and not self.passed:
-            code, used = self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.clock,
-                                            self.books, self.room, rows)
+            code, used = self._march(stop, rows)
             if code == self.kernels.PILED:
                 raise NotConverged(f"dynamics: events pile up at t = {rows[max(used - 1, 0), 0]:.9g} s")
             if code == self.kernels.TRAVEL:
@@ -140,6 +144,14 @@ class _Run:
             if progress is not None:
                 progress(min(self.now / (self.cycles * self.period), 1.0))
         return out
+
+    def _march(self, stop, rows) -> tuple:
+        """(code, rows used) of the compiled loop, of one mode its own."""
+        if self.alone is None:
+            return self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.clock, self.books,
+                                      self.room, rows)
+        return load(f"{ALONE}.one_kernels").march(stop, self.motion, self.alone, self.table, self.memory, self.clock,
+                                                  self.books, self.lines, rows)
 
     def _note(self, rows) -> np.ndarray:
         """Note stops and releases of all interfaces; which rows (k,) begin with one."""
@@ -172,6 +184,7 @@ class _Run:
             self.until(begin, False, progress)
         wide = self.until(first, True, progress) if first > begin else []
         late = []
+        before = float(self.before[0]) if len(self.before) else 0.0
         for stop in (first + 1, last):  # the drift asks for the first and the last cycle of the window
             if first < stop < end:
                 late += self.until(stop, True, progress)
@@ -179,7 +192,7 @@ class _Run:
             late += self.until(last + (end - last) * (k + 1) / frames, True)
             self.snapshots.append(self._snapshot())
         late += self.until(end, True, progress)
-        return None if self.passed else self._close(wide, late)
+        return None if self.passed else self._close(wide, late, before)
 
     @property
     def now(self) -> float:
@@ -191,7 +204,15 @@ class _Run:
                 "rate": float(self.plant.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
                 "stretch": stretches(self.groups[0], self.memory, 0)}
 
-    def _close(self, wide, late) -> PieceRun:
+    def _ring(self, late, before: float) -> tuple | None:
+        """`PieceRun.ring` of the rows of the window; before: way of the slip before them."""
+        if self.alone is None or self.table.count[0] > 1 or len(self.drive.segments) != 1:
+            return None
+        found, last = np.zeros(one.NUMBERS), self.clock.segments[0]
+        load(f"{ALONE}.window_kernels").rings(late, before, self.period, (last[5], last[4], last[3]), self.alone, found)
+        return one.ring_of(self.alone, self.table.stiff[0, -1], found[one.RING])
+
+    def _close(self, wide, late, before: float) -> PieceRun:
         """Everything kept, as a PieceRun."""
         none, late = np.empty((0, self.width)), np.concatenate(late)
         stop = late[-1, 0] + late[-1, 1]
@@ -216,7 +237,7 @@ class _Run:
         loops, *moved = self._loops(late)
         return PieceRun(_chain([*parts, window]), window, self.books.extremes[done], phasors, book, self.outcome,
                         loops, starts, float(high), log, self.snapshots, int(self.books.ledger[6]), *moved,
-                        stop / self.period, (Start(*self.motion.copy()), self.memory))
+                        stop / self.period, (Start(*self.motion.copy()), self.memory), self._ring(late, before))
 
     def log(self) -> EventLog:
         """The last stops and releases."""
@@ -283,7 +304,8 @@ class _Run:
             middle = slide.mean()
             q, pull = (2 / span * np.sum(turn * part) for part in (out[:, at] - middle, out[:, at + 2]))
             found.append(Loop(float(slide.min()), float(slide.max()), complex(q), complex(pull),
-                              float(work[-1] - work[0]), float(np.ptp(slip)), float(stuck), float(np.abs(force).max())))
+                              float(self.memory.worked[f] - work[0]), float(np.ptp(slip)), float(stuck),
+                              float(np.abs(force).max())))
         output, felt = ends[:, :n] @ self.modes.output, self._as_response(out, time).acceleration
         waves = tuple(complex(2 / span * np.sum(weight * felt * np.exp(-2j * np.pi * k * time / self.period)))
                       for k in (1, 3))

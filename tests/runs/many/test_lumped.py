@@ -11,8 +11,11 @@ from patchfem.scene.sets import assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
 SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + DRIVE
-LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2'}
+LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
+        "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"',
+        "iwan": 'law = "iwan"\nstatic = 0.3\nstiffness = "2e6 N/m"\nchi = -0.5\nbeta = 1.0'}
 SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
+LOOPS = ("loop_area", "equivalent_damping", "friction_work")
 DIFFERENCES = ("drift_per_cycle", "energy_balance", "work_check")  # of larger terms: known to their round-off
 
 
@@ -30,6 +33,8 @@ def models(law: str, seed: int, count: int) -> list:
             {"drive.force": push}
         if r.random() < 0.2:
             sets["structure.start.velocity"] = [0.05]
+        if law == "elastic-plastic":
+            sets["friction.bond_length"] = 10 ** r.uniform(-7, -4)
         scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
         out.append(build(base_of(scene).changed(assignments(sets))))
     return out
@@ -46,6 +51,15 @@ def batch(cases):
     for places in groups.values():
         found.place(places, lumped.solve([cases[case] for case in places]))
     return found
+
+
+def passed(found, case: int, name: str) -> float:
+    """Friction force times the slide of all cycles [J], or for the damping [1] the share of it in 2 pi K A^2."""
+    size = 40 * found.values["friction_force_peak"][case] * found.values["relative_displacement_amplitude"][case]
+    loop = found.values["loop_area"][case]
+    if name == "equivalent_damping":
+        return abs(found.values[name][case] / loop) * size if loop else 1.0
+    return size
 
 
 def conditioned(found, case: int) -> float:
@@ -66,6 +80,8 @@ def held_against(cases, ones, many) -> None:
                 continue
             value, bar = ones.values[name][case], ones.errors[name][case]
             near = 1e-12 * conditioned(ones, case) * abs(value)
+            if name in LOOPS:  # of the work that goes to and fro
+                near += 1e-14 * passed(ones, case, name)
             if name in DIFFERENCES:
                 near += max(bar, 1e-14) if np.isfinite(bar) else 1e-12
             elif name == "acceleration_distortion":
@@ -77,7 +93,7 @@ def held_against(cases, ones, many) -> None:
                 assert many.errors[name][case] == same, (case, name)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [one for one in LAWS if one != "iwan"])
 def test_exact_batch_is_the_single_runs(law):
     cases = models(law, 1, 20)
     held_against(cases, one_by_one.solve(cases), batch(cases))

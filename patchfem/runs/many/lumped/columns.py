@@ -26,7 +26,9 @@ class Runs:
     values: measure -> (n,), NaN where a run has none; book: energies of the run [J], (n,) each; extremes: (n, c, 2) [m]
     of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of every window; stuck, lost: (n,)
     whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of its
-    value; closes: gap of the energy balance beyond which a run has not converged.
+    value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run, whether
+    what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to settle
+    to, NaN where none is.
     """
 
     cycles: int
@@ -40,6 +42,14 @@ class Runs:
     errors: dict
     least: float
     closes: float
+    loads: np.ndarray | bool = False
+    steady: tuple | None = None
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """Half the range of the output in the last cycles (n,) [m]."""
+        last = self.extremes[:, -self.window:]
+        return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
 def answered(models, runs: Runs, numerics: dict) -> tuple:
@@ -48,7 +58,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     numerics: as `results.chosen` has it.
     """
     n, values = len(models), dict(runs.values)
-    values[MAIN] = (runs.extremes[:, -runs.window:, 1].max(axis=1) - runs.extremes[:, -runs.window:, 0].min(axis=1)) / 2
+    values[MAIN] = runs.amplitudes
     values["energy_balance"] = energy_balance(runs.book)
     nothing = np.zeros(n)
     errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
@@ -87,9 +97,15 @@ def _outcome(models, runs: Runs, tolerance) -> tuple:
     floor = SMALL * np.array([largest(m.rig.drive) / omega_of(m.rig.drive)**2 for m in models])
     decay = np.array([slowest(m.rig.modes) * runs.window * m.rig.drive.period for m in models])
     with np.errstate(all="ignore"):
-        number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window,
-                                  steady_amplitudes(ends, runs.phasors), (tolerance, floor, decay))
-    return [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)], steady
+        steady, bounded = steady_amplitudes(ends, runs.phasors), False
+        if runs.steady is not None:
+            bounded = ~np.isnan(runs.steady[0])
+            steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
+        number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window, steady,
+                                  (tolerance, floor, decay), bounded)
+    ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
+    return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
+        steady
 
 
 def _reasons(models, runs: Runs, found: Answers) -> None:

@@ -9,10 +9,10 @@ from ....core import BaseSine
 from ....model.model import Model
 from .. import one_by_one
 from ..answers import Answers
-from . import coulomb
+from . import coulomb, pieces
 from .columns import answered
 
-KINDS = {"exact": coulomb}
+KINDS = coulomb, pieces
 TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
 
 
@@ -28,12 +28,18 @@ def refuses(model: Model) -> str:
         return "it is not one mode under one sine"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
         return "it has no whole cycles, or no push, slide or output"
-    return coulomb.refuses(model)
+    kind = _kind(model)
+    return coulomb.refuses(model) if kind is None else ""
+
+
+def _kind(model: Model):
+    """The kind of cases that takes a model, None where there is none."""
+    return next((one for one in KINDS if not one.refuses(model)), None)
 
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return (int(model.rig.cycles),)
+    return int(model.rig.cycles), _kind(model).__name__, model.friction.law
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:
@@ -48,8 +54,9 @@ def solve(models: Sequence[Model], say=None) -> Answers:
 def _solved(models, say) -> Answers:
     begin, cycles = perf_counter(), int(models[0].rig.cycles)
     window = min(10, cycles // 10)
-    runs = coulomb.runs_of(models, cycles, window, say)
-    found, alone = answered(models, runs, coulomb.NUMERICS | {"window_cycles": window})
+    kind = _kind(models[0])
+    runs = kind.runs_of(models, cycles, window, say)
+    found, alone = answered(models, runs, kind.NUMERICS | {"window_cycles": window})
     found.seconds[:] = (perf_counter() - begin) / len(models)
     again = np.flatnonzero(alone).tolist()
     if not again:

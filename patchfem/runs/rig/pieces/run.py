@@ -7,12 +7,14 @@ import numpy as np
 from ....core import BaseSine, NotConverged, Outcome
 from ....dynamics.piecewise import elements, histories
 from ....dynamics.piecewise.steady import settled
+from ....dynamics.piecewise_one.steady import settled_alone
 from ....dynamics.second_book import gap, sampled_work
 from ....friction.record import law_from
 from ....response import run_events
 from ....response.levels import Level
 from ....response.measures import circular_mean, window_amplitudes, window_ends
 from ....response.outcome import steady_of
+from ....response.ringing import held_ring
 from ....response.rows import measures_of
 from ....structure.drive_sizes import omega_of, sinusoidal, whole
 from .. import levels as rig_levels
@@ -45,7 +47,10 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 def solution_of(model, numerics, patch, drive, found, done, seconds: float, **more) -> Solution:
     """The Solution of a PieceRun through Interfaces `found`; more: other fields of it."""
     values = values_of(model, numerics, patch, drive, done)
-    rings, own = run_events.rings(done.window, model.rig.modes, drive, done.log)
+    if done.ring is None:
+        rings, own = run_events.rings(done.window, model.rig.modes, drive, done.log)
+    else:
+        rings, own = held_ring(*done.ring, done.acceleration), {}
     outcome = done.outcome or (Outcome.STUCK if found.holds(done) else None)
     amplitudes = window_amplitudes(done.amplitudes, numerics.window)
     steady, bounded = None, False
@@ -70,15 +75,31 @@ def settles(modes, drive, groups, done) -> tuple | None:
     None where the run does not end with a period of a sine, or where no such motion was found.
     """
     last = drive.segments[-1] if drive.segments else None
-    if last is None or not sinusoidal(drive) or last.constant != 0 or abs(done.cycles_done % 1) > 1e-9:
+    if last is None or not sinusoidal(drive) or last.constant != 0 \
+            or abs(done.cycles_done - round(done.cycles_done)) > 1e-9:
         return None
-    try:
-        one = settled(modes, BaseSine(last.amplitude, last.omega, drive.moving), groups, *done.end)
-    except NotConverged:
-        return None
-    if np.abs(one.multipliers).max(initial=0.0) >= 1:
-        return None
-    return one.amplitude, one.amplitude * (1e-9 + one.error)
+    sine = BaseSine(last.amplitude, last.omega, drive.moving)
+    found = settled_alone(modes, sine, groups, *done.end)
+    if found is None:
+        try:
+            one = settled(modes, sine, groups, *done.end)
+        except NotConverged:
+            return None
+        found = one.amplitude, one.residual, one.multipliers
+    amplitude, error = (float(one[0]) for one in settled_of(*(np.asarray(one)[None] for one in found)))
+    return None if np.isnan(amplitude) else (amplitude, error)
+
+
+def settled_of(amplitude, residual, multipliers) -> tuple:
+    """Amplitudes [m] of stable motions and their errors, NaN of others, (n,) each.
+
+    residual (n,): by which they miss to close, over their size; multipliers (n, m) over a period. What it leaves in the
+    motion is that over how far they are from 1, and its last digits are rounding.
+    """
+    apart = np.maximum(np.abs(1 - multipliers).min(axis=1, initial=1.0), 1e-12)
+    error = amplitude * np.maximum(1e-9, 10 * residual / apart)
+    stable = np.abs(multipliers).max(axis=1, initial=0.0) < 1
+    return np.where(stable, amplitude, np.nan), np.where(stable, error, np.nan)
 
 
 class Interfaces:
@@ -144,8 +165,13 @@ def _second_book(done) -> float:
 
 def _of_interface(one, span: float) -> dict:
     """Measures of an interface by name, from its Loop over a window of `span` [s]."""
-    return {"slip_amplitude": one.slip / 2, "stick_fraction": min(one.stuck / span, 1.0),
+    return {"slip_amplitude": one.slip / 2, "stick_fraction": stuck_share(one.stuck, span),
             "friction_force_peak": one.force}
+
+
+def stuck_share(stuck, span):
+    """Share of a time span [s] that is stuck [s], 1 but for round-off of the sum of its pieces; numbers or (n,)."""
+    return np.where(stuck >= span * (1 - 1e-12), 1.0, stuck / span)[()]
 
 
 def _levels(model, numerics, patch, found, frames: int, progress) -> tuple:

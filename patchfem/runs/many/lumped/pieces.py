@@ -1,0 +1,167 @@
+"""Elastic-plastic elements, one or many, on one mode under a sine: all cases in one compiled call,
+`dynamics.piecewise_one`."""
+
+from math import ceil
+
+import numpy as np
+
+from ....compiled import load
+from ....dynamics.piecewise.elements import paired, table_of
+from ....dynamics.piecewise.plant import clock_of
+from ....dynamics.piecewise_one import names_kernels as read
+from ....dynamics.piecewise_one import room as made
+from ....dynamics.second_book import gap
+from ....effects import has
+from ....friction.record import law_from
+from ....response.errors import cells_error
+from ....response.loops import interface_loops
+from ....response.measures import ROUND, energy_balance
+from ....response.ringing import FAINT
+from ...rig.engines import PIECES, engine_of
+from ...rig.pieces.costs import pieces
+from ...rig.pieces.run import group_of, settled_of, stuck_share
+from .columns import MAIN, Runs
+from .threads import in_threads
+
+KERNELS = "dynamics.piecewise_one.batch_kernels"
+ROOM = 1.5  # times the pieces that a window may have
+LONGEST = 4000  # cycles of a run whose extremes are all held
+
+
+def refuses(model) -> str:
+    """Why the cases of this kind do not take a model; "" where they do."""
+    if not has(model.friction.law, "cells") and model.friction.law != "elastic-plastic":
+        return "its law is not made of elements"
+    if not 20 <= model.rig.cycles <= LONGEST:
+        return "its cycles are too few or too many"
+    return "" if engine_of(model) is PIECES else "its engine is not that of pieces"
+
+
+def row_of(model) -> tuple:
+    """(rig (6,), start (5,), segment (10,), Elements, (stiffness K, load)) of a model: rig and start by the places of
+    `names_kernels`, the drive as `drive_kernels` has it."""
+    rig, modes = model.rig, model.rig.modes
+    element = law_from(model.friction, model.point.load).element(model.point.load)
+    z, v = (0.0, 0.0) if rig.start is None else (float(rig.start.z[0]), float(rig.start.v[0]))
+    numbers = (float(modes.omega[0])**2, float(modes.dampers[0, 0]), float(modes.interfaces[0, 0]),
+               float(modes.base[0]), float(modes.output[0]), modes.mass)
+    start = z, v, float(rig.drive.moving), model.accuracy.tolerance, 1e-3 * element.length
+    return (numbers, start, clock_of(rig.drive, 1).segments[0], group_of(element),
+            (rig.stiffness, model.point.load))
+
+
+def runs_of(models, cycles: int, window: int, say=None) -> Runs:
+    """Runs of models of this kind, all of `cycles` cycles from their starts."""
+    rows, kernels = [row_of(model) for model in models], load(KERNELS, say)
+    rigs, starts, segments, others = (np.array([row[k] for row in rows]) for k in (0, 1, 2, 4))
+    most = ceil(ROOM * window * max(map(pieces, models))) + 256
+    groups = [row[3] for row in rows]
+    found = _solved(kernels, (rigs, starts, segments), groups, (cycles, window), most)
+    out = _read(found, others, cycles, window)
+    if has(models[0].friction.law, "cells"):
+        coarse = _solved(kernels, (rigs, starts, segments), [paired(one) for one in groups], (cycles, window), most)
+        return _with_cells(out, _read(coarse, others, cycles, window))
+    return out
+
+
+class _Found:
+    """What the compiled call gave of n cases, arrays by the names that it has for them."""
+
+    def __init__(self, given, counts, sorts, cycles: int, window: int):
+        n, windows = len(counts), (cycles - 1) // window + 1
+        self.rigs, self.starts, self.segments, self.counts, self.sorts = *given, counts, sorts
+        self.extremes, self.phasors = np.empty((n, cycles, 2)), np.empty((n, windows, 2))
+        self.ledgers, self.numbers = np.empty((n, 8)), np.full((n, read.NUMBERS), np.nan)
+        self.ends, self.steady = np.full((n, 5), np.nan), np.full((n, 3), np.nan)
+        self.slopes, self.codes = np.zeros((n, read.MOST, read.MOST)), np.zeros(n, np.int64)
+
+
+def _solved(kernels, given, groups: list, shape: tuple, most: int) -> _Found:
+    """The compiled call for elements of every case."""
+    table = [table_of([one]) for one in groups]
+    wide, (cycles, window) = max(one.reach.shape[1] for one in table), shape
+    counts, sorts = np.array([one.count[0] for one in table]), np.empty((len(table), 4, wide))
+    for k, one in enumerate(table):
+        for column, part in zip(sorts[k], (one.reach, one.stiff, one.limit, one.twice)):
+            column[:part.shape[1]], column[part.shape[1]:] = part[0], part[0, -1]
+    found = _Found(given, counts, sorts, cycles, window)
+    wanted = np.zeros(cycles)
+    wanted[cycles - 1::-window] = 1.0
+
+    def go(part: slice) -> None:
+        answers = (found.extremes, found.phasors, found.ledgers, found.numbers, found.ends, found.steady, found.slopes)
+        cases = (*given, counts, sorts)
+        kernels.runs(tuple(one[part] for one in cases), shape, made.work_of(wide - 1, cycles, wanted, most),
+                     tuple(one[part] for one in answers), found.codes[part])
+
+    in_threads(go, len(groups))
+    return found
+
+
+def _read(found: _Found, others, cycles: int, window: int) -> Runs:
+    """Measures of the runs."""
+    x, ends, ledger = found.numbers.T, found.ends.T, found.ledgers.T
+    book = dict(zip(("work_in", "viscous", "power"), ledger)) | {"friction": ledger[4]}
+    book |= {"stored": ends[read.STORED] - ends[read.BEGUN], "peak_stored": np.maximum(ledger[5], ends[read.BEGUN])}
+    period = 2 * np.pi / found.segments[:, 5]
+    with np.errstate(all="ignore"):
+        values = _values(found, x, book, others, period, window)
+        half = (x[read.SLIP_HIGH] - x[read.SLIP_LOW]) / 2
+        stuck = half <= np.maximum(found.starts[:, read.HELD], ROUND * x[read.REACH])
+        pulls = np.abs(x[[read.F_FIRST, read.F_LAST]]) / period
+        loads = stuck & (pulls[1] - pulls[0] > found.starts[:, read.TOLERANCE] * x[read.FORCE])
+    settles = (found.codes == read.STEADY) & ~stuck
+    steady = np.full((2, len(stuck)), np.nan)
+    if settles.any():
+        slopes = np.linalg.eigvals(found.slopes[settles])
+        steady[:, settles] = settled_of(*found.steady[settles][:, [read.AMOUNT, read.RESIDUAL]].T, slopes)
+    lost = (found.codes == read.LOST) | ((found.codes == read.UNKNOWN) & ~stuck) | (x[read.EDGE] > 0)
+    rings = (found.counts > 1) & (x[read.LONGEST] * _fastest(found) >= 0.999 * 3 * np.pi)
+    errors = {name: np.zeros(len(stuck)) for name in values}
+    return Runs(cycles, window, values, book, found.extremes, found.phasors @ [1, 1j], stuck, lost | rings, errors,
+                PIECES.least, PIECES.closes, loads, tuple(steady))
+
+
+def _fastest(found: _Found):
+    """Fastest rate [rad/s] at which anything rings, (n,)."""
+    stiff = found.sorts[:, 1].max(axis=1)
+    return np.sqrt(found.rigs[:, read.SQUARE] + stiff * found.rigs[:, read.FACE]**2 / found.rigs[:, read.MASS])
+
+
+def _values(found: _Found, x, book: dict, others, period, window: int) -> dict:
+    """Measures (n,) by name from the numbers x (NUMBERS, n), but amplitude and energy balance."""
+    span, (stiffness, load_) = window * period, others.T
+    q = 2 / span * (x[read.Q_COS] - 1j * x[read.Q_SIN])
+    f = 2 / span * (x[read.F_COS] - 1j * x[read.F_SIN])
+    first, third = (2 / span * np.hypot(x[a], x[b]) for a, b in ((read.A_COS, read.A_SIN), (read.A3_COS, read.A3_SIN)))
+    angle = np.arctan2(x[read.START_SIN], x[read.START_COS]) / 2 % np.pi
+    energy, moves = book["power"] + book["peak_stored"], x[read.HIGH] > x[read.LOW]
+    rung, own, damping = made.ring_of(found.rigs, found.sorts[:, 1].max(axis=1), x[read.RING])
+    rings = (rung > FAINT * x[read.ACCELERATION]) & (found.counts == 1)
+    out = {
+        "absolute_acceleration_peak": x[read.ACCELERATION], "friction_force_peak": x[read.FORCE],
+        "acceleration_distortion": np.where(first > 0, third / np.where(first > 0, first, 1.0), np.nan),
+        "drift_per_cycle": (x[read.LAST] - x[read.FIRST]) / period / (window - 1),
+        "slip_amplitude": (x[read.SLIP_HIGH] - x[read.SLIP_LOW]) / 2,
+        "stick_fraction": stuck_share(x[read.STUCK], span),
+        "slip_start_phase": np.where(x[read.STARTS] > 0, angle, np.nan), "normal_load": load_,
+        "friction_work": found.ledgers[:, 3], "energy_dissipated": found.ends[:, read.EVER],
+        "energy_created": np.zeros(len(x[0])),
+        "work_check": gap(x[read.TURNED], x[read.WORK], x[read.PASSED], energy),
+        "secant_stiffness": np.where(moves, x[read.SECANT], np.nan),
+        "ring_frequency": np.where(rings, own / (2 * np.pi), np.nan), "ring_damping": np.where(rings, damping, np.nan)}
+    return out | interface_loops(np.where(moves, x[read.RANGE] / 2, 0.0), q, f, x[read.WORK] / window, stiffness)
+
+
+def _with_cells(fine: Runs, coarse: Runs) -> Runs:
+    """Runs with the errors that runs of half as many elements tell."""
+    whole = [one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)} for one in (fine, coarse)]
+    for case in range(len(fine.stuck)):
+        a, b = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])} for one in whole)
+        told = cells_error(a, b)
+        for name, value in a.items():
+            fine.errors.setdefault(name, np.zeros(len(fine.stuck)))[case] = told.get(name, abs(value))
+    return fine
+
+
+NUMERICS = {"engine": "piecewise"}

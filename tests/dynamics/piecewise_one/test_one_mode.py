@@ -1,0 +1,123 @@
+"""The loop of one mode against the loop of any modes, and the motion that a run settles to."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import BaseSine, ModalBasis, Start
+from patchfem.dynamics.piecewise import histories
+from patchfem.dynamics.piecewise.elements import elements_of
+from patchfem.dynamics.piecewise.steady import settled
+from patchfem.dynamics.piecewise_one.steady import settled_alone
+from patchfem.response.measures import energy_balance
+from patchfem.response.run_events import rings
+from patchfem.structure.drives import levels, release, step
+
+
+def basis(omega, zeta, slide=1.0, base=1.0, output=1.0, mass=1.0):
+    return ModalBasis(("one",), *(np.array([one], float) for one in (omega, zeta, slide, base, output)), mass)
+
+
+def random_run(seed: int) -> tuple:
+    """(modes, drive, stiffness, yield slide): rigid, undamped and overdamped modes, below and above resonance."""
+    r = np.random.default_rng(seed)
+    count, omega = int(np.exp(r.uniform(0, np.log(40)))), r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))])
+    zeta = float(r.choice([0.0, 0.003, 0.1, 1.0, 2.5]))
+    modes = basis(omega, zeta, *(r.uniform(0.3, 1.5, 3) * r.choice([-1, 1], 3)), float(np.exp(r.uniform(-1, 1))))
+    y, k = np.exp(r.uniform(-3, 0, count)), np.exp(r.uniform(-1, 2, count))
+    k *= modes.mass * np.exp(r.uniform(-2, 0.3)) / (k @ y)
+    return modes, BaseSine(1.0, float(np.exp(r.uniform(-1, 1)))), k, y
+
+
+def both(modes, drive, groups, cycles=13, **more):
+    """PieceRuns of the same by the loop of one mode and by that of any."""
+    alone = histories.simulate(modes, drive, groups, cycles, window=4, **more)
+    serves, histories.one.serves = histories.one.serves, lambda *given: False
+    try:
+        return alone, histories.simulate(modes, drive, groups, cycles, window=4, **more)
+    finally:
+        histories.one.serves = serves
+
+
+def same(modes, drive, groups, **more):
+    alone, any_modes = both(modes, drive, groups, **more)
+    size = np.abs(any_modes.response.modal).max()
+    np.testing.assert_allclose(alone.end[0].z, any_modes.end[0].z, rtol=0, atol=1e-11 * size)
+    np.testing.assert_allclose(alone.amplitudes, any_modes.amplitudes, rtol=0, atol=1e-11 * size)
+    np.testing.assert_allclose(alone.phasors, any_modes.phasors, rtol=0, atol=1e-11 * size)
+    energy = any_modes.ledger["power"] + any_modes.ledger["peak_stored"]
+    for name in ("work_in", "viscous", "friction", "stored", "peak_stored"):
+        assert alone.ledger[name] == pytest.approx(any_modes.ledger[name], rel=0, abs=1e-10 * energy), name
+    assert alone.ledger["power"] == pytest.approx(any_modes.ledger["power"], rel=0.1)  # the twin's are a few points
+    assert energy_balance(alone.ledger) <= 1e-11
+    for one, other in zip(alone.loops[0], any_modes.loops[0]):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9 * max(size, energy, alone.loops[0].force))
+    assert len(alone.log.time) == len(any_modes.log.time)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_exact_one_mode_as_any_modes(seed):
+    modes, drive, k, y = random_run(seed)
+    same(modes, drive, [elements_of(k, y)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 180))
+def test_exact_one_mode_as_any_modes_many(seed):
+    modes, drive, k, y = random_run(seed)
+    same(modes, drive, [elements_of(k, y)], start=Start(np.array([0.3]), np.array([-0.2])))
+
+
+def test_exact_a_push_that_stays_and_levels_one_after_the_other():
+    modes, groups = basis(1.3, 0.01), [elements_of([3.0, 1.0], [0.1, 0.4])]
+    same(modes, step(0.7, 2 * np.pi), groups)
+    same(modes, levels([0.5, 1.0, 0.3], 1.1, 4, True), groups)
+    same(modes, release(2 * np.pi), groups, start=Start(np.array([2.0]), np.array([0.0])))
+
+
+def test_exact_power_of_a_drive_of_two_signs():
+    """Elements that never yield are a spring, so the power is that of a linear oscillator from rest."""
+    modes, omega = basis(1.0, 0.05, base=-1.0), 2.0
+    done = histories.simulate(modes, BaseSine(1.0, omega), [elements_of([3.0], [1e3])], 6, window=2)
+    own = np.sqrt(4.0 - 0.05**2)
+    time = np.linspace(0, 6 * np.pi, 400_001)
+    gain = 1 / (4.0 - omega**2 + 0.1j * omega)
+    forced = (gain * np.exp(1j * omega * time)).imag, (1j * omega * gain * np.exp(1j * omega * time)).imag
+    a, b = -forced[0][0], (-forced[1][0] - 0.05 * forced[0][0]) / own
+    v = forced[1] + np.exp(-0.05 * time) * ((own * b - 0.05 * a) * np.cos(own * time)
+                                            - (own * a + 0.05 * b) * np.sin(own * time))
+    assert done.ledger["power"] == pytest.approx(np.trapezoid(np.abs(np.sin(omega * time) * v), time), rel=1e-7)
+
+
+def test_exact_settled_as_the_map_of_any_modes():
+    """Many elements may turn where they turned a period before, within round-off: the map has two slopes there."""
+    alike = 0
+    for seed in range(41, 52):
+        modes, drive, k, y = random_run(seed)
+        groups = [elements_of(k, y)]
+        done = histories.simulate(modes, drive, groups, 12, window=4)
+        one = settled_alone(modes, drive, groups, *done.end)
+        if one is None:
+            continue
+        other = settled(modes, drive, groups, *done.end)
+        assert one[0] == pytest.approx(other.amplitude, rel=1e-10)
+        largest = [np.abs(each).max(initial=0.0) for each in (one[2], other.multipliers)]
+        assert (largest[0] < 1) == (largest[1] < 1)
+        alike += largest[0] == pytest.approx(largest[1], rel=1e-6, abs=1e-8)
+    assert alike >= 5
+
+
+def test_exact_ring_of_an_element_that_holds():
+    """In closed form, as a fit to the samples finds it, at the frequency of mode and element together."""
+    modes, drive = basis(1.0, 0.02), BaseSine(1.0, 0.31)
+    done = histories.simulate(modes, drive, [elements_of([60.0], [0.02])], 20, window=4)
+    amplitude, own, damping = done.ring
+    assert own == pytest.approx(np.sqrt(61.0 - 0.02**2)) and damping == pytest.approx(0.02 / np.sqrt(61.0))
+    assert amplitude > 1e-5
+    fitted, errors = rings(done.window, modes, drive, done.log)
+    assert fitted["ring_frequency"] == pytest.approx(own / (2 * np.pi), abs=errors["ring_frequency"] + 1e-9)
+    assert fitted["ring_damping"] == pytest.approx(damping, abs=errors["ring_damping"] + 1e-8)
+
+
+def test_exact_nothing_rings_where_sticks_are_short():
+    done = histories.simulate(basis(1.0, 0.02), BaseSine(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4)
+    assert done.ring[0] == 0.0
