@@ -11,14 +11,24 @@ from .sweep import Over
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
-    """Name every mistake in SCENE and in the files that it names; compute nothing."""
+    """Name every mistake in SCENE and in the files that it names; compute nothing. A table [sweep] whose cases are all
+    refused is one."""
     found = scene_of(scene, set_, _faults)
+    cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
         say(f"{scene}: {remark}")
     if json_:
-        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks}))
+        print(json.dumps({"kind": found.kind, "effects": found.named(), "remarks": found.remarks}
+                         | ({"cases": cases} if cases else {})))
     else:
-        print(f"{scene}: a {found.kind} scene without mistakes")
+        print(f"{scene}: a {found.kind} scene without mistakes" + (f", {cases} cases" if cases else ""))
+
+
+def _swept(scene: Path, sets, what: Over) -> tuple:
+    """(what all cases share, the cases) of a sweep."""
+    from ..campaigns.sweeps.ask import asked_of
+
+    return asked_of(scene, sets, what.request())
 
 
 def _faults(tables, folder: Path, whole: bool) -> list:
@@ -38,12 +48,12 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     With --over, or a table [sweep], of the whole sweep."""
     from ..runs.plan import plan as make
 
-    if what is not None and what.given():
-        _plan_sweep(scene, set_, what, json_)
-        return
-    read = scene_of(scene, set_)
-    if read.sweep:
-        _plan_sweep(scene, set_, Over(), json_)
+    over = what if what is not None and what.given() else None
+    read = scene_of(scene, set_) if over is None else None
+    if over is not None or read.sweep:
+        if probe:
+            raise Refused("--probe solves the patch of one scene; name its values by --set and leave out what is swept")
+        _plan_sweep(scene, set_, over or Over(), json_)
         return
     found = make(read)
     answer, asked = found.as_json(), found.model.patch
@@ -61,10 +71,9 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
 
 def _plan_sweep(scene: Path, sets, what: Over, json_: bool) -> None:
     """The plan of a sweep."""
-    from ..campaigns.sweeps.ask import asked_of
     from ..campaigns.sweeps.estimate import estimate
 
-    answer = estimate(*asked_of(scene, sets, what.request()))
+    answer = estimate(*_swept(scene, sets, what))
     if json_:
         print(json.dumps(answer))
         return

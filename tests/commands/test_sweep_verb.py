@@ -116,6 +116,8 @@ def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
     path.write_text(RIG + table, encoding="utf-8")
     assert cli("check", path).code == 0
     assert cli("sweep", path, "-o", tmp_path / "swept").code == 3
+    assert cli("check", path).out.endswith("a rig scene without mistakes, 6 cases\n")
+    assert json.loads(cli("check", path, "--json").out)["cases"] == 6
     assert (tmp_path / "swept" / "sweep.csv").read_bytes() == (swept[0] / "sweep.csv").read_bytes()
     told = cli("run", path, "-o", tmp_path / "one")
     assert told.code == 2 and "use `patchfem sweep`" in told.err
@@ -204,6 +206,19 @@ def test_refuses_before_anything_runs(scene, tmp_path, words, says):
     assert len(answer.err.splitlines()) == len(says)
     for one in says:
         assert one in answer.err
+
+
+def test_refuses_a_table_whose_cases_are_all_refused(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG + '[sweep]\n"normal.load" = "-1 N, -2 N"\n', encoding="utf-8")
+    told = [cli(verb, path) for verb in ("check", "plan", "sweep")]
+    assert [one.code for one in told] == [2, 2, 2] and len({one.err for one in told}) == 1
+    assert told[0].err.count("must be >= 0") == 2
+
+
+def test_refuses_to_probe_many_cases(scene):
+    answer = cli("plan", scene, *OVER, "--probe")
+    assert answer.code == 2 and "--probe solves the patch of one scene" in answer.err
 
 
 def test_refuses_a_folder_of_others(scene, tmp_path):
