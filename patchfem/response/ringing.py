@@ -5,6 +5,7 @@ sinusoids are fitted together and the one with the most energy is kept.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -142,22 +143,27 @@ class _Fit(NamedTuple):
 
 def _fitted(time, value, forced, poles, *ends) -> tuple:
     """(times that a fit was looked at, the sum of squares that the best one leaves, its room as
-    `ringing_kernels.fitted` has it); poles (2 r,) move to the best ones, not at all without `ends`."""
+    `ringing_kernels.fitted` has it, until the next call); poles (2 r,) move to the best ones, not at all without
+    `ends`."""
     from ..compiled import kernels  # runs in which nothing rings load no compiled code
 
-    count, many, samples = forced.shape[1] + poles.size, poles.size, time.size
-    columns = np.empty((3, count, samples))
-    columns[0, :forced.shape[1]] = forced.T
-    room = (columns, np.empty((count + 2, count)), np.empty((many, samples)), np.zeros((many, many + 1)),
-            np.empty((many + 2, many)))
+    room = _room(forced.shape[1] + poles.size, poles.size, time.size)
+    room[0][0, :forced.shape[1]] = forced.T
     ends = np.array([*ends, STEPS] if ends else [0.0] * 4)
     return *kernels(KERNELS).fitted(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
+
+
+@lru_cache(maxsize=16)
+def _room(count: int, many: int, samples: int) -> tuple:
+    """The room of a fit of `many` poles; the same at every call, which spares the time to make and describe it."""
+    return (np.empty((3, count, samples)), np.empty((count + 2, count)), np.empty((many, samples)),
+            np.zeros((many, many + 1)), np.empty((many + 2, many)))
 
 
 def _share(time, value, forced, poles) -> tuple:
     """Part of each sinusoid: (what is left over (k,), the sinusoids [(k,)])."""
     n, (columns, few, *_) = forced.shape[1], _fitted(time, value, forced, poles)[2]
-    return columns[2, 0], [few[-1, at:at + 2] @ columns[0, at:at + 2] for at in range(n, n + poles.size, 2)]
+    return columns[2, 0].copy(), [few[-1, at:at + 2] @ columns[0, at:at + 2] for at in range(n, n + poles.size, 2)]
 
 
 def _grown(time, value, forced, rest) -> _Fit | None:

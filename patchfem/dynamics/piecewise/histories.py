@@ -1,7 +1,7 @@
 """Samples, extremes, energies and events of a run of piecewise-linear elements."""
 
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,9 @@ LEAST = 101  # of a run that has no cycles
 CHUNK = 4096  # rows held at once
 CORNERS = 400_000  # turning points kept from before the window
 SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
-GAUSS = 12
+# largest piece times rate for which g Gauss points, g = 0 to 12, integrate a product of two motions to 1e-14
+GAUSS = np.array([0.0] + [0.5 * (1e-14 * (2 * g + 1) * factorial(2 * g)**3 / factorial(g)**4)**(1 / (2 * g))
+                          for g in range(1, 13)])
 
 
 class Loop(NamedTuple):
@@ -287,11 +289,8 @@ class _Run:
     def _loops(self, rows) -> tuple:
         """(what the measures ask of every interface over the pieces of the window, half the range of the output, motion
         of the first slide per cycle), by Gauss points and the ends of the pieces."""
-        nodes, weight = np.polynomial.legendre.leggauss(GAUSS)
-        owner = np.repeat(np.arange(len(rows)), GAUSS)
-        tau = (rows[:, 1:2] * (1 + nodes) / 2).ravel()
+        owner, tau, weight = self._points(rows)
         n, out, time = self.modes.omega.size, self.dense_values(rows, owner, tau), rows[owner, 0] + tau
-        weight = (rows[:, 1:2] * weight / 2).ravel()
         turn = np.exp(-2j * np.pi * time / self.period) * weight
         begin = self.dense_values(rows, np.arange(len(rows)), np.zeros(len(rows)))
         close = self.dense_values(rows[-1:], np.zeros(1, np.int64), rows[-1:, 1].copy())
@@ -311,6 +310,21 @@ class _Run:
                       for k in (1, 3))
         drift = self._drift(time, weight, out[:, 2 * n + 1], rows[0, 0], rows[-1, 0] + rows[-1, 1], ends[:, 2 * n + 1])
         return tuple(found), float(np.ptp(output)) / 2, drift, waves
+
+    def _points(self, rows) -> tuple:
+        """(row (k,), time in it (k,) [s], weight (k,) [s]) of Gauss points that integrate products of the motion and
+        of the third harmonic over the pieces of rows."""
+        springs = rows[:, self._at(0, 1)::self.kernels.EACH][:, :len(self.groups)]
+        square, damp = self.plant.square_most + springs @ self.plant.reach, 0.5 * self.plant.damping_most
+        rate = np.maximum(damp + np.sqrt(damp**2 + square), 6 * np.pi / self.period)
+        count = np.minimum(np.searchsorted(GAUSS, rate * rows[:, 1]), GAUSS.size - 1).clip(2)
+        owner = np.repeat(np.arange(len(rows)), count)
+        each = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count)
+        place, weight = np.zeros((2, GAUSS.size, GAUSS.size))
+        for g in set(count.tolist()):
+            place[g, :g], weight[g, :g] = np.polynomial.legendre.leggauss(g)
+        half = rows[owner, 1] / 2
+        return owner, half * (1 + place[count[owner], each]), half * weight[count[owner], each]
 
     def _drift(self, time, weight, slide, start: float, end: float, ends) -> float:
         """Mean of a slide in the last cycle of [start, end] less that in the first, per cycle between them [m]; in

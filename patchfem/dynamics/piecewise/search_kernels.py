@@ -4,6 +4,8 @@ Up to the first turning point of a slide, whose speed is proved free of roots be
 yield before it is one root of a monotone function: no event can be missed.
 """
 
+from math import sqrt
+
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .memory_kernels import threshold
@@ -57,7 +59,10 @@ def crossing(poly, top, room, limit, spare):
     spare[0] = way * room
     for k in range(top):
         spare[k + 1] = -way * poly[k] * OVER[k + 1]
-    return polish(spare, 0, top, 0.0, limit, limit * room / end)
+    start, square = limit * room / end, spare[1] * spare[1] - 4 * spare[0] * spare[2]
+    if square > 0 and 2 * spare[0] < limit * (sqrt(square) - spare[1]):  # the root of the first three terms
+        start = 2 * spare[0] / (sqrt(square) - spare[1])
+    return polish(spare, 0, top, 0.0, limit, start)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

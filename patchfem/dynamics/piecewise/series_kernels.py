@@ -78,6 +78,23 @@ def single_series(motion, force, spring, plant, wave, h, top, coefs):
         coefs[k + 2, 0] = after
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def double_series(motion, force, spring, plant, wave, h, top, coefs):
+    """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
+    squared, face_1, face_2, base_1, base_2 = h * h, plant.faces[0, 0], plant.faces[0, 1], plant.base[0], plant.base[1]
+    stiff_1, stiff_2, stiff = squared * plant.square[0], squared * plant.square[1], squared * spring / plant.mass
+    damp_1, damp_2, pull = h * plant.damping[0, 0], h * plant.damping[1, 1], squared * force / plant.mass
+    here_1, here_2, after_1, after_2 = motion[0, 0], motion[0, 1], h * motion[1, 0], h * motion[1, 1]
+    coefs[0, 0], coefs[0, 1], coefs[1, 0], coefs[1, 1] = here_1, here_2, after_1, after_2
+    for k in range(top - 1):
+        push, count = squared * wave[k], k + 1
+        new_1 = -TWICE[k + 2] * (stiff_1 * here_1 + base_1 * push + face_1 * pull + damp_1 * count * after_1)
+        new_2 = -TWICE[k + 2] * (stiff_2 * here_2 + base_2 * push + face_2 * pull + damp_2 * count * after_2)
+        pull = stiff * (face_1 * after_1 + face_2 * after_2)
+        here_1, here_2, after_1, after_2 = after_1, after_2, new_1, new_2
+        coefs[k + 2, 0], coefs[k + 2, 1] = new_1, new_2
+
+
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
 def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
     """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
@@ -89,6 +106,9 @@ def motion_series(motion, force, springs, plant, wave, h, top, coefs, pull):
     n, faces, squared = plant.square.size, plant.faces, h * h
     if n == 1 and springs.size == 1:
         single_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
+        return
+    if n == 2 and springs.size == 1 and not plant.coupled:
+        double_series(motion, force[0], springs[0], plant, wave, h, top, coefs)
         return
     for i in range(n):
         coefs[0, i], coefs[1, i] = motion[0, i], h * motion[1, i]

@@ -24,7 +24,7 @@ def chain(random, count, coupled):
                       None if dampers is None else dampers @ dampers.T)
 
 
-@pytest.mark.parametrize(("count", "coupled"), [(1, False), (3, False), (5, True)])
+@pytest.mark.parametrize(("count", "coupled"), [(1, False), (2, False), (2, True), (3, False), (5, True)])
 def test_exact_series_is_the_exponential_of_its_system(count, coupled):
     random = np.random.default_rng(count)
     modes, spring, force = chain(random, count, coupled), 3.0, 0.4

@@ -54,7 +54,7 @@ def solution_of(model, numerics, patch, drive, found, done, seconds: float, **mo
     outcome = done.outcome or (Outcome.STUCK if found.holds(done) else None)
     amplitudes = window_amplitudes(done.amplitudes, numerics.window)
     steady, bounded = None, False
-    if outcome is None and changes(amplitudes, model.accuracy.tolerance):
+    if numerics.whole and outcome is None and changes(amplitudes, model.accuracy.tolerance):
         steady = settles(model.rig.modes, drive, found.groups, done)
         bounded = steady is not None
     if steady is None:
