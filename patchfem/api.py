@@ -123,12 +123,14 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
 def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> Answers:
     """Answers of many models, or of scenes as `load` takes them: a column per measure, a place per model.
 
-    Models that share work are run together, with the answers of single runs. A model that cannot run has outcome
-    "failed" and its message; SceneError for a mistake in a scene.
+    Models that share work are run together, with the answers of single runs; patches of one geometry share the mesh
+    that serves all of them, as in a sweep. A model that cannot run has outcome "failed" and its message; SceneError
+    for a mistake in a scene.
     """
     from .runs.many.many import answers
+    from .runs.many.meshes import meshed
 
-    return answers([build(one) for one in models], say=_on_stderr if say is None else say)
+    return answers(meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:

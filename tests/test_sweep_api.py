@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from scene_texts import BENCH, COULOMB, POINT, SHORT
+from scene_texts import BENCH, COULOMB, PATCH, POINT, SHORT
 
 import patchfem as pf
 
@@ -85,3 +85,15 @@ def test_exact_many_models_are_single_runs():
         assert found.outcome[case] == single.outcome
         for name, one in single.measures.items():
             alike(found.values[name][case], one.value, one)
+
+
+def test_exact_many_patches_of_one_geometry_are_those_of_a_sweep():
+    """They share its mesh, so that they are alike to round-off; a patch alone chooses its own."""
+    angles = [2e-5, 2e-4]
+    text = PATCH + "[accuracy]\ntolerance = 1e-2\n"
+    swept = pf.sweep(text, {"contact.tilt.angle": angles})
+    found = pf.run_many([pf.load(text, **{"contact.tilt.angle": angle}) for angle in angles])
+    assert found.numerics[0] == found.numerics[1]
+    for name, values in found.values.items():  # the digits of a pressure at an end are those of a cell of a micron
+        near = 1e-9 if name in ("pressure_peak", "loaded_fraction") else 1e-12
+        np.testing.assert_allclose(values, swept[name].values, rtol=near, atol=near * found.floors[name].max())

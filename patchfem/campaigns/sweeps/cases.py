@@ -72,17 +72,19 @@ class Cases:
         return numbers
 
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
-        """The cases in an order in which those with the same pieces follow each other, for they share most work."""
-        slow = [k for k, axis in enumerate(self.axes) if axis.key.startswith(PIECES)]
+        """The cases in an order in which those with the same pieces follow each other, for they share most work, and
+        among these the ones with the same patch."""
+        slow = sorted((k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")),
+                      key=lambda k: not self.axes[k].key.startswith(PIECES))
         if not slow:
             return list(numbers)
         alike = [{value: place for place, value in reversed(list(enumerate(axis.values)))} for axis in self.axes]
 
-        def pieces(number: int) -> list:
+        def patch(number: int) -> list:
             places = self.places(number)
             return [alike[k][self.axes[k].values[places[k]]] for k in slow]
 
-        return sorted(numbers, key=pieces)
+        return sorted(numbers, key=patch)
 
     def keys(self, asked: Asked) -> list[str]:
         """Name of every case, made of what it computes: the same values in other units or another order have the same

@@ -7,7 +7,7 @@ from ...dynamics.march.models import jenkins_model, points_model
 from ...effects import has
 from ...friction.record import law_from
 from ...slip.fields import element_fields, point_fields, shear_of
-from ...slip.shear_modes import jenkins_set
+from ..patch.shared.kept import elements
 from .follow import follow
 from .ledger import Slid
 from .watch import Watch
@@ -24,7 +24,7 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     """Coulomb and elastic-plastic points: parallel elements."""
     f = model.friction
     length = law_from(f).element(1.0).length
-    found = jenkins_set(patch.giving, f.static * patch.pressure.sigma_n * patch.pieces.interface.weight, length)
+    found = elements(patch, f.static, length)
     done = follow(jenkins_model(found.stiffness, found.yield_slide), time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)

@@ -1,7 +1,7 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .condensed import condensed, shared_pairs
 from .grading import base_grids
 from .measures import measures, met, missed
 from .press import pressed, solve
+from .shared.kept import KEPT, Kept, shares
 
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
 LEAST_LEVELS = 3  # nested meshes that show an order
@@ -46,12 +47,17 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     fresh: condense anew, whatever is kept on disk.
     """
     if asked.meshes is not None:
-        pairs = tuple(condensed(asked, *level, fresh=True) for level in asked.meshes.levels) if fresh else \
-            shared_pairs(asked)
-        return on_pairs(asked, pairs, estimate)
+        if fresh:
+            return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)
+        return _kept(Kept(asked), estimate) if shares(asked) else on_pairs(asked, shared_pairs(asked), estimate)
     if asked.chosen:
         return climbed(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
+
+
+@lru_cache(maxsize=KEPT)
+def _kept(kept: Kept, estimate: bool) -> tuple:
+    return on_pairs(kept.asked, shared_pairs(kept.asked), estimate)
 
 
 def on_pairs(asked, pairs, estimate: bool = True) -> tuple:

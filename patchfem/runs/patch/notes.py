@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...mesh.nested import plan_of
-from .measures import plane_band
+from .shared.kept import band
 
 COUPLED = 0.02  # of the tangential compliance; the closing by shear is said from there on
 BENT = 0.02  # of the load under which a tall piece buckles; as much is missing from its sideways motion
@@ -29,7 +29,7 @@ def left_out(model, patch, coarse) -> list:
                    f"{patch.pair.coupling:.2g} of the tangential compliance")
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # a mesh of any cells has no coarser one: its second patch is finer than its first
-        out += plane_band(asked, patch if coarse[-1] is None else coarse[0])
+        out += band(asked, patch if coarse[-1] is None else coarse[0])
     return out
 
 

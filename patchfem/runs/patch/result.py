@@ -7,9 +7,10 @@ from ...model.pieces import bodies_of
 from ...model.source import placed
 from ..results.result import Result, still
 from .ladder import solve_all
-from .measures import measures, strip_error
+from .measures import strip_error
 from .notes import left_out
 from .rounding import beyond_gentle
+from .shared import kept
 from .values import values
 
 __all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "strained"]
@@ -38,7 +39,7 @@ def measured(model, patch, coarse) -> dict:
     times half the length, of the centre of pressure half the length, of the moment the load times that.
     """
     tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-    return floored(model, measures(patch, *coarse, tolerance=tolerance if model.patch.chosen else None))
+    return floored(model, kept.measured(model.patch, patch, coarse, tolerance if model.patch.chosen else None))
 
 
 def floored(model, found: dict) -> dict:

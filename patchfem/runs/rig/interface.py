@@ -10,9 +10,9 @@ from ...friction.record import law_from
 from ...model.law import Rubbing, bonds_of
 from ...model.model import Model
 from ...slip.fields import shear_of
-from ...slip.shear_modes import jenkins_set
 from ...structure.drive_sizes import omega_of
 from ..bench.averaged import limit_share
+from ..patch.shared.kept import elements
 from .numerics import Numerics, quadrature_of
 from .strips import strip_loads
 
@@ -88,7 +88,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if not soft:
         return models.element_model(one)
 
-    found = jenkins_set(patch.giving, f.static * patch.pressure.sigma_n * patch.pieces.interface.weight, one.length)
+    found = elements(patch, f.static, one.length)
     return models.jenkins_model(found.stiffness, found.yield_slide, found)
 
 

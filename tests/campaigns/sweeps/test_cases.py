@@ -57,6 +57,8 @@ def test_exact_cases_of_the_same_pieces_follow_each_other():
     assert found.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
     assert cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [0, 1, 2, 3]
     assert cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
+    found = cases("drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm")
+    assert found.neighbours(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]  # those of one patch side by side
     assert replace(cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours([2, 0, 1]) == [0, 1, 2]
 
 
