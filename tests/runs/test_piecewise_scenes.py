@@ -58,8 +58,7 @@ def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
     assert exact.measures["energy_balance"].value < 1e-12
     assert all(m.error <= 1e-8 * abs(m.value) + m.floor for m in exact.measures.values() if m.value is not None)
     if not sets:
-        assert exact.measures["stick_fraction"].value == pytest.approx(
-            0.5 * march.measures["stick_fraction"].value + 0.5 * exact.measures["stick_fraction"].value, abs=2e-3)
+        assert exact.measures["stick_fraction"].value == pytest.approx(march.measures["stick_fraction"].value, abs=4e-3)
 
 
 def test_exact_two_modes_and_a_release():
