@@ -257,6 +257,20 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
         assert (out / name).read_bytes() == (swept[0] / name).read_bytes()
 
 
+def test_always_two_shards_may_put_older_tables_aside_at_once(tmp_path, monkeypatch):
+    (tmp_path / "sweep.csv").write_text("older")
+    real = os.replace
+
+    def second(old, new):
+        real(old, new)  # by another process, between the look of this one and its own try
+        real(old, new)
+
+    monkeypatch.setattr(os, "replace", second)
+    with Folder(tmp_path, (), True) as folder:
+        folder.unfinish()
+    assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (tmp_path / "sweep.csv").exists()
+
+
 def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     out = tmp_path / "swept"
     over = ("--over", "friction.static=-1,0.1")

@@ -9,6 +9,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -137,7 +138,7 @@ class Folder:
     def unfinish(self) -> None:
         """Mark the tables of an older sweep as what they are while cases are answered: not those of the folder."""
         for name in TABLES:
-            if (self.target / name).is_file():
+            with suppress(FileNotFoundError):  # there is none, or another shard was first
                 os.replace(self.target / name, self.target / f"{name}.partial")
 
     def tidy(self, others: bool) -> None:
