@@ -145,6 +145,10 @@ EFFECTS = {
     "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds per point, or tau ds of form 'energy'",
                    ("pressure", "traction")),
     "measured": Effect("", "overlay of measured rows"),
+    "measured.reading=fundamental": Effect("patchfem.response.spectrum", "|a_1| of a(t) = Re sum a_n exp(i n w t)"),
+    "measured.reading=rms": Effect("patchfem.response.spectrum", "sqrt(1/T int a^2 dt)"),
+    "measured.reading=lowpass": Effect("patchfem.response.spectrum", "max |Re sum a_n H(n f) exp(i n w t)|, H = "
+                                       "1/(1 + sqrt2 s + s^2), s = i n f/cutoff"),
     "sweep": Effect("patchfem.campaigns.sweeps.cases", "one case per combination of the values of its keys"),
 }
 

@@ -1,8 +1,9 @@
 """Verbs that run a scene many times: error against time, and values fitted to measurements."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -48,19 +49,47 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
         print(json.dumps(answer))
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Options of a fit of a rig to rows."""
+
+    leave_out: str = ""
+    """frequency, input or run: a fit without each value of it, scored on what it did not see"""
+    starts: int = 8
+    """random starts inside the ranges; the best training score is taken"""
+    seed: int = 0
+    """of the random starts"""
+    unstable: Literal["bound", "out", "read"] = "bound"
+    """what rows flagged U count as in the fit: lower bounds, nothing, or as read"""
+    placebo: Annotated[tuple[str, ...], Parameter(negative=())] = ()
+    """table.key=value,...: a whole fit with each value, to see whether the rows prefer the scene's own"""
+    resume: Annotated[bool, Parameter(negative=())] = False
+    """go on from the starts that an interrupted fit has finished"""
+
+
 def fit(scene: Path, /, *, to: str, free: Annotated[tuple[str, ...], Parameter(negative=())],
         hold: Annotated[tuple[str, ...], Parameter(negative=())] = (),
         offset: Annotated[tuple[str, ...], Parameter(negative=())] = (),
         warm_up: Annotated[bool, Parameter(negative=())] = False,
+        rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (),
         json_: Json = False,
         quiet: Quiet = False):
-    """Fit keys of SCENE (--free table.key=low..high,...) to the measured loop --to FILE; rows that --hold names
-    (column=value,...) are only predicted. --offset force,displacement: free besides, what the record adds to the force
-    and how far its first row lies from the unstressed place; --warm-up: its whole cycles are driven once before it,
-    unscored. With [wear]: its coefficient, to a worn depth (--to compare.json, or --to
+    """Fit keys of SCENE (--free table.key=low..high,...) to what was measured, --to FILE; rows that --hold names
+    (column=value,...) are only predicted. A bench is fitted to a loop. --offset force,displacement: free besides, what
+    the record adds to the force and how far its first row lies from the unstressed place; --warm-up: its whole cycles
+    are driven once before it, unscored. A rig is fitted to rows of frequency, input, acceleration and displacement,
+    from --starts places drawn by --seed. With [wear]: its coefficient, to a worn depth (--to compare.json, or --to
     "worn_depth_max=2.5 um..3.5 um")."""
     found = scene_of(scene, set_)
+    if found.kind in ("rig", "linear") and found.wear is None:
+        if offset or warm_up:
+            raise Refused("--offset and --warm-up belong to a loop of a bench, and this scene is a rig")
+        _fit_rows(found, to, (free, hold, rows), out, json_, quiet)
+        return
+    if rows != Rows():
+        raise Refused("--leave-out, --starts, --seed, --unstable, --placebo and --resume belong to rows of a rig, and "
+                      "this scene is none")
     if found.wear is not None:
         _fit_wear(found, to, free, out, json_, quiet)
         return
@@ -77,6 +106,40 @@ def fit(scene: Path, /, *, to: str, free: Annotated[tuple[str, ...], Parameter(n
         from ..export.fit import lines_of
 
         print("\n".join(lines_of(answer)))
+        for text in answer["warnings"]:
+            say(f"warning: {text}")
+        print(f"results: {target}")
+    if answer["outcome"] == "not_converged":
+        raise NotReached
+
+
+def _fit_rows(found, to: str, asked: tuple, out: Path | None, json_: bool, quiet: bool) -> None:
+    """Fit a rig to rows; asked: (free, hold, Rows) as they stand on the command line."""
+    from ..campaigns.rows.asked import Question
+    from ..campaigns.rows.fit import Beside, Search, fit_rows
+    from ..export import fit_rows as written
+    from ..export.results import STARTS, Folder
+    from ..scene.ranges import ranges
+    from ..scene.scene import SceneError
+
+    free, hold, rows = asked
+    wanted, wrong = ranges(free)
+    if wrong:
+        raise SceneError(wrong)
+    if rows.starts < 1:
+        raise Refused(f"--starts {rows.starts}: one at least is wanted")
+    target, path = out if out is not None else Path("out") / f"{found.path.stem}-fit", Path(to)
+    with Folder(target, rows.resume) as folder, progress_bar(quiet or json_) as progress:
+        question = (found.resolved(), free, hold, rows.leave_out, rows.placebo, rows.seed, rows.unstable,
+                    path.read_bytes() if path.is_file() else "")
+        how = Search(rows.starts, rows.seed, rows.unstable, written.Starts(folder.path / STARTS, question, rows.resume))
+        fitted = fit_rows(Question(found, wanted, path), Beside(hold, rows.leave_out, rows.placebo, how),
+                          None if quiet else say, progress)
+        answer = written.fit_into(fitted, folder.path, folder.target)
+    if json_:
+        print(json.dumps(answer, ensure_ascii=False))
+    else:
+        print("\n".join(written.lines_of(answer)))
         for text in answer["warnings"]:
             say(f"warning: {text}")
         print(f"results: {target}")

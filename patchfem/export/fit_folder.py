@@ -1,6 +1,5 @@
 """A fit on disk: its object, rows, picture, and the fitted scene, which runs."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from ..campaigns.fit import Fitted
 from ..identify.least_squares import Fit
 from ..model.model import build, resolved
 from ..scene.ranges import Range
-from ..scene.scene import loads
+from ..scene.scene import loads, moved
 from .fit import draw, write_rows
 from .results import Folder
 from .summary import write_json
@@ -18,18 +17,20 @@ from .summary import write_json
 
 def fitted_scene(fitted: Fitted, folder: Path) -> str:
     """The fitted scene in SI with every default, its paths relative to `folder`; a comment says what was fitted."""
-    scene, moved = fitted.scene, []
-    profile = scene.contact.profile if scene.contact is not None else None
-    for key, file in (("contact.mesh", scene.contact and scene.contact.mesh),
-                      ("contact.profile.file", profile and profile.file), ("slide.file", scene.slide.file),
-                      ("measured.file", scene.measured and scene.measured.file)):
-        if file:
-            moved.append(f"{key}={Path(os.path.relpath(scene.beside(file), folder)).as_posix()}")
-    told = [f"# {one.key} fitted to {fitted.loop.path.name}: {value!r} {one.unit}" + _bar(ends) for one, value, ends in
-            zip(fitted.free, fitted.found.values.tolist(), fitted.found.intervals.tolist())]
-    sets = [*scene.sets, *fitted.sets]
-    model = build(loads(scene.text, scene.path, sets))  # its files are where they were; `folder` may not be there yet
-    return "\n".join(told) + "\n\n" + resolved(loads(scene.text, folder / "scene.fitted.toml", [*sets, *moved]), model)
+    whole = loads(fitted.scene.text, fitted.scene.path, [*fitted.scene.sets, *fitted.sets])
+    return scene_text(whole, fitted.free, fitted.found, fitted.loop.path, folder)
+
+
+def scene_text(whole, free, found: Fit, measured: Path, folder: Path) -> str:
+    """A scene with its fitted values in SI and every default, its paths relative to `folder`; comments say what was
+    fitted.
+
+    free: the Ranges of what was fitted, in the order of `found`; measured: the file.
+    """
+    told = [f"# {one.key} fitted to {measured.name}: {value!r} {one.unit}" + _bar(ends) for one, value, ends in
+            zip(free, found.values.tolist(), found.intervals.tolist())]
+    model = build(whole)  # its files are where they were; `folder` may not be there yet
+    return "\n".join(told) + "\n\n" + resolved(moved(whole, folder / "scene.fitted.toml"), model)
 
 
 def _bar(ends) -> str:
@@ -39,8 +40,8 @@ def _bar(ends) -> str:
 def answer_of(fitted: Fitted) -> dict:
     """The object of fit.json, in SI."""
     found, loop = fitted.found, fitted.loop
-    values = {one.key: _value(one, found, k) for k, one in enumerate(fitted.free)}
-    offsets = {one.what: _value(one.range, found, k) for k, one in enumerate(fitted.offsets, len(values))}
+    values = {one.key: value_of(one, found, k) for k, one in enumerate(fitted.free)}
+    offsets = {one.what: value_of(one.range, found, k) for k, one in enumerate(fitted.offsets, len(values))}
     named = [*fitted.free, *(one.range for one in fitted.offsets)]
     unit = "N" if loop.quantity == "force" else "1"
     clean = [[None if not np.isfinite(x) else x for x in row] for row in found.correlation.tolist()]
@@ -55,7 +56,8 @@ def answer_of(fitted: Fitted) -> dict:
             "descents_agreed": found.agreed, "warnings": fitted.warnings, "seconds": round(fitted.seconds, 6)}
 
 
-def _value(one: Range, found: Fit, k: int) -> dict:
+def value_of(one: Range, found: Fit, k: int) -> dict:
+    """The object of a fitted value in fit.json."""
     ends = found.intervals[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {"value": float(found.values[k]), "unit": one.unit, "low": low, "high": high,

@@ -262,11 +262,12 @@ def _measured(data: dict) -> Picture | None:
     if m.get("input") is None or m.get("frequency") is None:
         return None
     points = []
-    for name, gain in (("absolute_acceleration_peak", m["gain"]), ("relative_displacement_amplitude", 1.0)):
+    for name, gain in (("absolute_acceleration_peak", _factor(m)), ("relative_displacement_amplitude", 1.0)):
         one = found.get(name, {"value": None})
         points.append(None if one["value"] is None else
                       (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
     factor = f" (reading factor {m['gain']:g})" if m["gain"] != 1 else ""
+    factor += f" (read as {m['reading']}, {m['share']:.4g} of the peak)" if m.get("reading", "peak") != "peak" else ""
     return Picture(pictures.measured, (m["rows"], m["frequency"], m["input"], *points),
                    f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
 
@@ -274,6 +275,11 @@ def _measured(data: dict) -> Picture | None:
 # in the order of the page
 PICTURES = {"wear": _wear, "curve": _curve, "levels": _levels, "pressure": _interface, "bodies": _bodies, "loop": _loop,
             "history": _histories, "measured": _measured}
+
+
+def _factor(measured: dict) -> float:
+    """What the accelerometer shows of the largest acceleration: the factor of its reading and the share it reads."""
+    return measured["gain"] * measured.get("share", 1.0)
 
 
 def _unsettled(data: dict) -> str:
@@ -295,7 +301,7 @@ def _table_one(data: dict) -> list:
             value, mine = getattr(r, name), found.get(key, {"value": None})["value"]
             if value is None or mine is None:
                 continue
-            mine = mine * (m["gain"] if name == "acceleration" else 1.0)
+            mine = mine * (_factor(m) if name == "acceleration" else 1.0)
             kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
             ratio = f"{mine / value:.2f}" if value else "&ndash;"
             rows.append(f"<tr><td>{kind}</td><td class=n>{value / scale:.3g} {unit}</td>"

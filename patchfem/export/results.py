@@ -12,16 +12,17 @@ from ..core import Missing, PatchfemError
 PAGE = "report.html"
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
          "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
-         "compare.json", "surface_before.csv", "surface_after.csv", "profile.json")
+         "starts.json", "compare.json", "surface_before.csv", "surface_after.csv", "profile.json")
 LOCK = ".writer"
-STATE = "wear.npz"  # of an interrupted run, from which it goes on
+STATE, STARTS = "wear.npz", "starts.json"
+STATES = (STATE, STARTS)  # of an interrupted run or fit, from which it goes on
 
 
 class Folder:
     """Context of a results folder, which is claimed at entry.
 
     `path` is the partial folder to write into. Leaving without an error renames it, leaving with one removes it but for
-    a kept STATE, which `resume` leaves in place at the next entry. PatchfemError for a target that holds other files,
+    kept STATES, which `resume` leaves in place at the next entry. PatchfemError for a target that holds other files,
     Missing where it is in use or cannot be written.
     """
 
@@ -49,7 +50,8 @@ class Folder:
             self._abandon()
             return
         try:
-            (self.path / STATE).unlink(missing_ok=True)
+            for state in STATES:
+                (self.path / state).unlink(missing_ok=True)
             (self.path / LOCK).unlink()
             old = self.target.with_name(f".{self.target.name}.old{os.getpid()}")
             if self.target.exists():
@@ -62,11 +64,11 @@ class Folder:
 
     def _abandon(self) -> None:
         """Remove everything but a kept state; the folder too where there is none."""
-        if not (self.path / STATE).is_file():
+        if not any((self.path / state).is_file() for state in STATES):
             shutil.rmtree(self.path, ignore_errors=True)
             return
         for part in self.path.iterdir():
-            if part.name != STATE:
+            if part.name not in STATES:
                 shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(missing_ok=True)
 
 

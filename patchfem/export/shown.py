@@ -1,5 +1,6 @@
 """What a finished run is shown by: the plain data of its page, its page and its pictures."""
 
+from ..core import BaseSine
 from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
@@ -40,12 +41,17 @@ def report_data(result: Result) -> dict:
     if model.measured is not None:
         from ..inputs.measured import read_table
 
-        path, gain = model.measured
+        path, gain, kind, cutoff = model.measured
         rig = model.rig
         data["measured"] = {"rows": read_table(path), "frequency": rig.frequency if rig is not None else None,
-                            "gain": gain}
+                            "gain": gain, "reading": "peak", "share": 1.0}
         if rig is not None:
             data["measured"]["input"] = largest(rig.drive)
+            if kind != "peak" and isinstance(rig.drive, BaseSine) and "absolute_acceleration_peak" in result.measures:
+                from ..response.spectrum import reading
+
+                peak = result.measures["absolute_acceleration_peak"].value
+                data["measured"] |= {"reading": kind, "share": reading(w, rig.drive, peak, kind, cutoff) / peak}
     return data
 
 

@@ -152,9 +152,10 @@ def _profile(model, u, cost, i, sign, half, growth, others, descend) -> tuple:
 
     step = min(half, room) if np.isfinite(half) and half > SHARP else room / 64
     low, f_low, high, near = 0.0, -1.0, None, u
-    for _ in range(40):  # doublings to the bound, then the secant; 1e-3 of the growth ends it long before
+    enough = 1e-2 if model.quick else 1e-3
+    for _ in range(40):  # doublings to the bound, then the secant, which `enough` ends long before
         f, probe = miss(step, near)
-        if abs(f) < 1e-3:
+        if abs(f) < enough:
             break
         if f < 0:
             low, f_low, near = step, f, probe

@@ -16,6 +16,7 @@ from ..core import NotConverged, Outcome, frozen_array
 from .intervals import Answer, intervals, nothing
 from .space import Counted, space, spread_points
 
+QUICK = 1e-4  # change of the sum of squares by a step at which the descent of a quick model ends
 MOST = 100  # evaluations of one descent, Jacobians not counted
 EXACT = 1e-9  # of the largest residual seen: an answer this good needs no other start
 NEAR = 1e-3  # of the range: a value this close to a bound is tried on it
@@ -70,13 +71,18 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, ba
         found.append(descend(model, begin, everything))
         if found[-1][1] <= (EXACT * model.largest)**2 * model.rows:
             break
+    return answered(model, found, bars)
+
+
+def answered(model: Counted, found: list, bars: str = "rows") -> Fit:
+    """The Fit of the best of some descents, `found` as `descend` gives them; bars as in `fit`."""
     u, cost, done = min(found, key=lambda one: one[1])
     agreed = sum(abs(other[1] - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
     if bars:
         u, cost = _onto_bounds(model, u, cost)
         answer = intervals(model, u, cost, descend, bars == "series")
     else:
-        answer = nothing(n)
+        answer = nothing(u.size)
     rms = float(np.sqrt(cost / model.rows))
     return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done else Outcome.NOT_CONVERGED)
 
@@ -110,7 +116,8 @@ def _starts(model: Counted, own, count: int) -> list:
 def descend(model: Counted, u, free) -> tuple:
     """Descend from u (n,) in the unit cube along the coordinates `free` alone: (u, sum of squares, whether it settled).
 
-    SciPy's trust-region reflective method. The end is never worse than u; where u itself fails, the sum is inf.
+    SciPy's trust-region reflective method, which ends where a step changes the sum of squares by 1e-10 of it, or by
+    QUICK of a quick model. The end is never worse than u; where u itself fails, the sum is inf.
     """
     u, free = np.array(u, float), list(free)
     here = model(u)
@@ -128,8 +135,9 @@ def descend(model: Counted, u, free) -> tuple:
         if model(whole(begin)) is None:
             return u, float(here @ here), False
     size = max(float(np.abs(model.penalised(whole(begin))).max()), 1e-300)
+    share = QUICK if model.quick else 1e-10
     found = least_squares(lambda p: model.penalised(whole(p)) / size, begin, bounds=(0, 1), method="trf",
-                          jac=lambda p: model.jacobian(whole(p), free) / size, ftol=1e-10, xtol=1e-9, gtol=1e-15,
+                          jac=lambda p: model.jacobian(whole(p), free) / size, ftol=share, xtol=10 * share, gtol=1e-15,
                           max_nfev=MOST)
     end = whole(found.x)
     last = model(end)

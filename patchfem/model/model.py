@@ -32,8 +32,8 @@ class Model:
     kind: "patch", "bench", "rig" or "linear". patch or point, whichever carries the load, the other None. friction:
     keys of the law as they act, of the first interface; heat: surface temperature table or None; spread [m] of the pad
     (2.15) or None; pad [m]: width across the path. slide of a bench, rig of a coupled run. measured: (path of rows,
-    reading factor) or None. wear: over many cycles, or None. absent: effects that the scene does not name. grooves:
-    that the load climbs, or None.
+    reading factor, kind of reading, its cut-off [Hz] or None) or None. wear: over many cycles, or None. absent: effects
+    that the scene does not name. grooves: that the load climbs, or None.
     """
 
     source: Source
@@ -127,7 +127,7 @@ def build(scene: Scene) -> Model:
     friction, heat, spread, pad = _law(scene)
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
-                  (scene.beside(measured.file), measured.acceleration_gain) if measured else None,
+                  _measured(scene, measured) if measured else None,
                   _wear(scene), _absent(named), grooves)
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks))
     return replace(found, source=source)
@@ -136,6 +136,10 @@ def build(scene: Scene) -> Model:
 @lru_cache(64)
 def _absent(named: tuple) -> tuple:
     return tuple(absent(named))
+
+
+def _measured(scene: Scene, table) -> tuple:
+    return scene.beside(table.file), table.acceleration_gain, table.reading, table.reading_cutoff
 
 
 def _wear(scene: Scene) -> WearModel | None:

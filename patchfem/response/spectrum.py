@@ -1,8 +1,12 @@
-"""Harmonics of the drive in the motion of the last cycles, and the distortion that a gauge sees."""
+"""Harmonics of the drive in the motion of the last cycles, the distortion that a gauge sees, and what an accelerometer
+shows: a reading acts on what was computed and never on the model."""
 
 import numpy as np
 
 ROUND = 1e-12  # of the largest acceleration of the drive
+READINGS = ("peak", "fundamental", "rms", "lowpass")
+HARMONICS = 64  # that a low pass is taken of
+SAMPLES = 1024  # of a cycle behind it
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
@@ -71,3 +75,34 @@ def friction_harmonic(window, modes, drive) -> complex:
     push = -1j * last.amplitude * np.exp(1j * (last.phase - omega * last.start))
     rest = -modes.base * push - gains - modes.dampers @ rates - modes.omega**2 * first
     return complex(modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide))
+
+
+def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None = None) -> float:
+    """Size [m s-2] of the absolute acceleration in a window, as an instrument shows it.
+
+    window: Response over whole cycles of the drive, a core.BaseSine; peak: its largest size [m s-2]. kind: "peak" is
+    that; "fundamental" is |a_1|, the amplitude at the drive's frequency; "rms" is sqrt(mean a^2); "lowpass" is the
+    largest size behind a Butterworth low pass of second order, 1/(1 + sqrt2 s + s^2) with s = i f/cutoff, of the
+    harmonics to HARMONICS; cutoff [Hz]. ValueError for a kind that is none of READINGS.
+    """
+    if kind == "peak":
+        return peak
+    if kind == "rms":
+        step, square = np.diff(window.time), window.acceleration**2
+        return float(np.sqrt(np.sum(step * (square[1:] + square[:-1]) / 2) / (window.time[-1] - window.time[0])))
+    if kind == "fundamental":
+        return abs(_harmonic(window, drive, 1))
+    if kind != "lowpass":
+        raise ValueError(f"reading '{kind}' is none of {', '.join(READINGS)}")
+    n = np.arange(1, HARMONICS + 1)
+    s = 1j * n * drive.omega / (2 * np.pi * cutoff)
+    passed = np.array([_harmonic(window, drive, k) for k in n]) / (1 + np.sqrt(2) * s + s**2)
+    spectrum = np.zeros(SAMPLES // 2 + 1, complex)
+    spectrum[1:HARMONICS + 1] = passed * SAMPLES / 2
+    return float(np.abs(np.fft.irfft(spectrum, SAMPLES)).max())
+
+
+def _harmonic(window, drive, n: int) -> complex:
+    """Complex harmonic n [m s-2] of the absolute acceleration, from the motion by parts: nothing is lost at a jump."""
+    found = acceleration_harmonic(window.time, window.output, window.output_rate, n * drive.omega)
+    return found - 1j * drive.acceleration if n == 1 and drive.moving else found

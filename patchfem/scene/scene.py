@@ -6,6 +6,7 @@ float in metres, an absent table is None) or raise a `SceneError` that holds one
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Callable, Iterable
@@ -115,6 +116,13 @@ def text_of(path: str | Path) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         byte = content[error.start]
         raise SceneError([f"{path}:{line}: not UTF-8: byte 0x{byte:02x}; save the scene as UTF-8 text"]) from None
+
+
+def moved(found: Scene, path: Path) -> Scene:
+    """The scene as if it stood at another path, its own files named from there."""
+    sets = [f"{key}={Path(os.path.relpath(found.beside(file), path.parent)).as_posix()}" for key, file in
+            files_of(found)]
+    return loads(found.text, path, [*found.sets, *sets])
 
 
 def with_files(found: Scene) -> Scene:

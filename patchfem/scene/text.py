@@ -9,7 +9,7 @@ from typing import Any
 
 from .keys.contact import Asperities, Material, OnePiece
 from .keys.quantities import format_si
-from .keys.tables import Accuracy, Drive, Friction, Slide
+from .keys.tables import Accuracy, Drive, Friction, Measured, Slide
 from .keys.types import Table, keys, kind_of, model_of
 from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
@@ -31,6 +31,10 @@ def _effects(table: Any, at: str) -> Iterator[str]:
     if isinstance(table, Accuracy):
         if table.method != "auto":
             yield f"{at}.method={table.method}"
+    elif isinstance(table, Measured):
+        yield at
+        if table.reading != "peak":
+            yield f"{at}.reading={table.reading}"
     elif isinstance(table, tuple):
         for item in table:
             yield from (effect for effect in _effects(item, at) if "=" in effect)
@@ -57,6 +61,8 @@ def _unused(table: Table) -> set[str]:
     for model, selector, used in ((Friction, "law", LAWS), (Slide, "kind", SLIDES), (Asperities, "law", ASPERITIES)):
         if isinstance(table, model):
             return unused(table, selector, used)
+    if isinstance(table, Measured):
+        return set() if table.reading == "lowpass" else {"reading_cutoff"}
     if isinstance(table, Drive):
         return set(drive_unused(table)) | (waveform_unused(table) if table.kind != "free" else set())
     return set()

@@ -208,6 +208,10 @@ MEANINGS = {
     "Measured": {
         "file": "table of measured rows: frequency, input, acceleration, displacement, flag",
         "acceleration_gain": "factor by which the reading exceeds the true acceleration",
+        "reading": "what the accelerometer shows: 'peak' the largest acceleration, 'fundamental' its part at the "
+                   "drive's frequency, 'rms' its effective value, 'lowpass' the largest behind a low pass of second "
+                   "order",
+        "reading_cutoff": "cut-off frequency of that low pass",
     },
 }
 
@@ -231,6 +235,7 @@ CONDITIONS = {
     "drive.displacement": "kind `free` unless [structure.start]",
     "drive.force": "kind `force` unless a file",
     "drive.onset_length": "onset `gauge`",
+    "measured.reading_cutoff": "reading `lowpass`",
     "drive.rate": "waveform `sweep` unless log_rate",
     "drive.cycles": "unless duration, a sweep or a file",
 }

@@ -228,6 +228,8 @@ class Measured(Table):
 
     file: Text
     acceleration_gain: Positive = 1.0
+    reading: Literal["peak", "fundamental", "rms", "lowpass"] = "peak"
+    reading_cutoff: Frequency | None = None
 
 
 class Tables(Table):

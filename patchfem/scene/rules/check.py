@@ -20,7 +20,7 @@ from .wear import check_wear
 
 def check(draft: Draft) -> str:
     """Say every mistake of the whole draft; the kind of run (``patch``, ``bench``, ``rig``, ``linear`` or empty)."""
-    for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive):
+    for rule in (_contact, _load_line, _normal, _frictions, _slide, check_structure, check_drive, _measured):
         rule(draft)
     kind = _kind(draft)
     for rule in (_quadrature, _sliding, check_length, check_wear, check_grooves):
@@ -38,6 +38,20 @@ def _normal(draft: Draft) -> None:
             draft.lacks("normal.amplitude", f"{key} needs it")
     if draft.given("normal.width") and not draft.given("friction.spread"):
         draft.remark("normal.width has no meaning without friction.spread and is not used")
+
+
+def _measured(draft: Draft) -> None:
+    if draft.tables.measured is None or draft.tables.measured.reading is None:
+        return
+    low, cut = draft.tables.measured.reading == "lowpass", draft.given("measured.reading_cutoff")
+    if low and not cut:
+        draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs it, such as '600 Hz'")
+    drive = draft.tables.drive
+    if draft.tables.measured.reading != "peak" and (drive is None or drive.kind == "free" or drive.waveform != "sine"):
+        draft.remark("measured.reading is that of a motion under one sine and is not used")
+    if cut and not low:
+        draft.remark(f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "
+                     "used")
 
 
 def _slide(draft: Draft) -> None:

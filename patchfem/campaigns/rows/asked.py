@@ -1,0 +1,105 @@
+"""The models that a scene of a rig stands for: one per measured condition, for any values of the free keys."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ...core import BaseSine, PatchfemError
+from ...effects import unbuilt
+from ...model.model import Model, build
+from ...scene.changed import Base
+from ...scene.scene import Scene, SceneError, loads
+
+READINGS = ("measured.acceleration_gain",)  # of the instruments: never in the model
+
+
+class Question:
+    """What is to be fitted: a scene of a rig, the Ranges `wanted` of its free keys, and the file of measured rows."""
+
+    def __init__(self, scene: Scene, wanted, measured):
+        self.scene, self.wanted, self.measured = scene, wanted, measured
+
+    def asked(self, conditions, *sets: str) -> Asked:
+        """The scene, with more --set strings, asked at conditions (c, 2)."""
+        scene = loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets]) if sets else self.scene
+        return Asked(scene, conditions, self.wanted, self.measured)
+
+
+class Asked:
+    """A scene of a rig under a sine of its base, asked at measured conditions with values of free keys.
+
+    conditions: (c, 2) frequency [Hz] and input [m s-2]; wanted: Ranges of the free keys; measured: the file of rows.
+    SceneError and PatchfemError name what cannot be fitted. A scene that names no method is asked for its steady
+    motions where 'harmonic' takes it (`notes` says so): a row was read when the rig had settled.
+    """
+
+    def __init__(self, scene: Scene, conditions, wanted, measured):
+        self.scene, self.wanted, self.notes, self.sets = scene, wanted, [], []
+        self._refuse(measured)
+        if scene.measured is None and any(one.key.startswith("measured.") for one in wanted):
+            self.sets.append(f"measured.file={measured.resolve().as_posix()}")
+        if scene.accuracy.method in (None, "auto"):
+            self._settle()
+        start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
+        self.base, self.read = Base(start), start.measured
+        self.inner = [k for k, one in enumerate(wanted) if one.key not in READINGS]
+        self.rigs = [build(self.base.changed(sets_of(*one))).rig for one in conditions]
+
+    def _refuse(self, measured) -> None:
+        scene, drive = self.scene, self.scene.drive
+        where = f"{scene.path}: fit --to {measured.name}: "
+        if scene.kind not in ("rig", "linear"):
+            raise PatchfemError(f"{where}rows of frequency and input are those of a rig, and this is a {scene.kind} "
+                                "scene; a bench is fitted to a loop with a column displacement")
+        if drive.kind != "base" or drive.waveform != "sine":
+            raise PatchfemError(f"{where}each row is one sine of the base; set drive.kind = 'base' and drive.waveform "
+                                "= 'sine'")
+        if drive.displacement is not None:
+            raise PatchfemError(f"{where}the rows give the input as an acceleration; replace drive.displacement by "
+                                "drive.acceleration")
+        if scene.wear is not None:
+            raise PatchfemError(unbuilt(f"{where}beside [wear]", "leave [wear] out"))
+        for one in self.wanted:
+            if one.key.startswith("drive.") or one.key == "measured.reading_cutoff":
+                raise PatchfemError(f"--free {one.key}: it is not a value of the rig; the rows give the drive")
+
+    def _settle(self) -> None:
+        """Ask for steady motions where the scene allows them."""
+        steady = "accuracy.method=harmonic"
+        try:
+            loads(self.scene.text, self.scene.path, [*self.scene.sets, *self.sets, steady])
+        except SceneError:
+            return
+        self.sets.append(steady)
+        self.notes.append("the scene names no method: its steady motions are fitted, by 'harmonic'")
+
+    def model(self, values) -> Model:
+        """The model with values (n,) of the free keys, at the drive of the scene; SceneError where they make none."""
+        try:
+            return build(self.base.changed([self.wanted[k].assigned(values[k]) for k in self.inner]))
+        except SceneError as error:
+            raise PatchfemError(error.mistakes[0]) from None
+
+    def fitted(self, values) -> Scene:
+        """The scene with values (n,) of all free keys, those of the reading too."""
+        sets = [*self.sets, *(one.assigned(value) for one, value in zip(self.wanted, values))]
+        return loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
+
+    def at(self, model: Model, condition: int) -> Model:
+        """The model under the drive of a condition."""
+        rig = self.rigs[condition]
+        return replace(model, rig=replace(model.rig, drive=rig.drive, frequency=rig.frequency, cycles=rig.cycles))
+
+    def sine(self, condition: int) -> BaseSine:
+        """The drive of a condition."""
+        return self.rigs[condition].drive
+
+    @property
+    def moves_pieces(self) -> bool:
+        """Whether a free key changes how the pieces are pressed."""
+        return any(one.key.startswith("contact.") for one in self.wanted)
+
+
+def sets_of(frequency: float, level: float) -> list:
+    """The --set strings of a condition: frequency [Hz], input [m s-2]."""
+    return [f"drive.frequency={float(frequency)!r} Hz", f"drive.acceleration={float(level)!r} m/s^2"]

@@ -1,0 +1,145 @@
+"""What was read in a table of measured responses, cell by cell, and the logarithm of computed over measured."""
+
+from dataclasses import dataclass
+from math import log
+from pathlib import Path
+
+import numpy as np
+
+from ...core import PatchfemError, frozen_array
+from ...inputs.measured import read_table
+from ...scene.keys.quantities import parse
+
+FLOOR = 0.01 * 25.4e-6  # m, one digit of the printed displacements: what lies below it counts as this in a ratio
+MOST = log(1e3)  # largest size of a logarithm: of a motion that runs away, or is none
+ALIKE = 1e-9  # relative difference of two inputs that are one
+KINDS = {"frequency": "frequency", "input": "acceleration"}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cells:
+    """The n readings of a table, those of a row after another, its acceleration first.
+
+    path; rows: all of them, as `inputs.measured.Row`; row (n,): of each reading; felt (n,): whether it is an
+    acceleration; measured (n,) [m s-2] or [m]; unstable (n,): of a row flagged U; conditions (c, 2): distinct frequency
+    [Hz] and input [m s-2] of rows with a reading, ascending; condition (n,): of each reading; runs: a name per row, of
+    its frequency and whether it is a repeat.
+    """
+
+    path: Path
+    rows: tuple
+    row: np.ndarray
+    felt: np.ndarray
+    measured: np.ndarray
+    unstable: np.ndarray
+    conditions: np.ndarray
+    condition: np.ndarray
+    runs: tuple
+
+    @property
+    def empty(self) -> list:
+        """Numbers of the rows in which nothing was read."""
+        return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
+
+    def column(self, name: str) -> list:
+        """Values (n,) of a column at the readings: "frequency", "input", "flag" or "run"."""
+        if name == "run":
+            return [self.runs[k] for k in self.row]
+        if name not in ("frequency", "input", "flag"):
+            raise PatchfemError(f"{self.path}: no column {name} to hold or leave out; frequency, input, flag or run")
+        return [getattr(self.rows[k], name) for k in self.row]
+
+    def chosen(self, one: str) -> np.ndarray:
+        """Which readings (n,) a text like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat" names.
+
+        PatchfemError for a value without its unit, and for one that no row has.
+        """
+        name, equals, values = (part.strip() for part in one.partition("="))
+        if not equals or not values:
+            raise PatchfemError(f"--hold {one}: column=value,value is wanted, such as frequency=135 Hz,150 Hz")
+        here, out = self.column(name), np.zeros(self.row.size, bool)
+        for text in (part.strip() for part in values.split(",")):
+            named = np.array([self._is(name, value, text) for value in here])
+            if not named.any():
+                known = ", ".join(dict.fromkeys(_shown(name, value) for value in here))
+                raise PatchfemError(f"--hold {name}={text}: no row of {self.path.name} with a reading has it; there "
+                                    f"are {known}")
+            out |= named
+        return out
+
+    @staticmethod
+    def _is(name: str, value, text: str) -> bool:
+        if name not in KINDS:
+            return text in value if name == "flag" else text == value
+        try:
+            wanted = parse(text, KINDS[name])
+        except ValueError as error:
+            raise PatchfemError(f"--hold {name}={text}: {error}") from None
+        return abs(value - wanted) <= ALIKE * abs(wanted)
+
+    def parts(self, name: str, among) -> list:
+        """(name, readings (n,) bool) of every distinct value of a column among readings (n,) bool, in their order."""
+        here = self.column(name)
+        found = dict.fromkeys(value for value, there in zip(here, among) if there)
+        return [(_shown(name, value), np.array([other == value for other in here]) & among) for value in found]
+
+    def logs(self, acceleration, displacement) -> np.ndarray:
+        """ln(computed/measured) (n,) of accelerations [m s-2] and displacement amplitudes [m], (c,) each of the
+        conditions; NaN where nothing was computed, MOST where a motion is not finite."""
+        both = np.array([displacement, acceleration], float)
+        computed = both[self.felt.astype(int), self.condition]
+        least = np.where(self.felt, 1e-300, FLOOR)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = np.log(np.maximum(computed, least)) - np.log(np.maximum(self.measured, least))
+        return np.clip(ratio, -MOST, MOST)
+
+
+def _shown(name: str, value) -> str:
+    unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
+    return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
+
+
+def cells_of(path: Path) -> Cells:
+    """The readings of a CSV of measured responses (`inputs.measured.read_table`); PatchfemError names what is wrong.
+
+    Repeats of one condition stay readings of their own; rows without a reading are kept by their number.
+    """
+    rows = tuple(read_table(path))
+    row, felt, measured = [], [], []
+    for k, one in enumerate(rows):
+        if not (one.frequency > 0 and one.input > 0):
+            raise PatchfemError(f"{path}: row {k + 1}: frequency and input above zero are wanted")
+        if one.acceleration == 0:
+            raise PatchfemError(f"{path}: row {k + 1}: an acceleration of 0 has no ratio; leave the cell empty")
+        for value, is_felt in ((one.acceleration, True), (one.displacement, False)):
+            if value is not None:
+                row.append(k)
+                felt.append(is_felt)
+                measured.append(value)
+    if not row:
+        raise PatchfemError(f"{path}: no acceleration or displacement was read, so there is nothing to fit")
+    row = np.array(row)
+    asked = sorted({(rows[k].frequency, rows[k].input) for k in row})
+    conditions = []
+    for one in asked:  # 4 g written in two units is one condition
+        if not conditions or abs(one[0] - conditions[-1][0]) > ALIKE * one[0] \
+                or abs(one[1] - conditions[-1][1]) > ALIKE * one[1]:
+            conditions.append(one)
+    conditions = np.array(conditions)
+    condition = [int(np.argmin(np.abs(conditions / (rows[k].frequency, rows[k].input) - 1).max(axis=1))) for k in row]
+    unstable = [("U" in rows[k].flag) for k in row]
+    runs = tuple(f"{one.frequency:.6g} Hz" + " repeat" * ("R" in one.flag) for one in rows)
+    return Cells(Path(path), rows, frozen_array(row, np.int64), frozen_array(felt, bool), frozen_array(measured),
+                 frozen_array(unstable, bool), frozen_array(conditions), frozen_array(condition, np.int64), runs)
+
+
+def scores(cells: Cells, logs, among) -> dict | None:
+    """{"acceleration", "displacement", "all"}: root mean square of logs (n,) over the readings `among` (n,) bool, of
+    each kind (None where there is none) and of all; None where there are no readings at all."""
+    if not np.any(among):
+        return None
+    logs, out = np.asarray(logs), {}
+    for name, which in (("acceleration", cells.felt), ("displacement", ~cells.felt), ("all", np.ones(len(logs), bool))):
+        part = logs[which & among]
+        out[name] = float(np.sqrt(np.mean(part**2))) if part.size else None
+    return out

@@ -1,0 +1,79 @@
+"""What the instruments of a rig read at the measured conditions, as a function of the free values."""
+
+import numpy as np
+
+from ...core import Outcome, PatchfemError
+from ...model.source import placed
+from ...response.spectrum import reading
+from ...runs.many.watched import Watcher
+from .asked import Asked
+
+
+class Computed:
+    """Readings of the models of an Asked; a call with values (n,) and conditions gives (acceleration [m s-2],
+    displacement amplitude [m]), (c,) each, NaN at conditions that were not asked for and infinite where no bounded
+    motion is found.
+
+    Motions start from those of the values before, so that a descent is quick; `forget` makes the next ones start from
+    rest, so that an answer does not depend on what was asked before it.
+    """
+
+    def __init__(self, asked: Asked, say=None):
+        self.asked, self.say = asked, say
+        self.patch, self.near, self.last = None, {}, (None, {})
+        self.runs = 0
+        read_as = asked.read
+        self.reading = ("peak", None) if read_as is None else (read_as.reading, read_as.reading_cutoff)
+        self.gain = 1.0 if read_as is None else read_as.acceleration_gain
+        keys = [one.key for one in asked.wanted]
+        self.free_gain = keys.index("measured.acceleration_gain") if "measured.acceleration_gain" in keys else None
+        self.warm = True
+
+    def forget(self) -> None:
+        """Start the next motions from rest."""
+        self.near, self.last = {}, (None, {})
+
+    def __call__(self, values, conditions) -> tuple:
+        count = len(self.asked.rigs)
+        inner = tuple(float(values[k]) for k in self.asked.inner)
+        known = self.last[1] if self.last[0] == inner else {}
+        if any(k not in known for k in conditions):
+            known = known | self._run(values, [k for k in conditions if k not in known])
+            self.last = inner, known
+        out = np.full((2, count), np.nan)
+        for k in conditions:
+            out[:, k] = known[k]
+        out[0] *= self.gain if self.free_gain is None else values[self.free_gain]
+        return out
+
+    def _run(self, values, conditions) -> dict:
+        """Condition -> (reading of the acceleration without its gain, displacement amplitude)."""
+        model, found = self.asked.model(values), {}
+        with placed(model.source):
+            patch = self._pressed(model)
+            watcher = Watcher(model, patch, self.say)
+            for k in conditions:
+                self.runs += 1
+                if not watcher.by:
+                    watcher = Watcher(self.asked.at(model, k), patch, self.say)
+                seen = watcher(self.asked.sine(k), self.near.get(k) if self.warm else None)
+                if seen is None:
+                    self.near.pop(k, None)
+                    found[k] = np.inf, np.inf
+                    continue
+                self.near[k] = seen.near
+                shown = reading(seen.window, self.asked.sine(k), seen.acceleration, *self.reading)
+                found[k] = shown, seen.displacement
+        return found
+
+    def _pressed(self, model):
+        """The pressed patch of a model, made once where no free key moves it; None under [normal]."""
+        if model.patch is None:
+            return None
+        if self.patch is None or self.asked.moves_pieces:
+            from ...runs.patch.ladder import solve_all
+
+            self.patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
+            if self.patch.pressure.outcome is Outcome.NO_CONTACT:
+                raise PatchfemError(self.patch.pressure.outcome.sentence, "")
+        return self.patch

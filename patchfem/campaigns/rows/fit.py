@@ -1,0 +1,204 @@
+"""Values of a rig identified from measured responses, with scores of what was fitted, held out and left out.
+
+A score is the root mean square of ln(computed/measured). Beside each stand those of models without mechanics, fitted to
+the same readings (`nulls`). What is held or left out is seen by nothing but the last evaluation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+
+from ...core import Outcome, PatchfemError
+from ...identify.least_squares import Fit
+from ...identify.words import remarks
+from .asked import Asked, Question
+from .cells import MOST, Cells, cells_of, scores
+from .computed import Computed
+from .nulls import NULLS, predicted
+from .search import Found, Search, searched
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Fold:
+    """One value of the column that is left out: its name, readings (n,) bool, and the Found of all others."""
+
+    name: str
+    readings: np.ndarray
+    found: Found
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Placebo:
+    """A key at a value that the fit did not choose: its --set string, the Found with it, and its logs (n,)."""
+
+    text: str
+    found: Found
+    logs: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedRows:
+    """A rig fitted to rows.
+
+    asked; cells; how: the Search; held (n,) bool; found: of the readings that are not held; computed (2, c):
+    acceleration reading [m s-2] and displacement [m] of every condition; logs (n,): ln(computed/measured); folds, and
+    left (n,): logs of each reading by the fit that did not see it, NaN where none was left out; placebos; nulls: name
+    -> (logs (n,), left (n,), numbers by kind); runs: motions computed; warnings.
+    """
+
+    asked: Asked
+    cells: Cells
+    how: Search
+    held: np.ndarray
+    found: Found
+    computed: np.ndarray
+    logs: np.ndarray
+    folds: tuple
+    left: np.ndarray
+    placebos: tuple
+    nulls: dict
+    runs: int
+    warnings: list
+    seconds: float
+
+    @property
+    def fit(self) -> Fit:
+        """Values with their intervals."""
+        return self.found.fit
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the fit ended: done, or not_converged where the descent ran out of evaluations."""
+        return self.fit.outcome
+
+    def scored(self, logs, left, stable: bool = False) -> dict:
+        """{"fitted", "held_out", "left_out"}: `cells.scores` of logs (n,) and of those of left-out readings (n,);
+        stable: without the readings flagged U."""
+        among = ~self.cells.unstable if stable else np.ones(self.held.size, bool)
+        return {"fitted": scores(self.cells, logs, among & ~self.held),
+                "held_out": scores(self.cells, logs, among & self.held),
+                "left_out": scores(self.cells, left, among & ~np.isnan(left))}
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What stands beside a fit: rows held out ("column=value,value" texts), the column of which each value is left out
+    in turn, placebos ("key=value,value" texts), and how it searches."""
+
+    hold: tuple = ()
+    leave_out: str = ""
+    placebos: tuple = ()
+    how: Search = field(default_factory=Search)
+
+
+def fit_rows(question: Question, beside: Beside, say: Callable | None = None,
+             progress: Callable | None = None) -> FittedRows:
+    """Fit what a Question asks for.
+
+    say: called with one line when compiled code has to be made; progress: called with the share of starts that is done.
+    SceneError and PatchfemError name bad input, NotConverged a fit of which every start fails.
+    """
+    begin, how, count = perf_counter(), beside.how, len(question.wanted)
+    cells = cells_of(question.measured)
+    held = np.zeros(cells.row.size, bool)
+    for one in beside.hold:
+        held |= cells.chosen(one)
+    _enough(cells, ~held, count, how)
+    asked = question.asked(cells.conditions)
+    computed = Computed(asked, say)
+    parts = cells.parts(beside.leave_out, ~held) if beside.leave_out else []
+    if len(parts) == 1:
+        raise PatchfemError(f"--leave-out {beside.leave_out}: the rows that are not held have one value of it, so that "
+                            "nothing would be left")
+    placebos = [text for one in beside.placebos for text in _texts(one)]
+    tell = _told(progress, how.starts * (1 + len(parts) + len(placebos)))
+    found = searched(cells, computed, ~held, how, name="all", tell=tell)
+    answer = _predicted(computed, found.fit.values, range(len(cells.conditions)))
+    logs, left, folds = cells.logs(*answer), np.full(held.size, np.nan), []
+    for name, part in parts:
+        _enough(cells, ~held & ~part, count, how)
+        fold = Fold(name, part, searched(cells, computed, ~held & ~part, how, "", f"without {name}", tell))
+        seen = _predicted(computed, fold.found.fit.values, sorted(set(cells.condition[part].tolist())))
+        left[part] = cells.logs(*seen)[part]
+        folds.append(fold)
+    tried = tuple(_tried(question, text, cells, held, how, (say, tell)) for text in placebos)
+    nulls = {name: _null(cells, name, held, parts) for name in NULLS}
+    warnings = [*asked.scene.remarks, *asked.notes, *_said(cells, asked, found, logs, how)]
+    return FittedRows(asked, cells, how, held, found, answer, logs, tuple(folds), left, tried, nulls, computed.runs,
+                      warnings, perf_counter() - begin)
+
+
+def _enough(cells: Cells, training, count: int, how: Search) -> None:
+    used = int((training & ~cells.unstable).sum() if how.unstable == "out" else training.sum())
+    if used <= count:
+        raise PatchfemError(f"{cells.path}: {used} readings that are not held or left out cannot determine {count} "
+                            "values and their intervals")
+
+
+def _predicted(computed: Computed, values, conditions) -> np.ndarray:
+    """(2, c) of the conditions from motions that begin at rest, as a run makes them."""
+    computed.forget()
+    return np.array(computed(values, list(conditions)))
+
+
+def _told(progress: Callable | None, total: int) -> Callable | None:
+    if progress is None:
+        return None
+    done = [0]
+
+    def tell(count: int) -> None:
+        done[0] += count
+        progress(done[0] / total)
+
+    return tell
+
+
+def _texts(one: str) -> list:
+    key, equals, values = (part.strip() for part in one.partition("="))
+    if not equals or not values:
+        raise PatchfemError(f"--placebo {one}: table.key=value,value is wanted, such as "
+                            "structure.mode.yaw.frequency=110 Hz,138 Hz")
+    return [f"{key}={value.strip()}" for value in values.split(",")]
+
+
+def _tried(question: Question, text: str, cells: Cells, held, how: Search, heard: tuple) -> Placebo:
+    """A whole fit with a key at another value, by a --set string; heard: (say, tell)."""
+    computed = Computed(question.asked(cells.conditions, text), heard[0])
+    found = searched(cells, computed, ~held, how, "", text, heard[1])
+    logs = cells.logs(*_predicted(computed, found.fit.values, range(len(cells.conditions))))
+    return Placebo(text, found, logs)
+
+
+def _null(cells: Cells, name: str, held, parts) -> tuple:
+    """(logs (n,), left (n,), numbers by kind) of a null model."""
+    logs, numbers = predicted(cells, name, ~held)
+    left = np.full(held.size, np.nan)
+    for _, part in parts:
+        left[part] = predicted(cells, name, ~held & ~part)[0][part]
+    return logs, left, numbers
+
+
+def _said(cells: Cells, asked: Asked, found: Found, logs, how: Search) -> list:
+    """What a person must know of the rows and of the fit."""
+    out = remarks(found.fit, [one.key for one in asked.wanted])
+    if cells.empty:
+        out.append(f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: row "
+                   f"{', '.join(str(k + 1) for k in cells.empty)}")
+    count = int(cells.unstable.sum())
+    if count:
+        means = {"bound": "count in the fit as lower bounds", "out": "are left out of the fit",
+                 "read": "count in the fit as any other"}[how.unstable]
+        out.append(f"{count} readings flagged U {means}; scores_stable are without them")
+    lost = sorted({f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
+                   for k, log in zip(cells.row, logs) if abs(log) >= MOST})
+    if lost:
+        out.append(f"no bounded motion is found at {'; '.join(lost)}: each counts as a factor of {np.exp(MOST):.0f}")
+    alone = int((found.rms <= np.nanmin(found.rms) * 1.01).sum())
+    if alone == 1 and how.starts > 1:
+        out.append(f"only one of {how.starts} starts ends within 1 % of the least training score: more --starts may "
+                   "find a better one")
+    return out

@@ -1,0 +1,121 @@
+"""What instruments see of a rig at many drives: its motion alone, without errors, multipliers or events.
+
+For searches, which ask a model thousands of times. A steady engine goes straight to its motion and may start from one
+nearby; any other engine makes its run. Pieces and elements are made once for all drives.
+"""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core import NotConverged, Outcome, Response
+from ..rig.engines import ENGINES, HARMONIC, steady_by
+from ..rig.numerics import choose
+
+SAMPLES = 400  # of a cycle without friction
+
+
+class Watched(NamedTuple):
+    """The last cycle or cycles of a rig: window with its histories, largest absolute acceleration [m s-2] and
+    displacement amplitude [m] as a run measures them; near: a start for a motion nearby, None where there is none."""
+
+    window: Response
+    acceleration: float
+    displacement: float
+    near: Any = None
+
+
+class Watcher:
+    """A model of kind rig or linear, asked at one drive after another.
+
+    patch: the solved Patch, or None under [normal]. A call with a drive (core.BaseSine) and the `near` of another
+    answer gives Watched, or None where no bounded motion is found; the answer is that of `runs.run.run` to round-off
+    where no start is given.
+    """
+
+    def __init__(self, model, patch, say=None):
+        self.model, self.patch, self.say = model, patch, say
+        self.numerics = choose(model)
+        steady = self.numerics.engine == HARMONIC.name
+        self.by = "" if not steady else "line" if model.kind == "linear" and not model.rig.bends else steady_by(model)
+        self.made = {}
+
+    def __call__(self, drive, near=None) -> Watched | None:
+        try:
+            return {"yields": self._yields, "balance": self._balance, "events": self._events,
+                    "line": self._line}.get(self.by, self._run)(drive, near)
+        except NotConverged:
+            if near is None:
+                return None
+        return self(drive)
+
+    def _once(self, name: str, make):
+        if name not in self.made:
+            self.made[name] = make()
+        return self.made[name]
+
+    def _line(self, drive, near) -> Watched | None:
+        """Without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
+        from ...dynamics.harmonic.harmonic import plant
+
+        modes, omega = self.model.rig.modes, drive.omega
+        found = plant(modes, omega, 1)
+        if any(k == 1 for k, *_ in found.free):
+            return None
+        z = found.inverse[1] @ (1j * drive.acceleration * modes.base)
+        time = np.linspace(0.0, drive.period, SAMPLES + 1)
+        turn = np.exp(1j * omega * time)
+        modal, rate = (np.outer(turn, z * factor).real for factor in (1.0, 1j * omega))
+        push, none = drive.values(time), np.zeros(time.size)
+        base, shift = (push, -1j * drive.acceleration) if drive.moving else (none, 0.0)
+        gain = np.outer(turn, -omega**2 * z).real
+        window = Response(time, modal, rate, modal @ modes.slide, rate @ modes.slide, modal @ modes.output,
+                          rate @ modes.output, gain @ modes.output + base, base, none, none)
+        return Watched(window, float(abs(-omega**2 * modes.output @ z + shift)), float(abs(modes.output @ z)))
+
+    def _yields(self, drive, near) -> Watched:
+        from ...dynamics.piecewise import histories
+        from ...dynamics.piecewise.steady import steady
+        from ..rig.pieces.run import Interfaces
+
+        modes = self.model.rig.modes
+        groups = self._once("yields", lambda: Interfaces(self.model, self.numerics, self.patch)).groups
+        try:
+            one = steady(modes, drive, groups, near)
+        except NotConverged:
+            if near is not None or len(self.model.rig.interfaces) > 1:
+                raise
+            return self._balance(drive, None)
+        done = histories.simulate(modes, drive, groups, 1.0, 1, np.inf, 0, None, one.start, one.memory)
+        return Watched(done.window, done.acceleration, done.swing, one.point)
+
+    def _balance(self, drive, near) -> Watched:
+        from ...dynamics.harmonic.balance import periodic_response
+        from ...dynamics.harmonic.point import point
+        from ...response.measures import acceleration_peak
+        from ..rig.steady_balance import SAMPLES, Balance
+
+        one = self._once("balance", lambda: Balance(self.model, self.numerics, self.patch, self.say))
+        found = point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
+        window = periodic_response(found, one.modes, drive, SAMPLES)
+        if not drive.moving:
+            window = replace(window, base_acceleration=0 * window.base_acceleration)
+        return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
+
+    def _events(self, drive, near) -> Watched | None:
+        from ..rig.steady_events import Events
+
+        raw = self._once("events", lambda: Events(self.model, self.numerics, self.patch, self.say)).point(drive)[0]
+        return _seen(raw)
+
+    def _run(self, drive, near) -> Watched | None:
+        model = replace(self.model, rig=replace(self.model.rig, drive=drive))
+        return _seen(ENGINES[self.numerics.engine].run(model, self.numerics, self.patch, 0, self.say, None))
+
+
+def _seen(raw) -> Watched | None:
+    """What a Solution shows; None where the motion grows, leaves its travel or was not found."""
+    if raw.outcome in (Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL):
+        return None
+    return Watched(raw.window, raw.values["absolute_acceleration_peak"], raw.values["relative_displacement_amplitude"])

@@ -1,0 +1,257 @@
+"""Rigs identified from rows of responses: tables made by known rigs, and what a fit may not see."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import cli
+
+from patchfem.campaigns.rows.asked import Asked, Question
+from patchfem.campaigns.rows.cells import cells_of
+from patchfem.campaigns.rows.computed import Computed
+from patchfem.campaigns.rows.fit import Beside, Search, fit_rows
+from patchfem.campaigns.rows.search import residual_of
+from patchfem.core import G_N, PatchfemError
+from patchfem.runs.run import run
+from patchfem.scene.ranges import ranges
+from patchfem.scene.scene import SceneError, load, loads
+
+MIL = 25.4e-6
+LINEAR = """
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "140 Hz"
+damping = 0.02
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "1 g"
+cycles = 100
+"""
+RUBS = """
+[normal]
+load = "115 N"
+[friction]
+law = "elastic-plastic"
+static = 0.4
+bond_length = "0.5 um"
+[structure]
+moving_mass = "1.2 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[structure.bonded]
+stiffness = "3e6 N/m"
+damping = "900 N s/m"
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 400
+"""
+HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
+
+
+def scene_of(tmp_path, text, *sets):
+    path = tmp_path / "scene.toml"
+    path.write_text(text, "utf-8")
+    return load(path, sets)
+
+
+def table(tmp_path, rows, name="rows.csv"):
+    """A CSV of (frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], flag), "" where nothing is."""
+    path = tmp_path / name
+    lines = [f"{f!r},{a / G_N!r},{_cell(x, G_N)},{_cell(y, MIL)},{flag}" for f, a, x, y, flag in rows]
+    path.write_text(HEAD + "\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+def _cell(value, unit):
+    return value if value == "" else repr(float(value) / unit)
+
+
+def linear(f, level, own=141.0, zeta=0.03):
+    """(absolute acceleration, relative displacement) of a driven oscillator in closed form."""
+    w, wn = 2 * np.pi * f, 2 * np.pi * own
+    z = -level / (wn**2 - w**2 + 2j * zeta * wn * w)
+    return float(abs(level - w**2 * z)), float(abs(z))
+
+
+def free(*texts):
+    found, wrong = ranges(texts)
+    assert not wrong
+    return found
+
+
+def fitted(scene, path, wanted, **beside):
+    how = Search(beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound"))
+    return fit_rows(Question(scene, wanted, path), Beside(how=how, **beside))
+
+
+LINEAR_FREE = ("structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2",)
+
+
+def linear_rows(noise=0.0, scale=1.0, seed=1):
+    draw = np.random.default_rng(seed)
+    out = []
+    for f in (120.0, 135.0, 143.0, 150.0, 160.0):
+        a, y = linear(f, 20.0)
+        spread = np.exp(noise * draw.standard_normal(2))
+        out.append((f, 20.0, a * scale * spread[0], y * spread[1], ""))
+    return out
+
+
+def test_exact_a_linear_rig_is_found_from_closed_forms(tmp_path):
+    """Rows of an oscillator in closed form give back its frequency, its damping and the factor of the reading."""
+    found = fitted(scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(scale=1.3)),
+                   free(*LINEAR_FREE, "measured.acceleration_gain=0.5..2"), starts=3)
+    assert found.fit.values == pytest.approx([141.0, 0.03, 1.3], rel=1e-6)
+    assert found.scored(found.logs, found.left)["fitted"]["all"] < 1e-6
+
+
+def test_intervals_of_a_linear_rig_hold_the_truth(tmp_path):
+    """Of 10 noisy tables 95 % intervals of two values hold the truth in 16 of 20 cases or more: less has a chance of
+    0.3 %."""
+    held = 0
+    for seed in range(10):
+        path = table(tmp_path, linear_rows(0.05, seed=seed))
+        found = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
+        ends = found.fit.intervals
+        held += sum(low <= value <= high for (low, high), value in zip(ends, (141.0, 0.03)))
+    assert held >= 16
+
+
+RUBS_FREE = ("friction.static=0.3..0.6,structure.bonded.stiffness=1e6 N/m..6e6 N/m",)
+TRUE = {"friction.static": "0.45", "structure.bonded.stiffness": "2.4e6 N/m"}
+
+
+@pytest.fixture(scope="module")
+def rubbed(tmp_path_factory):
+    """Rows of a rubbing rig with known values, marched to its steady motion from yield to yield."""
+    out = []
+    for f in (135.0, 143.0, 150.0):
+        for level in (5.0, 7.0):
+            sets = [f"{key}={text}" for key, text in TRUE.items()]
+            one = run(loads(RUBS, sets=[*sets, f"drive.frequency={f} Hz", f"drive.acceleration={level} g"]))
+            assert str(one.outcome) in ("steady", "stuck") and one.extra["engine"] == "piecewise"
+            out.append((f, level * G_N, one.measures["absolute_acceleration_peak"].value,
+                        one.measures["relative_displacement_amplitude"].value, ""))
+    return out
+
+
+def test_exact_a_rubbing_rig_is_found_from_its_own_rows(tmp_path, rubbed):
+    found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, rubbed), free(*RUBS_FREE))
+    assert found.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
+    assert any("steady motions are fitted" in text for text in found.warnings)
+
+
+def test_a_noisy_rubbing_rig_lies_within_its_intervals(tmp_path, rubbed):
+    draw = np.random.default_rng(3)
+    noisy = [(f, level, *(value * np.exp(0.05 * draw.standard_normal()) for value in (a, y)), flag)
+             for f, level, a, y, flag in rubbed]
+    found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, noisy), free(*RUBS_FREE), starts=1)
+    for (low, high), value in zip(found.fit.intervals, (0.45, 2.4e6)):
+        assert low < value < high and high / low < 1.5
+    assert 0.02 < found.fit.rms < 0.08
+
+
+def test_always_the_fit_does_not_see_what_is_held_or_left_out(tmp_path, rubbed):
+    """Other readings in the rows held out, and in those left out, change no bit of the values, nor of any start."""
+    scene = scene_of(tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}")
+    wanted, rows = free("friction.static=0.3..0.6"), rubbed[1::2]
+    other = [(f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag) for f, level, a, y, flag in rows]
+    first, second = (fitted(scene, table(tmp_path, each), wanted, hold=("frequency=150 Hz",)) for each in (rows, other))
+    assert np.array_equal(first.fit.values, second.fit.values)
+    assert np.array_equal(first.found.ends, second.found.ends) and np.array_equal(first.found.rms, second.found.rms)
+    assert not np.array_equal(first.logs, second.logs)
+    one, two = (fitted(scene, table(tmp_path, each), wanted, leave_out="frequency", starts=1) for each in (rows, other))
+    assert [fold.name for fold in one.folds] == ["135 Hz", "143 Hz", "150 Hz"]
+    assert np.array_equal(one.folds[2].found.fit.values, two.folds[2].found.fit.values)
+    assert not np.array_equal(one.folds[0].found.fit.values, two.folds[0].found.fit.values)
+    assert one.scored(one.logs, one.left)["left_out"]["all"] < 1e-3 < two.scored(two.logs, two.left)["left_out"]["all"]
+
+
+def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
+    path = table(tmp_path, rubbed)
+    cells = cells_of(path)
+    asked = Asked(scene_of(tmp_path, RUBS), cells.conditions, free(*RUBS_FREE), path)
+    computed = Computed(asked)
+    cold = np.array(computed([0.45, 2.4e6], range(6)))
+    assert np.abs(cells.logs(*cold)).max() < 1e-6  # marched rows: 400 cycles leave that much
+    computed([0.46, 2.5e6], range(6))
+    assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)  # from motions nearby
+
+
+def test_rows_flagged_u_are_lower_bounds(tmp_path):
+    """What lies above a bound counts nothing, what lies below it as it is; left out it is not there at all."""
+    rows = [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()]
+    path = table(tmp_path, rows)
+    cells = cells_of(path)
+    computed = Computed(Asked(scene_of(tmp_path, LINEAR), cells.conditions, free(*LINEAR_FREE), path))
+    every = np.ones(cells.row.size, bool)
+    sharp, flat = [141.0, 0.01], [141.0, 0.1]  # more, and less, at 143 Hz than was read
+    for values, more in ((sharp, True), (flat, False)):
+        logs = cells.logs(*computed(values, range(5)))
+        found = {what: residual_of(cells, computed, every, what)(values) for what in ("bound", "out", "read")}
+        assert np.array_equal(found["read"], logs)
+        assert np.array_equal(found["out"], logs[~cells.unstable])
+        assert np.all(logs[cells.unstable] > 0) == more
+        wanted = np.where(cells.unstable, np.minimum(logs, 0), logs)
+        assert np.array_equal(found["bound"], wanted)
+    stable = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
+    whole, without = (stable.scored(stable.logs, stable.left, part)["fitted"] for part in (False, True))
+    among = ~cells.unstable
+    assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[among]**2))) and whole != without
+
+
+def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path):
+    """A rigid block whose friction is too weak to hold an undamped spring runs away: said, and no failure."""
+    text = RUBS.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
+    text = text.replace("damping = 0.003", "damping = 0.0").replace(text[text.index("[structure.bonded]"):
+                                                                         text.index("[drive]")], "")
+    path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, ""), (150.0, 4 * G_N, 5 * G_N, 1e-5, "")])
+    found = fitted(scene_of(tmp_path, text), path, free("friction.static=0.1..0.3"), starts=1)
+    assert found.fit.failures == 0
+    assert any("no bounded motion is found at 143 Hz" in text for text in found.warnings)
+    assert np.abs(found.logs).max() == pytest.approx(np.log(1e3))
+
+
+@pytest.mark.parametrize("sets, wanted, match", [
+    (["drive.waveform=step"], LINEAR_FREE, "one sine of the base"),
+    ([], ("drive.cycles=10..20",), "the rows give the drive"),
+    ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "cannot determine 3 values")])
+def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
+    path = table(tmp_path, [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""),
+                            (155.0, 20.0, 30.0, "", "")])
+    with pytest.raises((PatchfemError, SceneError), match=match):
+        fitted(scene_of(tmp_path, LINEAR, *sets), path, free(*wanted))
+
+
+def test_the_verb_answers_as_the_contract_says(tmp_path):
+    path = table(tmp_path, linear_rows(0.02))
+    scene = scene_of(tmp_path, LINEAR).path
+    out = tmp_path / "out"
+    given = ["fit", str(scene), "--to", str(path), "--free", *LINEAR_FREE, "--hold", "frequency=160 Hz", "--starts",
+             "2", "--leave-out", "frequency", "-o", str(out)]
+    code, text, said = cli(*given)
+    assert code == 0, said
+    answer = json.loads((out / "fit.json").read_text())
+    one = answer["values"]["structure.mode.axial.frequency"]
+    assert one["low"] < one["value"] < one["high"] and one["unit"] == "Hz"
+    for scores in (answer["scores"], answer["scores_stable"], *answer["nulls"].values()):
+        for part in ("fitted", "held_out", "left_out"):
+            assert set(scores[part]) == {"acceleration", "displacement", "all"}
+    assert set(answer["nulls"]) == {"constant", "power_input", "power_input_frequency"}
+    assert [fold["left_out"] for fold in answer["folds"]] == ["120 Hz", "135 Hz", "143 Hz", "150 Hz"]
+    assert "null power_input_frequency" in text and "held out" in text
+    again = json.loads(cli("run", str(out / "scene.fitted.toml"), "--json", "-q", "-o", str(tmp_path / "run"))[1])
+    row = next(row for row in answer["rows"] if row["frequency"] == 143)
+    assert again["measures"]["absolute_acceleration_peak"]["value"] == pytest.approx(
+        linear(143.0, 1 * G_N, one["value"], answer["values"]["structure.mode.axial.damping"]["value"])[0], rel=1e-4)
+    assert row["acceleration"]["computed"] == pytest.approx(20 / G_N *
+        again["measures"]["absolute_acceleration_peak"]["value"], rel=1e-4)
