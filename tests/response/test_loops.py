@@ -213,3 +213,20 @@ def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, s
     assert turns[0][1].slide == pytest.approx(slide[0], rel=1e-12)  # the range is that of the cycle all the same
     found = loops.secant_stiffness(turns)
     assert found is None if secant is None else found == pytest.approx(secant, abs=1e-6)
+
+
+@pytest.mark.parametrize("decay, early", [(0.3, 0.003), (-0.3, 0.997)])
+def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, early):
+    """A force in proportion to the rate is 0 where the slide turns: in the step before a cycle of a motion that falls,
+    in the one after a cycle of one that rises. decay over a period; early: of the turn before the cycle, in periods."""
+    time = np.arange(401) / 100  # period 1
+    angle = 2 * pi * (time + early) + np.arctan2(-decay, 2 * pi)  # exp(-decay t) cos(angle) turns at -early, 1 - early
+    wave = np.exp(-decay * time)
+    slide = wave * np.cos(angle)
+    rate = -wave * (decay * np.cos(angle) + 2 * pi * np.sin(angle))
+    middle = loops.turns_of(time, slide, rate, 3 * rate, 1.0)[1][1]
+    border = 100 if decay > 0 else 200
+    assert middle.slide == pytest.approx(slide[border], rel=1e-12)
+    assert abs(3 * rate[border]) > 0.1 and abs(middle.force) < 1e-12
+    rests = np.where(np.arange(401) == border, 0.0, rate)  # the turn is the border itself, and its rate all but 0
+    assert loops.turns_of(time, slide, rests + 1e-11 * (np.arange(401) == border), 7 + 0 * rate, 1.0)[1][1].force == 7

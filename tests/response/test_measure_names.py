@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.response.errors import SURE, step_error, with_errors
-from patchfem.response.rows import TABLE, of_first, row_of
+from patchfem.response.rows import TABLE, floor_of, of_first, row_of
 from patchfem.response.settling import steady_amplitude
 
 
@@ -12,6 +12,7 @@ from patchfem.response.settling import steady_amplitude
 def test_exact_a_number_behind_a_name_changes_no_row(name):
     for full in (name, f"{name}_2", f"{name}_17"):
         assert of_first(full) == name and row_of(full) is TABLE[name]
+        assert floor_of(full, 1e-9) == floor_of(name, 1e-9)
 
 
 def test_exact_further_interfaces_have_errors_by_the_same_rule():

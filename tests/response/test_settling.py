@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from patchfem.core import Outcome
 from patchfem.response import settling
+from patchfem.response.outcome import settled, steady_error
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -253,3 +254,15 @@ def test_exact_slips_that_are_too_few_have_no_period():
     time = np.arange(0, 12, 0.01)
     late = np.isin(np.floor(time / 0.5), (2, 16, 18, 20, 22))  # slips at 1, 8, 9, 10 and 11 s
     assert settling.slip_period(time, late * 1.0) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_exact_what_rises_to_a_motion_that_exists_does_not_grow():
+    a, nothing = 1 + 0.1 * np.arange(6)[None], (np.full(1, np.nan),) * 2
+    for bounded, number in ((False, settling.GROWS), (True, 0)):
+        assert settled(a, None, 10, nothing, (1e-3, 0.0, 0.0), bounded)[0].tolist() == [number]
+
+
+def test_exact_the_error_of_a_steady_amplitude_holds_that_of_the_run():
+    """An amplitude that is 5 % off moves what it settles to by 5 %."""
+    assert steady_error(2.0, 0.01, 1.0, 0.05) == pytest.approx(0.01 + 0.1, rel=1e-12)
+    assert steady_error(np.array([2.0, 0.5]), 0.0, -1.0, 0.05) == pytest.approx([0.1, 0.025], rel=1e-12)
