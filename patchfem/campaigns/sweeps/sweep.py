@@ -44,6 +44,17 @@ class Died:
     reason: str
 
 
+def warmed(work: Work) -> None:
+    """Bring up what the first case of a work needs, though its meshes are not chosen yet; what is wrong with it is told
+    by its own run."""
+    from ...runs.plan import plan
+
+    try:
+        many.taken(model := work.asked.model(work.cases.sets(0))) or plan(model)
+    except Exception:
+        return
+
+
 def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[Answers, list]:
     """Answers of some cases, and of each what `work.tell` makes of it. This is what a worker does with a chunk."""
     models = [_model(work, number) for number in numbers]
@@ -112,11 +123,24 @@ def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = 
     """(numbers, Answers, told) of chunk after chunk as they come in.
 
     executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
-    every chunk that `take` hands out until it hands out none.
+    every chunk that `take` hands out until it hands out none; where it has begin(work, count, say), that is told of the
+    work before the meshes of all cases are chosen, and end() after all.
     """
-    work = with_meshes(work) if len(numbers) else work
+    if not len(numbers):
+        return
     chunks = Chunks(work.cases.neighbours(numbers), executor.workers)
-    for chunk, seconds, found in executor.run(work, chunks.take, say):
+    try:
+        if hasattr(executor, "begin"):
+            executor.begin(work, len(numbers), say)
+        yield from _handed(chunks, executor.run(with_meshes(work), chunks.take, say))
+    finally:
+        if hasattr(executor, "end"):
+            executor.end()
+
+
+def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
+    """What `solved` gives, of the chunks that an executor has done."""
+    for chunk, seconds, found in done:
         if isinstance(found, Died):
             lost = chunks.died(chunk)
             if lost:

@@ -3,11 +3,15 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scene_texts import PATCH
 
+from patchfem.campaigns.sweeps import sweep
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import pool as pool_module
 from patchfem.campaigns.sweeps.executors.here import Here
+from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
 from patchfem.runs.many.answers import joined
 from patchfem.scene.axes import read
@@ -27,3 +31,23 @@ def test_exact_a_part_of_a_sweep_has_the_answers_of_the_whole():
 def test_exact_meshes_are_made_once_and_travel_with_the_work():
     work = with_meshes(WORK)
     assert with_meshes(work) is work and len(work.meshes.meshes) == 1
+
+
+def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
+    here = joined(4, [part[:2] for part in solved(WORK, range(4), Here())])
+    pool = Pool(2)
+    found = joined(4, [part[:2] for part in solved(WORK, range(4), pool)])
+    assert pool.ready == [] and found.numerics == here.numerics
+    for name, values in here.values.items():
+        np.testing.assert_allclose(found.values[name], values, rtol=1e-9)
+
+
+def test_always_no_process_is_left_where_no_meshes_could_be_chosen(monkeypatch):
+    pool, started = Pool(2), []
+    own = pool_module.Worker.__init__
+    monkeypatch.setattr(pool_module.Worker, "__init__", lambda one, *given: started.append(one) or own(one, *given))
+    monkeypatch.setattr(sweep, "with_meshes", lambda work: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        next(solved(WORK, range(4), pool))
+    assert len(started) == 2 and all(one.process.poll() is not None for one in started)
+

@@ -37,6 +37,13 @@ class Worker:
         self.chunk, self.begin = None, 0.0
         self.pipe.send(work)
 
+    def tell(self, work: Work) -> None:
+        """Send the work with the meshes that its cases share."""
+        try:
+            self.pipe.send(work)
+        except OSError:
+            pass  # it is dead, which `taken` finds when it has a chunk
+
     def give(self, chunk: list) -> None:
         """Send a chunk."""
         self.chunk, self.begin = chunk, perf_counter()
@@ -65,12 +72,28 @@ class Pool:
     """The executor of some processes of this machine."""
 
     def __init__(self, workers: int):
-        self.workers = workers
+        self.workers, self.ready = workers, []
+
+    def begin(self, work: Work, count: int, say: Callable | None = None) -> None:
+        """Start the processes, which bring up what a case needs while the meshes of all cases are chosen here.
+
+        work: without these meshes; count: of cases.
+        """
+        self.end()
+        for _ in range(min(self.workers, count)):
+            self.ready.append(_started(work, say is None))
+
+    def end(self) -> None:
+        """Stop the processes that wait for the meshes."""
+        while self.ready:
+            self.ready.pop().end()
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """(chunk, seconds, answer or Died) of each chunk that `take` hands out, as they come in."""
-        workers: list[Worker] = []
+        workers, self.ready = self.ready, []
         try:
+            for one in workers:
+                one.tell(work)
             while True:
                 self._hand_out(workers, lambda: _started(work, say is None), take)
                 busy = {one.pipe: one for one in workers if one.chunk is not None}

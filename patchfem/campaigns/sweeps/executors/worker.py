@@ -6,17 +6,21 @@ from multiprocessing.connection import Connection
 
 
 def main() -> None:
-    """Answer the chunks that come through the pipe whose number is the first word of the command line; a second word
-    keeps it silent."""
+    """Answer the chunks of a work that come through the pipe whose number is the first word of the command line; a
+    second word keeps it silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the business of the process that asks
     pipe = Connection(int(sys.argv[1]))
     try:
         work = pipe.recv()
-        from ..sweep import answer
+        from ..sweep import Work, answer, warmed
 
+        warmed(work)
         while True:
-            chunk = pipe.recv()
-            pipe.send(answer(work, chunk, None if sys.argv[2] else _say))
+            asked = pipe.recv()
+            if isinstance(asked, Work):  # the same with what was made of all cases
+                work = asked
+            else:
+                pipe.send(answer(work, asked, None if sys.argv[2] else _say))
     except (EOFError, BrokenPipeError, ConnectionResetError):  # who asked is gone
         return
 
