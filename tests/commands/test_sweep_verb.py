@@ -94,6 +94,9 @@ def test_exact_the_dataset_has_a_dimension_per_key(swept):
         np.testing.assert_allclose(found.normal_load, [10, 26 * 4.4482216152605, -1])
         np.testing.assert_allclose(found.drive_acceleration, [9.80665, 5 * 9.80665], rtol=1e-15)
         assert (found.normal_load.units, found.drive_acceleration.units) == ("N", "m s-2")
+        assert found.normal_load.dims == ("normal_load",) and "normal_load_error" not in found  # the key, no measure
+        assert found.message.values.ravel().tolist() == [row["message"] for row in rows(out)]
+        assert found.folder.values.ravel().tolist() == [row["case"] for row in rows(out)]
         names = {"loop_area", "relative_displacement_amplitude"}
         for number, row in enumerate(rows(out)):
             at = {"normal_load": number // 2, "drive_acceleration": number % 2}
@@ -295,6 +298,13 @@ def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
     with xr.open_dataset(tmp_path / "a" / "sweep.nc") as found:
         assert dict(found.sizes) == {"case": 4} and found.normal_load.dims == ("case",)
         np.testing.assert_array_equal(found.friction_static, [0.3, 0.3, 0.4, 0.4])
+
+
+def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
+    table = tmp_path / "cases.csv"
+    table.write_text("normal.load [N],friction.static\n10,0.3\n", encoding="utf-8")
+    answer = cli("sweep", scene, "--cases", table, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
+    assert answer.code == 2 and answer.err == f"--over friction.static: stands in {table} too\n"
 
 
 @pytest.mark.parametrize("words, says", [
