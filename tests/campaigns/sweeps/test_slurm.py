@@ -1,0 +1,82 @@
+"""The scripts for Slurm, with a stand-in for sbatch that runs at once what it is given."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import cli
+from scene_texts import BENCH
+from study_module import ROOT, study
+
+SBATCH = """\
+#!{python}
+import os, re, subprocess, sys
+words = sys.argv[1:]
+given = dict(one.removeprefix("--").split("=", 1) for one in words if one.startswith("--") and "=" in one)
+with open({log!r}, "a") as log:
+    print(" ".join(words), file=log)
+if "wrap" not in given and "--wrap" in words:
+    given["wrap"] = words[words.index("--wrap") + 1]
+low, high = map(int, given.get("array", "1-1").split("-"))
+runs = []
+for task in range(low, high + 1):
+    more = {{"SLURM_ARRAY_TASK_ID": str(task)}} if "array" in given else {{}}
+    what = ["bash", "-c", given["wrap"]] if "wrap" in given else ["bash", words[-1]]
+    quiet = {{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}}
+    runs.append(subprocess.Popen(what, env=os.environ | more, **quiet))
+if "wrap" in given and any(one.wait() for one in runs):
+    sys.exit("a task failed")
+print("7;here" if "--parsable" in words else "Submitted batch job 7")
+"""
+OVER = ("friction.static=0.1,0.2,0.3", "slide.amplitude=5 um,10 um")
+
+
+@pytest.fixture
+def slurm(tmp_path, monkeypatch) -> Path:
+    """The log of what was submitted; commands `sbatch`, `scancel` and `patchfem` are found first."""
+    place, log = tmp_path / "bin", tmp_path / "submitted"
+    place.mkdir()
+    for name, text in {"sbatch": SBATCH.format(python=sys.executable, log=str(log)),
+                       "scancel": "#!/bin/sh\n",
+                       "patchfem": f'#!/bin/sh\nexec {sys.executable} -m patchfem "$@"\n'}.items():
+        (place / name).write_text(text)
+        (place / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{place}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT.parent), os.environ.get("PYTHONPATH", "")]))
+    return log
+
+
+def asked(tmp_path) -> tuple:
+    scene = tmp_path / "a scene.toml"  # a path to be quoted
+    scene.write_text(BENCH, encoding="utf-8")
+    words = [word for one in OVER for word in ("--over", one)]
+    assert cli("sweep", scene, *words, "-o", tmp_path / "whole").code == 0
+    return scene, words, tmp_path / "whole"
+
+
+@pytest.mark.slow
+def test_exact_a_job_array_gives_the_files_of_one_sweep(slurm, tmp_path):
+    scene, words, want = asked(tmp_path)
+    out = tmp_path / "parts"
+    done = subprocess.run([ROOT / "cluster" / "array.sh", scene, out, "2", *words], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    first, second = slurm.read_text().splitlines()
+    assert "--array=1-2" in first and "--dependency=afterany:7 " in second
+    for name in ("sweep.csv", "sweep.nc"):
+        assert (out / name).read_bytes() == (want / name).read_bytes()
+    assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
+        one.name for one in (want / "cases").iterdir())
+
+
+@pytest.mark.slow
+def test_exact_workers_in_jobs_give_the_answers_of_one_sweep(slurm, tmp_path):
+    pytest.importorskip("dask_jobqueue")
+    scene, _, want = asked(tmp_path)
+    jobqueue = study("cluster/jobqueue.py")
+    found = jobqueue.main(str(scene), str(tmp_path / "jobs"), "2", *OVER, python=sys.executable, interface="lo")
+    assert len(slurm.read_text().splitlines()) == 2
+    assert (tmp_path / "jobs" / "sweep.csv").read_bytes() == (want / "sweep.csv").read_bytes()
+    assert np.isfinite(found["loop_area"].values).all()
