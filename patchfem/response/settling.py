@@ -162,9 +162,9 @@ def slip_period(time, rate) -> float:
     time (k,) [s]; rate (k,) [m/s] of the slide; it slips where that is above MOVES of the largest. A motion that never
     holds has two slips a cycle, from one turn to the next.
     """
-    speed = np.abs(np.asarray(rate, float))
-    slips = speed > MOVES * speed.max(initial=0.0)
-    starts = np.asarray(time, float)[1:][slips[1:] & ~slips[:-1]]
+    rate = np.asarray(rate, float)
+    way = np.sign(rate) * (np.abs(rate) > MOVES * np.abs(rate).max(initial=0.0))
+    starts = np.asarray(time, float)[1:][(way[1:] != 0) & (way[1:] != way[:-1])]
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 

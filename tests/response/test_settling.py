@@ -251,6 +251,9 @@ def test_exact_slips_that_are_too_few_have_no_period():
     assert settling.slip_period(time, 0 * time) == 0.0
     assert settling.slip_period(time, np.where(time % 4 < 1, 0.0, 1.0)) == pytest.approx(4.0, abs=1e-12)
     assert settling.slip_period(time, np.where((time % 2 < 1) | (time > 4), 0.0, 1.0)) == 0.0  # it came to hold
+    for shift in (0.0, 0.5, 0.999):  # turns at a sample, between two, and beside one: a slip begins at each
+        time = (np.arange(401) + shift) / 40
+        assert settling.slip_period(time, np.sin(2 * np.pi * time)) == pytest.approx(0.5, abs=0.026)
     time = np.arange(0, 12, 0.01)
     late = np.isin(np.floor(time / 0.5), (2, 16, 18, 20, 22))  # slips at 1, 8, 9, 10 and 11 s
     assert settling.slip_period(time, late * 1.0) == pytest.approx(1.0, rel=1e-9)
