@@ -50,19 +50,23 @@ def truth_of(s: dict, path, result) -> tuple:
     model = build(load(path))
     if referable(s):
         try:
-            return _steady(s, model, cycles_kept(model, result)) if s.get("method") == "harmonic" else _moved(s, model)
+            return _steady(s, model, cycles_kept(model, result)) if s.get("method") == "harmonic" else \
+                _moved(s, model, result.extra["window"])
         except TooLong:
             pass
     return _finer(s, path, model, result.extra)
 
 
-def _moved(s: dict, model) -> tuple:
-    """Truth by the independent program; what a second, more careful run of it changes is what it does not know."""
+def _moved(s: dict, model, window: int) -> tuple:
+    """Truth by the independent program; what a second, more careful run of it changes is what it does not know.
+
+    window: cycles over which the measures are told.
+    """
     numerics, period, runs = choose(model), model.rig.drive.period, []
     for share, rtol in (ROUGH, FINE) if numerics.engine in SHARPEST else (ROUGH,):
         motion = Motion(s, share)
         stretches = motion.run(numerics.cycles * period, rtol, most=MOST_STEPS)
-        runs.append(measures(motion, stretches, period, numerics.cycles, numerics.window))
+        runs.append(measures(motion, stretches, period, numerics.cycles, window))
     return runs[-1], doubts(*runs), "reference"
 
 
