@@ -125,11 +125,13 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
 
     Models that share work are run together, with the answers of single runs; patches of one geometry share the mesh
     that serves all of them, as in a sweep. A model that cannot run has outcome "failed" and its message; SceneError
-    for a mistake in a scene.
+    for a mistake in a scene. One scene or model alone is a list of one.
     """
     from .runs.many.many import answers
     from .runs.many.meshes import meshed
 
+    if isinstance(models, str | Path | Scene | Model):
+        models = [models]
     return answers(meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 

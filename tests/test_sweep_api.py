@@ -78,6 +78,15 @@ def test_refuses_what_is_no_sweep():
             pf.sweep(RIG, {"normal.load": "1 N..2 N"}, **draw)
 
 
+def test_exact_one_scene_is_a_list_of_one(tmp_path):
+    """A text was read sign by sign: "[: not valid TOML"."""
+    path = tmp_path / "bench.toml"
+    path.write_text(BENCH, encoding="utf-8")
+    peak = pf.run(BENCH).measures["friction_force_peak"].value
+    for one in (BENCH, str(path), path, pf.load(BENCH), pf.build(BENCH)):
+        assert pf.run_many(one).values["friction_force_peak"].tolist() == [peak]
+
+
 def test_exact_many_models_are_single_runs():
     found = pf.run_many([RIG, pf.build(BENCH)])
     for case, text in enumerate((RIG, BENCH)):
