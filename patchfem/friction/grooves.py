@@ -50,6 +50,10 @@ class Grooves:
         """Slope t = A k sin(k q - phase) [1] at slides q [m]."""
         return self.steepest * np.sin(self.wave * np.asarray(q, float) - self.phase)
 
+    def bend(self, q):
+        """Rate of the slope t' = A k^2 cos(k q - phase) [1/m] at slides q [m]."""
+        return self.steepest * self.wave * np.cos(self.wave * np.asarray(q, float) - self.phase)
+
     def ratio(self, q, way, friction: float):
         """Force against the slide over the vertical force, (t + way mu)/(1 - way mu t) [1], at slides q [m].
 

@@ -140,6 +140,23 @@ def test_exact_flat_grooves_are_the_law_itself(text):
         {name: one.value for name, one in here.measures.items()}
 
 
+def test_always_harmonic_balance_finds_the_motion_of_the_march():
+    text = RIG.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"').replace(
+        "steps_per_cycle = 100", "steps_per_cycle = 400")
+    balanced, marched = run(text, **{"accuracy.method": "harmonic"}), run(text)
+    for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
+        found, true = balanced.measures[name], marched.measures[name]
+        assert abs(found.value - true.value) <= found.error + true.error and found.error < 0.03 * abs(found.value)
+
+
+def test_always_a_balanced_motion_that_does_not_last_is_said():
+    """At 6 g the balance climbs to a motion of 37 um; from rest and from that motion itself a march comes to 9 um."""
+    text = RIG.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "0.5 um"')
+    found = run(text.replace("steps_per_cycle = 100", 'method = "harmonic"'), **{
+        "drive.acceleration": "58.8 m/s^2", "normal.load": "115.65 N", "structure.moving_mass": "1.194 kg"})
+    assert found.outcome is Outcome.NOT_CONVERGED and any("does not last" in one for one in found.warnings)
+
+
 def test_exact_the_plan_prints_stiffness_and_capacity():
     found = pf.plan(loads(RIG))
     assert found.chain["grooves"] == pytest.approx(115 * WAVE**2 * 7.5e-6)
@@ -157,6 +174,10 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
     (RIG, ["accuracy.method=newmark"], "accuracy.method", "beside [normal.grooves]"),
     (RIG, ["friction.law=iwan", "friction.stiffness=1e7 N/m", "friction.chi=-0.5", "friction.beta=0.5"],
      "friction.law", "beside [normal.grooves]: use law 'coulomb'"),
+    (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.method=harmonic"], "accuracy.method",
+     "'harmonic' with law 'nonlocal' beside [normal.grooves]"),
+    (RIG, ["friction.law=elastic-plastic", "friction.bond_length=1 um", "accuracy.method=harmonic",
+           "normal.grooves.lifted_mass=1 kg"], "normal.grooves.lifted_mass", "beside accuracy.method = 'harmonic'"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.order=2"], "friction.order",
      "beside [normal.grooves]"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "accuracy.quadrature=direct"], "accuracy.quadrature",

@@ -113,11 +113,10 @@ def solve(free, beta, q, v, dt, c, goal):
         digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(at[PULL]))
         if abs(miss) <= 0.01 * goal * beta + digit:
             return dq, at[PULL], count
-        gain = max(1 + beta * at[PULL_SLOPE], 0.1)
+        gain, here = max(1 + beta * at[PULL_SLOPE], 0.1), dq
         low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
         if high - low <= digit:
-            pull(dq, q, dt, c)
-            return dq, at[PULL], count if abs(miss) <= goal * beta + 8 * gain * digit else -count
+            return here, at[PULL], count if abs(miss) <= goal * beta + 8 * gain * digit else -count
     return dq, at[PULL], -200
 
 

@@ -59,6 +59,16 @@ def _climbing(model: Model, patch):
     return model_of(model.grooves, load, f.static, f.static if f.kinetic is None else f.kinetic, speed, model.rig.modes)
 
 
+def flank_of(model: Model, patch):
+    """The law along the flanks of grooves of a harmonic balance."""
+    from ...dynamics.grooves.periodic import ElasticFlank, PacedFlank
+
+    f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
+    if has(f.law, "memoryless"):
+        return PacedFlank(model.grooves, load, f.static, f.reference_speed)
+    return ElasticFlank(_climbing(model, patch))
+
+
 def _element(one: Rubbing, load: float, speed: float) -> Element:
     """The law of an interface under a load [N]; speed [m/s] to expect."""
     f = one.numbers

@@ -15,10 +15,12 @@ from ...dynamics.harmonic.point import point as periodic_point
 from ...dynamics.harmonic.stability import with_stability
 from ...dynamics.second_book import gap, sampled_work
 from ...response.rows import measures_of
-from .interface import contact_model
+from .interface import contact_model, flank_of
 from .solution import Solution, sampled_loop, seen
 from .strips import other_measures
 
+ADRIFT = ("the steady motion that the balance found over the grooves does not last: another one is reached from rest; "
+          'use accuracy.method = "march"')
 SAMPLES = 1024  # of the cycle that measures are read off
 
 
@@ -30,7 +32,8 @@ class Balance:
         rig = model.rig
         parts = []
         if model.friction is not None:
-            parts.append((0, contact_model(model, numerics, patch)))
+            parts.append((0, flank_of(model, patch) if model.grooves is not None else
+                          contact_model(model, numerics, patch)))
         if rig.interlock is not None:
             parts.append((0, Interlock(*rig.interlock)))
         if rig.cubic is not None:
@@ -58,8 +61,11 @@ class Balance:
         extra = {"regime": name if stable.stable else f"{name}, unstable", "multipliers": stable.multipliers,
                  "residual": found.residual, "harmonics": found.harmonics}
         amplitude = np.array([values["relative_displacement_amplitude"]])
-        outcome = Outcome.STUCK if held else Outcome.STEADY
-        raw = Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin)
+        outcome, message = Outcome.STUCK if held else Outcome.STEADY, ""
+        if self.model.grooves is not None and not stable.stable:
+            outcome, message = Outcome.NOT_CONVERGED, ADRIFT
+        raw = Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
+                       message=message)
         return raw, errors, extra
 
     def _measured(self, found, drive) -> tuple:

@@ -27,7 +27,7 @@ def check_grooves(draft: Draft, kind: str) -> None:
     if kind == "bench" and grooves.lifted_mass:
         draft.remark(f"{at}.lifted_mass has no meaning beside [slide], whose motion is slow, and is not used")
     if grooves.amplitude:
-        _beside(draft, at, law)
+        _beside(draft, at, grooves, law)
 
 
 def grooves_of(tables: Any) -> tuple | None:
@@ -52,7 +52,7 @@ def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
                   f"wavelength/(2 pi static) = {most:.6g} m is wanted, or a smaller static")
 
 
-def _beside(draft: Draft, at: str, law: Any) -> None:
+def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     """Grooves are climbed as a whole by one interface under a constant load."""
     contact, structure = draft.tables.contact, draft.tables.structure
     beside = f"beside [{at}]"
@@ -75,6 +75,8 @@ def _beside(draft: Draft, at: str, law: Any) -> None:
              if one.on == "lower"]
     if lower:
         draft.say(lower[0], unbuilt(f"'lower' {beside}", "shapes"))
+    if draft.tables.accuracy.method == "harmonic" and grooves.lifted_mass:
+        draft.say(f"{at}.lifted_mass", unbuilt("beside accuracy.method = 'harmonic'", "march"))
     if structure is None:
         return
     if structure.stiffening is not None:

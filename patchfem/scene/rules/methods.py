@@ -174,6 +174,8 @@ def _harmonic(m: Motion, method: str) -> str:
         return unbuilt(f"'harmonic' with a law that jumps beside {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
         return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic')}"
+    if m.spring.endswith("grooves]") and has(law.law, "bonds"):
+        return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring}", "march or stiff")
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
     return unbuilt(f"'harmonic' with law '{law.law}' beside {beside}", "march") if has(law.law, "bonds") and beside \
