@@ -13,7 +13,8 @@ from ..model.source import placed
 from ..runs.bench import bench as law_bench
 from ..runs.bench.engine import smooth_sum_of
 from ..runs.bench.watch import Watch
-from ..scene.scene import Scene, SceneError, loads
+from ..scene.changed import Base
+from ..scene.scene import Scene, SceneError
 from .fit_path import lead_in, whole_cycles
 
 MOST_MOVED = 3  # keys of [contact] whose ends the shared meshes are chosen by
@@ -29,6 +30,7 @@ class BenchModel:
 
     def __init__(self, scene: Scene, loop: Loop, wanted: list, offsets=(), warm: bool = False, say=None):
         self.scene, self.loop, self.wanted, self.say = scene, loop, wanted, say
+        self.base = Base(scene)  # its text is read once, not at every value
         self.offsets, self.warm = tuple(one.what for one in offsets), whole_cycles(loop) if warm else 0
         self.notes, self.sets, law = [], [], scene.friction
         self.time = self._paced()
@@ -79,7 +81,7 @@ class BenchModel:
         """The scene with these free values."""
         sets = [*self.sets, *(one.assigned(value) for one, value in zip(self.wanted, values))]
         try:
-            return loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
+            return self.base.changed(sets)
         except SceneError as error:
             self.refused = self.refused or error
             raise PatchfemError(error.mistakes[0]) from None

@@ -97,7 +97,10 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     bounds, target = _bounds(free), measured_of(to)
     if model.patch is None:
         raise PatchfemError(f"--to {target.name}: one point under [normal] has no depth; name [contact]", "normal")
-    curve, most = _curve(model, bounds.high, target.name, progress)
+    from ..runs.patch.ladder import solve_all
+
+    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
+    curve, most = _curve(model, patch, bounds.high, target.name, progress)
     if not curve[1][-1] >= target.value:
         raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches {target.name} = "
                             f"{curve[1][-1]:.4g} of the measured {target.value:.4g}; raise the high bound")
@@ -105,7 +108,7 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     value, runs, reached = float(bounds.high * inverse(target.value)), 1, math.nan
     while runs < MOST_RUNS:
         runs += 1
-        _, reached = _curve(model, value, target.name, progress)
+        _, reached = _curve(model, patch, value, target.name, progress)
         if abs(reached - target.value) <= 0.1 * model.accuracy.tolerance * target.value:
             break
         value *= float(inverse(target.value) / inverse(reached))
@@ -127,13 +130,14 @@ def _bounds(free) -> Range:
     return found[0]
 
 
-def _curve(model: Model, coefficient: float, name: str, progress) -> tuple:
-    """((share of the cycles, quantity) (j,) each, the last quantity) of a model with this coefficient."""
-    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
-    from ..runs.patch.ladder import solve_all
+def _curve(model: Model, patch, coefficient: float, name: str, progress) -> tuple:
+    """((share of the cycles, quantity) (j,) each, the last quantity) of a model with this coefficient.
+
+    patch: that of the model as it is new.
+    """
     from ..runs.wear.evolve import evolve
 
-    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     found = evolve(model, patch, (None, None), progress)
     if found.stopped:
         raise PatchfemError(f"fit {KEY}: {found.stopped}")
