@@ -40,6 +40,13 @@ def test_exact_x3p_of_every_data_type(tmp_path, kind, increment, near, z):
     same(read(tmp_path, write.x3p_of(z, kind, increment)), z, near)
 
 
+@pytest.mark.parametrize("kind, near", [("D", 0), ("F", 1e-12)])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_exact_x3p_whose_missing_heights_are_infinite(tmp_path, kind, near, sign):
+    data = write.x3p_of(np.where(np.isnan(HOLES), sign * np.inf, HOLES), kind)
+    same(read(tmp_path, data), HOLES, near)
+
+
 def test_exact_x3p_with_an_offset_of_its_axes(tmp_path):
     data = write.x3p_of(Z, "I", 2e-10, 3e-6)
     same(read(tmp_path, data), Z, 1.01e-10)
