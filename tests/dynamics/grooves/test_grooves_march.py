@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
+from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.friction.grooves import Grooves
@@ -158,3 +159,16 @@ def test_always_a_fork_goes_on_as_the_march_does():
     rows = [one.cycle(100, 0, [])[1] for one in (run, twin)]
     np.testing.assert_array_equal(*rows)
     assert abs(rows[0][-1, 1]) < 1e-9  # at rest on its flank without a drive
+
+
+@pytest.mark.parametrize("kinetic", [0.4, 0.32])
+def test_exact_two_modes_on_flat_grooves_by_the_exact_engine(kinetic):
+    """Flanks of a slope of 1e-12: stops, sticks with a mode that goes on swinging, and releases of Coulomb's law."""
+    basis = ModalBasis(("axial", "yaw"), 2 * np.pi * np.array([143.0, 129.0]), np.full(2, 0.003), np.array([1.0, 0.4]),
+                       np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.2)
+    drive = BaseSine(48.0, 2 * np.pi * 143)
+    done = march(basis, drive, model_of(Grooves(80e-6, 1e-17), 115.0, 0.4, kinetic, None, basis), 8, 100, window=4)
+    true = simulate(basis, drive, 46.0, 115 * kinetic, 8, 4)
+    np.testing.assert_allclose(done.response.modal[-1], true.response.modal[-1], rtol=1e-7)
+    np.testing.assert_allclose(done.response.modal_rate[-1], true.response.modal_rate[-1], rtol=1e-7)
+    assert done.ledger["friction"] == pytest.approx(true.ledger["friction"], rel=1e-8)
