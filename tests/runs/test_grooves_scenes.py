@@ -8,6 +8,8 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import Outcome
+from patchfem.model.model import build
+from patchfem.runs.many.many import taken
 from patchfem.scene.scene import SceneError, loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
@@ -219,3 +221,11 @@ def test_always_nothing_of_grooves_is_imported_unasked():
         "'''))\nprint([m for m in sys.modules if 'grooves' in m and 'rules' not in m])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
+def test_refuses_a_batch_that_knows_no_grooves(law):
+    """The lumped batch takes the same rig without them, with them each case runs by itself."""
+    text = RIG.replace('law = "coulomb"', f'law = "{law}"' + '\nbond_length = "1 um"' * (law != "coulomb"))
+    text = text.replace("steps_per_cycle = 100", "")
+    assert taken(build(loads(text))) is None and taken(build(loads(flat(text)))) is not None
