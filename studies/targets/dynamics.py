@@ -1,14 +1,15 @@
 """Which targets of the dynamics are met, on this machine, now?
 
 All of accuracy, and of the times those of the event engine, of the bonds and of harmonic balance; not that of a march
-step for 100 elements. CPU seconds of one core, least of several turns, three runs on a machine that was shared by
-nine others all the while. Event engine: 1.9 to 2.1 us for a cycle of stick-slip in a long run (wanted 3), 1500 to 2100
-times less than DOP853 with events at 1e-8 and 840 to 970 times less than the fastest CVODE run (300); 20 to 33 ms for
-200 cycles in plain Python (20: met in a quiet turn alone); 8.2 to 9.0 us for a steady point (10, 69 to 74 times less
-than its plain form). March: 300 to 310 ns per step for 100 elements on five modes (200), 520 to 710 ns with the samples
-and energies that a run keeps (300), 280 to 380 ns for 30 elements on ten modes (300), 0.25 to 0.32 us for 200 points of
-bonds on ten modes (3), 6.4 to 13 us with 16 shear modes (15). Harmonic balance of 100 elements with 15 harmonics takes
-2.8 to 3.5 ms a point (5), 6 to 9 times less than 200 cycles of the march.
+step for 100 elements, and of 200 cycles in plain Python hardly. CPU seconds of one core, least of several turns, four
+runs on a machine that was shared by up to nine others all the while. Event engine: 1.9 to 2.1 us for a cycle of
+stick-slip in a long run (wanted 3), 1460 to 2100 times less than DOP853 with events at 1e-8 and 770 to 970 times less
+than the fastest CVODE run (300); 20 to 33 ms for 200 cycles in plain Python (20: met in a quiet turn alone); 8.2 to
+9.0 us for a steady point (10, 66 to 74 times less than its plain form). March: 280 to 310 ns per step for 100 elements
+on five modes (200), 515 to 710 ns with the samples and energies that a run keeps (200), 250 to 380 ns for 30 elements
+on ten modes (300), 0.25 to 0.32 us for 200 points of bonds on ten modes (3), 5.9 to 13 us with 16 shear modes (15).
+Harmonic balance of 100 elements with 15 harmonics takes 2.4 to 3.5 ms a point (5), 6 to 9 times less than 200 cycles
+of the march.
 
 The same step took 195 ns on this machine when it was idle, and the state of the package of that day takes as long as
 today's beside it, turn by turn: 281 to 344 beside 267 to 284 ns, 449 to 647 beside 520 to 530 ns with what a run keeps.
