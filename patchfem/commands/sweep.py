@@ -69,25 +69,28 @@ class By:
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: Annotated[bool, Parameter(negative=(), help="go on with what the folder holds")] = False,
-          keep: Annotated[Literal["summaries", "results"], Parameter(help="of each case its summary.json, or its whole "
-                                                                     "results folder")] = "summaries",
-          json_: Json = False, quiet: Quiet = False):
-    """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv and
-    sweep.nc, by default in out/<scene name>-sweep."""
+          keep: Annotated[Literal["summaries", "results", "pages"], Parameter(
+              help="of each case its summary.json, its results folder, or that with its report.html")] = "summaries",
+          no_page: Annotated[bool, Parameter(negative=())] = False, json_: Json = False, quiet: Quiet = False):
+    """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv,
+    sweep.nc and report.html of them all, by default in out/<scene name>-sweep; --no-page leaves out report.html."""
     from ..campaigns.sweeps import executors
     from ..campaigns.sweeps.ask import asked_of
     from ..export.sweeps.run import Place, collect, sweep_into
 
+    if no_page and keep == "pages":
+        raise Refused("sweep: --no-page leaves out every report.html, --keep pages asks for one of each case; name one "
+                      "of them")
     by = by or By()
     begin, part = perf_counter(), by.part()
     asked, cases = asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     if by.collect:
-        _answer(collect(asked, cases, target), target, json_, perf_counter() - begin)
+        _answer(collect(asked, cases, target, not no_page), target, json_, perf_counter() - begin)
         return
     line = Progress(quiet)
     try:
-        found = sweep_into(asked, cases, Place(target, resume, keep == "results", part),
+        found = sweep_into(asked, cases, Place(target, resume, keep != "summaries", part, keep == "pages", not no_page),
                            executors.of(by.executor, by.jobs), None if quiet else say, line)
     except KeyboardInterrupt:
         line.end()

@@ -81,8 +81,9 @@ def _place(folder: Path) -> tuple:
     return found.st_dev, found.st_ino
 
 
-def save(result: Result, folder: Path) -> None:
-    """Write the results folder of a run that is done, with its page; an older one is replaced."""
+def save(result: Result, folder: Path, page: bool = True) -> None:
+    """Write the results folder of a run that is done, with its page unless told otherwise; an older one is replaced."""
     with Folder(folder) as claimed:
         written = write(result, claimed.path)
-    write_page(written, claimed.target)
+    if page:
+        write_page(written, claimed.target)

@@ -288,6 +288,20 @@ def test_exact_whole_results_folders_are_kept(scene, tmp_path):
     assert (out / "sweep.csv").read_bytes() == before
 
 
+def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
+    out, over, page = tmp_path / "swept", ("--over", "friction.static=0.1"), "report.html"
+    for words, own, each in ((), True, False), (("--no-page",), False, False), (("--keep", "results"), True, False), \
+            (("--keep", "pages"), True, True), (("--keep", "results", "--no-page"), False, False):
+        assert cli("sweep", scene, *over, "-o", out, *words).code == 0
+        assert (out / page).is_file() == own and (out / "sweep.csv").is_file()
+        assert [one.is_file() for one in (out / "cases").glob(f"*/{page}")] == [True] * each
+        assert not own or (page in (out / page).read_text("utf-8")) == each  # what a click on the case opens
+    answer = cli("sweep", scene, *over, "-o", out, "--keep", "pages", "--no-page")
+    assert answer.code == 2 and "--no-page" in answer.err
+    assert cli("sweep", scene, *over, "-o", out, "--collect").code == 0 and (out / page).is_file()
+    assert cli("sweep", scene, *over, "-o", out, "--collect", "--no-page").code == 0 and not (out / page).exists()
+
+
 def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
     table = tmp_path / "cases.csv"
     table.write_text("normal.load [N],friction.static\n10,0.3\n20,0.4\n", encoding="utf-8")

@@ -62,14 +62,16 @@ def _measures(found: Answers, case: int) -> dict:
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """Keeps the whole results folder of each case."""
+    """Keeps the results folder of each case; page: with its report.html, which takes more room and time than all the
+    rest of a short run."""
 
     folder: Path
     keys: tuple
+    page: bool = False
 
     def __call__(self, number: int, result) -> None:
         """Write the folder of a case that has been run."""
-        save(result, self.folder / CASES / self.keys[number])
+        save(result, self.folder / CASES / self.keys[number], self.page)
 
 
 class Folder:

@@ -13,7 +13,7 @@ from ...core import Missing
 from ...runs.many.answers import Answers
 from .. import netcdf
 from .folder import Folder, Summaries, Whole
-from .page import write_page
+from .page import WHOLE, write_page
 from .tables import contents, write_csv
 
 
@@ -22,13 +22,16 @@ class Place:
     """Where a sweep is kept, and how.
 
     resume: answers that are there are taken as they are; whole: the results folder of each case is kept, and one that
-    is not there is no answer; shard: (i, n) to answer the i-th of n parts only, into a folder that the parts share.
+    is not there is no answer; shard: (i, n) to answer the i-th of n parts only, into a folder that the parts share;
+    pages: the results folders have their report.html; page: the sweep has one.
     """
 
     target: Path
     resume: bool = False
     whole: bool = False
     shard: tuple | None = None
+    pages: bool = False
+    page: bool = True
 
 
 def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable | None = None,
@@ -51,7 +54,8 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         kept = set(there)
         if len(kept) < len(wanted):
             folder.unfinish()
-        work = Work(asked, cases, Summaries(cases), Whole(folder.target, tuple(keys)) if place.whole else None)
+        whole = Whole(folder.target, tuple(keys), place.pages) if place.whole else None
+        work = Work(asked, cases, Summaries(cases), whole)
         for numbers, found, texts in solved(work, [one for one in wanted if one not in kept], executor, say):
             folder.put(*_to_write(numbers, found, texts, place.whole))
             _columns_only(found)
@@ -60,7 +64,7 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
             if told is not None:
                 told(done, len(wanted))
         if place.shard is None:
-            write_tables(asked, cases, total, folder)
+            write_tables(asked, cases, total, folder, place.page)
             folder.tidy(not place.resume)
     return total
 
@@ -74,7 +78,7 @@ def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None) -> 
     return total
 
 
-def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
+def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answers:
     """The tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
     keys = cases.keys(asked)
     with Folder(target, keys) as folder:
@@ -82,16 +86,19 @@ def collect(asked: Asked, cases: Cases, target: Path) -> Answers:
         if len(numbers) < len(cases):
             raise Missing(f"{target}: {len(cases) - len(numbers)} of {len(cases)} cases have no answer; run their "
                           "shards again, or go on with --resume")
-        write_tables(asked, cases, found, folder)
+        write_tables(asked, cases, found, folder, page)
         folder.tidy(False)
     return found
 
 
-def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder) -> None:
-    """Write sweep.csv, sweep.nc and report.html of all cases."""
+def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, page: bool = True) -> None:
+    """Write sweep.csv, sweep.nc and report.html of all cases; without a page, none is left of other cases."""
     write_csv(cases, found, folder.keys, folder.target / "sweep.csv")
     netcdf.write(contents(asked, cases, found, folder.keys), folder.target / "sweep.nc")
-    write_page(asked, cases, found, folder.keys, folder.target)
+    if page:
+        write_page(asked, cases, found, folder.keys, folder.target)
+    else:
+        (folder.target / WHOLE).unlink(missing_ok=True)
 
 
 def _part(count: int, shard: tuple | None) -> list[int]:
