@@ -10,7 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, 
 import pytest
 from hypothesis import settings
 
-from patchfem.compiled import cache_folder
+from patchfem.compiled import UNKEPT, cache_folder
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
 
@@ -26,3 +26,13 @@ def pytest_xdist_auto_num_workers(config):
         config.option.dist = "no"
         return 0
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+@pytest.fixture(autouse=True)
+def machine_code_is_kept():
+    """Every compiled function that a test calls must be one whose machine code is kept: else each process that calls it
+    waits for numba, and where it is not cached either, for its compiler."""
+    yield
+    unkept, _ = sorted(UNKEPT), UNKEPT.clear()
+    assert not unkept, f"not kept as machine code: {', '.join(unkept)}; it allocates, or an argument is no float, " \
+        "whole number, array or tuple of these"

@@ -1,6 +1,9 @@
 """Functions that compiled code calls: compiled with their callers, the same answers, callable from Python still."""
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +13,39 @@ from numba.core.registry import CPUDispatcher
 from patchfem.compiled import inner
 from patchfem.compiled.inner import Inner, njit
 
+KERNELS = """\
+import numpy as np
+from patchfem.compiled.inner import njit
+
+
+@njit(error_model="numpy", _nrt=False)
+def doubled(x):
+    return 2 * x
+
+
+@njit(error_model="numpy")
+def lengthened(count):
+    return np.zeros(count).size
+"""
+CALLS = """\
+import functools, importlib.util, sys
+from pathlib import Path
+from patchfem import compiled
+
+path = Path("{}")
+@functools.cache
+def bring():
+    spec = importlib.util.spec_from_file_location("some_kernels", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["some_kernels"] = module
+    spec.loader.exec_module(module)
+    return module
+
+kernels = compiled.Kernels("some_kernels", path, bring)
+print(kernels.doubled(3.0), "numba" in sys.modules)
+assert not compiled.UNKEPT
+print(kernels.lengthened(3), *compiled.UNKEPT)
+"""
 ALIKE = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp"}}
 
 
@@ -46,7 +82,6 @@ def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
     assert not called._alone.overloads and len(total._alone.overloads) == 1
     assert called(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
     assert len(called._alone.overloads) == 1
-    called.enable_caching()
     assert total(values.astype("f4"), places) == pytest.approx(truth, rel=1e-5)  # nothing of an inner one to keep
 
 
@@ -69,6 +104,17 @@ def test_always_kernels_are_compiled_by_it():
     assert len(kernels) > 50
     own = re.compile(r"(?m)^(from numba import .*\bn?jit\b|@numba\b)")
     assert not [str(path) for path in kernels if own.search(path.read_text("utf-8"))]
+
+
+def test_exact_calls_from_python_are_kept(tmp_path):
+    """A function that compiled code alone is meant to call is compiled once, not in every process, where Python does;
+    one that allocates is told, for numba must come up for it each time."""
+    (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
+    code = CALLS.format(tmp_path / "some_kernels.py")
+    environment = os.environ | {"PATCHFEM_CACHE": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "numba")}
+    for kept in (False, True):
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ["6.0", "False" if kept else "True", "3", "some_kernels.lengthened"]
 
 
 def test_exact_constants_in_calls_make_no_more_functions():

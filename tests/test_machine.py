@@ -45,6 +45,11 @@ def refusing(value):
     return value * 2
 
 
+def above(value, out):
+    out[0] = value
+    return value > 1
+
+
 def lengthened(count):
     return np.zeros(count).size
 
@@ -121,6 +126,12 @@ def test_exact_nothing_returned_and_what_was_raised(tmp_path):
     assert answer == code(words_of(2.0)) == 4.0
     with pytest.raises(RuntimeError, match="status"):
         code(words_of(-1.0))
+
+
+def test_exact_yes_and_no(tmp_path):
+    out = np.zeros(1)
+    answer, code = kept(tmp_path / "above.code", above, 2.0, out)
+    assert answer is True is code(words_of(3.0, out)) and code(words_of(1.0, out)) is False and out[0] == 1
 
 
 def test_refuses_what_numba_alone_can_run(tmp_path):

@@ -25,6 +25,7 @@ from pathlib import Path
 from . import machine
 
 HERE = Path(__file__).parents[1]  # the package
+UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
 
@@ -105,6 +106,7 @@ class Entry:
         try:
             kinds, words = zip(*map(self.words.of, arguments))
         except machine.Unfit:
+            UNKEPT.add(self.kept[:-1])
             return self.function()(*arguments)
         code = self.codes.get(kinds)
         if code is None:
@@ -112,7 +114,8 @@ class Entry:
             code = machine.found(path)
             if code is None:
                 answer = self.function()(*arguments)
-                machine.keep(path, self.function(), arguments)
+                if not machine.keep(path, self.function(), arguments):
+                    UNKEPT.add(self.kept[:-1])
                 self.codes[kinds] = False
                 return answer
             self.codes[kinds] = code
@@ -120,7 +123,8 @@ class Entry:
 
     def function(self):
         """The function of the module, which numba compiles or finds in its cache."""
-        return getattr(self.home.module(), self.name)
+        function = getattr(self.home.module(), self.name)
+        return function.alone() if hasattr(function, "alone") else function
 
     def __getattr__(self, name: str):
         if name.startswith("__"):

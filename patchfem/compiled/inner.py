@@ -35,7 +35,7 @@ class Inner(CPUDispatcher):
 
     def __init__(self, function, names, options, compiler):
         super().__init__(function, names, options | NO_C | NO_PYTHON, compiler)
-        self._alone = CPUDispatcher(function, names, options | NO_C)
+        self._alone, self._kept = CPUDispatcher(function, names, options | NO_C), False
 
     def get_call_template(self, args, kws):
         """As numba's, of the types alone: else a call with another constant would be another function to compile."""
@@ -48,7 +48,14 @@ class Inner(CPUDispatcher):
 
     def enable_caching(self):
         """Keep on disk what calls from Python compile."""
-        self._alone.enable_caching()
+        if not self._kept:
+            self._alone.enable_caching()
+            self._kept = True
+
+    def alone(self) -> CPUDispatcher:
+        """The function for itself, for calls from Python, kept on disk."""
+        self.enable_caching()
+        return self._alone
 
 
 class Inside(Compiler):

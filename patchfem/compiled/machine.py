@@ -162,14 +162,16 @@ def keep(path: Path, function, arguments: tuple) -> bool:
         return False
 
 
-def _results(kind):
-    """Results of a function as "d", "q", "" or a list of these; Unfit for others."""
+def _results(kind, inside: bool = False):
+    """Results of a function as "d", "q", "" or a list of these, "?" of one that answers yes or no; Unfit for others."""
     from numba.core import types
 
+    if kind == types.boolean and not inside:
+        return "?"
     if isinstance(kind, types.NoneType):
         return ""
     if isinstance(kind, types.BaseTuple):
-        return [_results(one) for one in kind]
+        return [_results(one, True) for one in kind]
     if kind == types.float64 or (isinstance(kind, types.Integer) and kind.bitwidth == 64 and kind.signed):
         return "d" if kind == types.float64 else "q"
     raise Unfit

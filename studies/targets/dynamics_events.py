@@ -48,8 +48,9 @@ def cycle_of_events() -> tuple:
     """(seconds per drive cycle of the compiled event engine in a batch of long runs, relative error of the peak)."""
     kernels = load("dynamics.one_mode.event_kernels")
     table = np.tile([1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0, 0.0], (BATCH, 1))
+    room = np.zeros((0, 10)), np.zeros(9), np.zeros((1, 6)), np.zeros((CYCLES, 2))
     size, books, ends = np.zeros((BATCH, 2)), np.zeros((BATCH, 10)), np.zeros((BATCH, 2))
-    seconds = least(lambda: kernels.batch(table, float(CYCLES), 10, size, books, ends)) / (BATCH * CYCLES)
+    seconds = least(lambda: kernels.batch(table, float(CYCLES), 10, room, size, books, ends)) / (BATCH * CYCLES)
     return seconds, float(abs(np.abs(size[0]).max() / PEAK - 1))
 
 
@@ -86,7 +87,7 @@ def steady_point() -> tuple:
     row = [1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0]
     count = 200
     table, found, phases = np.tile(row, (count, 1)), np.zeros((count, 12)), np.zeros((count, 16))
-    seconds = least(lambda: kernels.points(table, 4000, found, phases)) / count
     room, answer = np.empty(orbit_kernels.OUT), np.zeros(12)
+    seconds = least(lambda: kernels.points(table, 4000, room, found, phases)) / count
     plain = least(lambda: orbit_kernels.point(*row, 4000, room, phases[0], answer), 3, 5)
     return seconds, float(max(found[0, 9], abs(found[0, 2] / PEAK - 1))), plain

@@ -84,21 +84,29 @@ def step_of(row, z, v, first, last):
     return row[0] * z + row[1] * v + row[2] * first + row[3] * last
 
 
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", **LEAN)
+def copied(values, out):
+    """Write values (n,) into `out`; as a slice, numba would allocate a copy of what it cannot tell apart."""
+    for i in range(out.size):
+        out[i] = values[i]
+
+
+@njit(error_model="numpy", cache=True, **LEAN)
 def duhamel_loop(maps, coupling, solve, omega, dampers, faces, base, mass, drive, laws, criterion, tolerance, relax,
-                 most, z, v, force, residual, iterations):
+                 most, room, z, v, force, residual, iterations):
     """Fill z, v (k, n), force (i, k), residual (i, k) [N] and iterations (k,) from their first entries on.
 
     maps (n, 2, 4): (z, z', f at the start, f at the end) to (z, z') at the end of a step; coupling (n, n): dampers that
     are no part of the maps, solve (n, n): inverse of 1 + their effect on z' by f at the end; criterion 0 displacement,
-    1 velocity, 2 force. Returns the number of steps that did not converge.
+    1 velocity, 2 force; room: (numbers (3, i), numbers (3, n)) to work in. Returns the number of steps that did not
+    converge.
     """
     n, m = omega.size, laws.shape[0]
-    trial, slide, speed = np.empty(m), np.empty(m), np.empty(m)
-    scratch, starts, ends = np.empty(n), np.empty(n), np.empty(n)
+    trial, slide, speed = room[0][0], room[0][1], room[0][2]
+    scratch, starts, ends = room[1][0], room[1][1], room[1][2]
     failed = 0
     for k in range(drive.size - 1):
-        trial[:] = force[:, k]
+        copied(force[:, k], trial)
         for count in range(1, most + 1):
             for i in range(n):
                 first, last = -base[i] * drive[k] - dot(coupling[i], v[k]), -base[i] * drive[k + 1]
@@ -134,7 +142,7 @@ def duhamel_loop(maps, coupling, solve, omega, dampers, faces, base, mass, drive
                     trial[c] += relax * residual[c, k + 1]
         else:
             failed += 1
-        force[:, k + 1] = trial
+        copied(trial, force[:, k + 1])
     return failed
 
 
@@ -222,26 +230,28 @@ def arrest(stuck, faces, mass, crossed, v, accel, force):
             return
 
 
-@njit(error_model="numpy", cache=True)
-def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_force, z, v, force, residual,
+@njit(error_model="numpy", cache=True, **LEAN)
+def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_force, room, z, v, force, residual,
                  iterations):
     """Fill z, v (k, n), force (i, k), residual (i, k) [N] and iterations (k,) from their first entries on.
 
     Average acceleration; inverse (n, n): of 1 + h D/2 + h^2 omega^2/4. A Coulomb interface below its stick speed after
-    a step is stopped, with by_force only where its static force suffices. Returns the number of such stops.
+    a step is stopped, with by_force only where its static force suffices. room: (zeros (3, i, i), flags (i,), numbers
+    (4, i), numbers (4, n)) to work in. Returns the number of such stops.
     """
     n, m = omega.size, laws.shape[0]
-    crossed, soft = np.zeros((m, m)), np.zeros((m, m))
+    crossed, soft_speed, soft_travel, stuck = room[0][0], room[0][1], room[0][2], room[1]
+    direction, now, speed, travel = room[2][0], room[2][1], room[2][2], room[2][3]
+    accel, new, scratch, half = room[3][0], room[3][1], room[3][2], room[3][3]
+    copied(force[:, 0], now)
     for c in range(m):
         for d in range(m):
             for i in range(n):
                 crossed[c, d] += faces[c, i] * faces[d, i]
                 for j in range(n):
-                    soft[c, d] += faces[c, i] * inverse[i, j] * faces[d, j] / mass
-    soft_speed, soft_travel = soft * (h / 2), soft * (h * h / 4)
-    stuck, direction, now = np.zeros(m, np.bool_), np.zeros(m), force[:, 0].copy()
-    accel, new, scratch, half = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    speed, travel = np.empty(m), np.empty(m)
+                    soft_speed[c, d] += faces[c, i] * inverse[i, j] * faces[d, j] / mass
+            soft_travel[c, d] = soft_speed[c, d] * (h * h / 4)
+            soft_speed[c, d] *= h / 2
     stops = 0
     accelerate(z[0], v[0], omega, dampers, faces, base, mass, drive[0], now, accel)
     for c in range(m):
@@ -251,9 +261,9 @@ def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_
         if stuck[c] and by_force and abs(hold) > laws[c, 1]:
             stuck[c], direction[c] = False, np.sign(hold)
             force[c, 0] = laws[c, 2] * direction[c]
-    now[:] = force[:, 0]
+    copied(force[:, 0], now)
     accelerate(z[0], v[0], omega, dampers, faces, base, mass, drive[0], now, accel)
-    scratch[:] = v[0]
+    copied(v[0], scratch)
     arrest(stuck, faces, mass, crossed, scratch, accel, now)
     for k in range(drive.size - 1):
         for i in range(n):
@@ -281,7 +291,7 @@ def newmark_loop(inverse, omega, dampers, faces, base, mass, drive, laws, h, by_
         for i in range(n):
             z[k + 1, i] = z[k, i] + h * (v[k, i] + h / 4 * (accel[i] + new[i]))
             v[k + 1, i] = half[i] + h / 2 * new[i]
-        accel[:] = new
+        copied(new, accel)
         for c in range(m):
             w = dot(faces[c], v[k + 1])
             hold = now[c] + dot(faces[c], accel) * mass / crossed[c, c]
@@ -306,12 +316,14 @@ def accelerate(z, v, omega, dampers, faces, base, mass, drive, force, out):
             out[i] -= faces[c, i] * force[c] / mass
 
 
-@njit(error_model="numpy", cache=True)
-def euler_loop(omega, dampers, faces, base, mass, drive, laws, h, z, v, force):
+@njit(error_model="numpy", cache=True, **LEAN)
+def euler_loop(omega, dampers, faces, base, mass, drive, laws, h, room, z, v, force):
     """Fill z, v (k, n) and force (i, k) from their first entries on: z += h z', z' += h z'', all from the step's start.
+    room: (numbers (i,), numbers (n,)) to work in.
     """
     n, m = omega.size, laws.shape[0]
-    accel, now = np.empty(n), force[:, 0].copy()
+    now, accel = room
+    copied(force[:, 0], now)
     for k in range(drive.size):
         for c in range(m):
             along = pull(faces[c], z[k], v[k], omega, dampers, base, drive[k], accel)

@@ -56,10 +56,11 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     dampers = np.ascontiguousarray(modes.dampers, float)
     maps, coupling = kernels(modes, found.h), dampers - np.diag(np.diag(dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
+    room = np.empty((3, len(law))), np.empty((3, modes.omega.size))
     failures = compiled.duhamel_loop(
         maps, coupling, solve, np.array(modes.omega), dampers,
         np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
-        CRITERIA.index(convergence), float(tolerance), float(relax), int(most), found.z, found.v, found.force,
+        CRITERIA.index(convergence), float(tolerance), float(relax), int(most), room, found.z, found.v, found.force,
         found.residual, found.iterations)
     said = _warnings(modes, laws, law, found, convergence, tolerance, relax, failures)
     return finish(modes, found, failures, said)

@@ -22,11 +22,12 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     law = rows(laws, len(modes.interfaces))
     kernels = loops(laws)
     found = grid(modes, drive, (law, kernels), duration, steps_per_cycle, start)
+    room = np.empty(len(law)), np.empty(modes.omega.size)
     with np.errstate(over="ignore", invalid="ignore"):
         kernels.euler_loop(
             np.array(modes.omega), np.ascontiguousarray(modes.dampers, float),
             np.ascontiguousarray(modes.interfaces, float), np.array(modes.base), float(modes.mass), found.drive, law,
-            found.h, found.z, found.v, found.force)
+            found.h, room, found.z, found.v, found.force)
         return finish(modes, found, 0, _warnings(modes, laws, found.h))
 
 

@@ -26,7 +26,7 @@ def slide_at(re, im, angle):
     return value, rate, bend
 
 
-@njit(error_model="numpy", cache=True)
+@njit(error_model="numpy", cache=True, **LEAN)
 def turning_points(re, im, rate, angle, place, cell):
     """Turning points of the slide with harmonics re + i im (H + 1,) whose rate at N uniform angles is known.
 
@@ -34,7 +34,9 @@ def turning_points(re, im, rate, angle, place, cell):
     the first sample. A rate within rounding of zero has no direction of its own.
     """
     n, count = rate.size, 0
-    floor = 1e-13 * np.max(np.abs(rate))
+    floor = 0.0
+    for i in range(n):
+        floor = max(floor, 1e-13 * abs(rate[i]))
     width = 2 * np.pi / n
     first = 0.0
     for i in range(n - 1, -1, -1):
@@ -76,20 +78,18 @@ def turning_points(re, im, rate, angle, place, cell):
     return count, start
 
 
-@njit(error_model="numpy", cache=True)
-def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, force, slope, hold, stretch):
+@njit(error_model="numpy", cache=True, **LEAN)
+def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, room, force, slope, hold, stretch):
     """Steady loop of t parallel Jenkins elements, limit (t,) rising, along samples q (N,) of one cycle.
 
     turns, cells (R,): places of the turning points and the sample before each; stiff, full, square (t + 1,): running
-    sums of k, k limit, k limit^2. Out: force (N,), slope (N,) of the elements that stick, hold (R, N): minus the
-    stiffness that hangs on each turning point, stretch (N,): sum of k limit stretch. Two turns from the virgin state:
-    the second is periodic.
+    sums of k, k limit, k limit^2. room: (whole numbers (2, 2 R + 3), numbers (2, 2 R + 3)) to work in. Out: force (N,),
+    slope (N,) of the elements that stick, hold (R, N): minus the stiffness that hangs on each turning point, stretch
+    (N,): sum of k limit stretch. Two turns from the virgin state: the second is periodic.
     """
     t, n, r = limit.size, q.size, turns.size
     depth = 1
-    end = np.empty(2 * r + 3, np.int64)
-    mark = np.empty(2 * r + 3, np.int64)
-    sign, base = np.empty(2 * r + 3), np.empty(2 * r + 3)
+    end, mark, sign, base = room[0][0], room[0][1], room[1][0], room[1][1]
     end[0], mark[0], sign[0], base[0] = t, -1, 0.0, 0.0
     p = 0
     g = 1.0 if q[0] > 0 else -1.0
@@ -142,13 +142,13 @@ def _turn(q, g, p, depth, end, sign, base, mark, number):
     return depth, 0
 
 
-@njit(error_model="numpy", cache=True)
-def bond_cycle(q, start, cells, turns, limit, length, force, slope, hold):
+@njit(error_model="numpy", cache=True, **LEAN)
+def bond_cycle(q, start, cells, turns, limit, length, room, force, slope, hold):
     """Steady loop of the bond recursion, u' = sgn - u per length [m], F = limit u, along samples q (N,) of a cycle.
 
     Between turning points the stretch is exact, u = g + (u_r - g) exp(-|q - q_r|/length), so its value at the turning
-    points obeys an affine condition, solved exactly. Out: force (N,), slope (N,) at fixed turning points, hold (R, N):
-    derivative of the force to each turning place.
+    points obeys an affine condition, solved exactly. room: zeros (R + 1, R) to work in. Out:
+    force (N,), slope (N,) at fixed turning points, hold (R, N): derivative of the force to each turning place.
     """
     n, r = q.size, turns.size
     if r == 0:
@@ -157,8 +157,7 @@ def bond_cycle(q, start, cells, turns, limit, length, force, slope, hold):
             force[i] = limit * (1 - e) * (1.0 if q[0] > 0 else -1.0)
             slope[i] = limit / length * e
         return
-    u = np.zeros(r)  # stretch at the turning points
-    jac = np.zeros((r, r))
+    u, jac = room[r], room[:r]  # stretch at the turning points
     for passed in range(2):
         g = -start  # direction after the first turning point
         for k in range(r):

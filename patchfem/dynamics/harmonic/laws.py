@@ -127,8 +127,9 @@ class Jenkins:
         _, places, cells, start = track.turning
         n, (stiff, full, square) = track.samples, self.sums
         force, slope, stretch, hold = np.empty(n), np.empty(n), np.empty(n), np.zeros((places.size, n))
-        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full,
-                                                        square, force, slope, hold, stretch)
+        room = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
+        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full, square, room, force,
+                                slope, hold, stretch)
         return Sampled(force, slope, None, hold, float(full[-1]), stretch)
 
 
@@ -157,8 +158,8 @@ class Stretch:
         _, places, cells, start = track.turning
         n = track.samples
         force, slope, hold = np.empty(n), np.empty(n), np.zeros((places.size, n))
-        kernels().bond_cycle(track.q, start, cells, places, self.limit, self.length, force,
-                                                     slope, hold)
+        kernels().bond_cycle(track.q, start, cells, places, self.limit, self.length,
+                             np.zeros((places.size + 1, places.size)), force, slope, hold)
         return Sampled(force, slope, None, hold, self.limit, self.length * force)
 
 

@@ -200,7 +200,7 @@ class VaryingLoadRun(Run):
         self.rub = compiled("dynamics.march.varying_friction_kernels").Rub(
             np.array(law.force, float), memory, now.copy(), now, np.array(psi.T, order="C"), np.arange(x.size),
             **sheared(weight, law.length, law.growth, psi, kappa))
-        self.held = np.zeros(3)
+        self.held, self.room = np.zeros(3), (np.empty(30), np.empty((3, modes.omega.size)))
         self.width += 5
         self.ledger[0] += self.strained()
 
@@ -217,7 +217,7 @@ class VaryingLoadRun(Run):
             loads = np.array(model.load((self.done + np.arange(count + 1)) * self.prop.dt), float)
         return self.loop.march(row, count, self.state, self.held, self.slot, self.plant, self.ports, table,
                                model.law.kind, self.rub, self.sets, loads, GOAL * model.limit, float(self.travel),
-                               self.ledger, rows)
+                               self.room, self.ledger, rows)
 
     def _booked(self, rows) -> np.ndarray:
         """As of a Run; the noise is that of the largest force, of the slide's last digit (a sum over the modes) and of

@@ -203,21 +203,22 @@ def last_force(used, v1, load, state, kind, plant, rub, ports, force, at, table,
     return need / gain if gain > 0 else 0.0
 
 
-@njit(error_model="numpy", cache=True)
-def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, sets, loads, goal, travel, ledger,
-          rows):
+@njit(error_model="numpy", cache=True, **LEAN)
+def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, sets, loads, goal, travel, room,
+          ledger, rows):
     """March `steps` steps from row `first` of the table of the drive.
 
     held (3,): last friction force, mean force of the step before, 1 while Coulomb friction holds; at_set (1,): slot of
     the present set; rub: `dynamics.march.varying_friction_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the
-    steps, empty where the contact says it;
+    steps, empty where the contact says it; room: (numbers (30,), (3, n)) to work in;
     ledger as in `dynamics.march.loop_kernels.march`; rows (steps + 1, 2 n + 12) as there, then load, moment, energy of
     the preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no
     contact set fits.
     """
     slide, mass, n, around, beta = plant.slide, plant.mass, plant.omega.size, table.shape[0], ports.beta
-    free, force, turn, out, begin = np.empty(3), np.zeros(3), np.zeros(2), np.zeros(9), np.zeros(5)
-    accel, spare, ends = np.empty(n), np.empty((2, n)), np.zeros(8)
+    few, accel, spare = room[0], room[1][0], room[1][1:]
+    free, force, turn, out, begin, ends = few[:3], few[3:6], few[6:8], few[8:17], few[17:22], few[22:]
+    few[:] = 0.0
     for r in range(3):
         ends[1 + r] = rate_given(ports.rows[0], ports.rows[r], plant.push, plant.dense, mass)
     for j in range(n):

@@ -4,6 +4,7 @@ arithmetic of `sdof_kernels` and `window_kernels`."""
 import numpy as np
 
 from ...compiled.inner import njit
+from ...friction.flags_kernels import LEAN
 from . import window_kernels as plain
 from .event_kernels import COMPILED, compiled_copy, enter, march
 
@@ -12,18 +13,17 @@ _SCOPE = compiled_copy(plain, ("fading", "place", "integrals", "integral", "mean
 window, cycle_parts = _SCOPE["window"], _SCOPE["cycle_parts"]
 
 
-@njit(error_model="numpy", cache=True, nogil=True)
+@njit(error_model="numpy", cache=True, nogil=True, **LEAN)
 def runs(table, shape, room, answers, codes):
     """Runs from rest or not under one sine each. table (n, 9): w, decay, static, kinetic, B, om, share, as `rig` of
     `window_kernels`, and z, v at t = 0; shape: (cycles, cycles of the window). room: (phases (r, 10), brackets (TURNS,
-    4), numbers (6,), parts (c, 2)) to work in. answers: (extremes of z per cycle (n, c, 2), its parts at the drive's
-    frequency in the last cycle of every window (n, windows, 2), books (n, 10) of `sdof_kernels.march`, numbers
-    (n, NUMBERS) of `window_kernels`, (z, v at the end, largest z'^2 + w^2 z^2) (n, 3)). codes (n,): 1 of a run that
-    came to its end, else as of `march`, 0 where the room was too small."""
+    4), numbers (6,), parts (c, 2), state (9,), segments (1, 6)) to work in. answers: (extremes of z per cycle (n, c,
+    2), its parts at the drive's frequency in the last cycle of every window (n, windows, 2), books (n, 10) of
+    `sdof_kernels.march`, numbers (n, NUMBERS) of `window_kernels`, (z, v at the end, largest z'^2 + w^2 z^2) (n, 3)).
+    codes (n,): 1 of a run that came to its end, else as of `march`, 0 where the room was too small."""
     cycles, last = shape
-    rows, turns, found, parts = room
+    rows, turns, found, parts, state, segments = room
     extremes, phasors, books, numbers, ends = answers
-    state, segments = np.empty(9), np.empty((1, 6))
     windows = phasors.shape[1]
     for n in range(table.shape[0]):
         w, decay, static, kinetic, b, om, share, z, v = table[n]
@@ -39,7 +39,8 @@ def runs(table, shape, room, answers, codes):
             ends[n, 0], ends[n, 1] = state[3], state[4]
             ends[n, 2] = cycle_parts(rows, used, last, cycles - 1, rig, parts)
             for k in range(windows):
-                phasors[n, windows - 1 - k] = parts[cycles - 1 - k * last]
+                at = cycles - 1 - k * last
+                phasors[n, windows - 1 - k, 0], phasors[n, windows - 1 - k, 1] = parts[at, 0], parts[at, 1]
             if not window(rows, used, cycles * per - last * per, last, rig, (turns, found), numbers[n]):
                 code = 0
         codes[n] = code

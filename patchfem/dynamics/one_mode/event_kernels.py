@@ -37,14 +37,13 @@ COMPILED = {name: _SLIP[name] for name in SLIP} | {name: _EVENTS[name] for name 
 march, enter, keep = _EVENTS["march"], _EVENTS["enter"], _KEEP["keep"]
 
 
-@njit(error_model="numpy", cache=True)
-def batch(table, cycles, last, amplitude, books, ends):
+@njit(error_model="numpy", cache=True, **LEAN)
+def batch(table, cycles, last, room, amplitude, books, ends):
     """Runs under one sine each, from rest or not. table (n, 9): w, decay, static, kinetic (over the mass), B, om, push,
-    and z, v at t = 0. amplitude (n, 2): least and largest z of the `last` cycles; books (n, 10) as in `march`; ends
-    (n, 2): z and v at the end. Returns the worst code of `march`."""
-    worst, none = 1, np.empty((0, 10))
-    state, segments = np.empty(9), np.empty((1, 6))
-    extremes = np.empty((int(cycles), 2))
+    and z, v at t = 0. room: (rows (0, 10), state (9,), segments (1, 6), extremes (cycles, 2)) to work in. amplitude
+    (n, 2): least and largest z of the `last` cycles; books (n, 10) as in `march`; ends (n, 2): z and v at the end.
+    Returns the worst code of `march`."""
+    worst, (none, state, segments, extremes) = 1, room
     for n in range(table.shape[0]):
         w, decay, static, kinetic, b, om, push, z, v = table[n]
         per = 2 * np.pi / om
@@ -55,8 +54,10 @@ def batch(table, cycles, last, amplitude, books, ends):
         enter(state, segments, 0, 0.0, 0.0, z, v, 1.0, static, kinetic, w * w)
         code, _ = march((w, decay), (static, kinetic), segments, (per, np.inf, 1.0, 1.0), state, none, extremes,
                         books[n])
-        amplitude[n, 0] = np.min(extremes[-last:, 0])
-        amplitude[n, 1] = np.max(extremes[-last:, 1])
+        amplitude[n, 0], amplitude[n, 1] = np.inf, -np.inf
+        for k in range(extremes.shape[0] - last, extremes.shape[0]):
+            amplitude[n, 0] = min(amplitude[n, 0], extremes[k, 0])
+            amplitude[n, 1] = max(amplitude[n, 1], extremes[k, 1])
         ends[n, 0], ends[n, 1] = state[3], state[4]
         worst = max(worst, code)
     return worst

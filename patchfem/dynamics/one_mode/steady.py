@@ -96,7 +96,8 @@ def point(modes: ModalBasis, drive, static: float, kinetic: float, start: Start 
     row, output = _row(modes, drive, static, kinetic, start)
     found, phases = np.zeros(12), np.full(orbit_kernels.PHASES, np.nan)
     if compiled:
-        load("dynamics.one_mode.steady_kernels").points(np.array([row], float), patience, found[None], phases[None])
+        load("dynamics.one_mode.steady_kernels").points(np.array([row], float), patience, np.empty(orbit_kernels.OUT),
+                                                           found[None], phases[None])
     else:
         orbit_kernels.point(*row, patience, np.empty(orbit_kernels.OUT), phases, found)
     return _steady(row, found, phases, output)
@@ -136,7 +137,7 @@ def motions(modes: ModalBasis, level, omega, static, kinetic=None, patience: int
     w, decay, output = float(modes.omega[0]), float(modes.dampers[0, 0]) / 2, abs(float(modes.output[0]))
     for place, column in enumerate((w, decay, static * share, kinetic * share, -float(modes.base[0]) * level, omega)):
         table[:, place] = np.ravel(column)
-    load("dynamics.one_mode.steady_kernels").points(table, patience, found, phases)
+    load("dynamics.one_mode.steady_kernels").points(table, patience, np.empty(orbit_kernels.OUT), found, phases)
     columns = (found[:, 1], found[:, 2] * output, found[:, 4], found[:, 5] + 1j * found[:, 6],
                found[:, 3] * output * (w**2 if w > 0 else table[:, 5]**2), found[:, 9])
     regime = np.array(REGIMES)[found[:, 0].astype(int)]

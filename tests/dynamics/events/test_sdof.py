@@ -421,7 +421,8 @@ def test_exact_batch_is_its_runs():
                              rng.uniform(0.4, 2, 20), np.zeros(20), rng.uniform(-1, 1, 20), rng.uniform(-1, 1, 20)])
     table[:, 3] = table[:, 2]
     size, books, ends = np.zeros((20, 2)), np.zeros((20, 10)), np.zeros((20, 2))
-    assert events().batch(table, 20.0, 5, size, books, ends) == 1
+    room = np.zeros((0, 10)), np.zeros(9), np.zeros((1, 6)), np.zeros((20, 2))
+    assert events().batch(table, 20.0, 5, room, size, books, ends) == 1
     for row, found, book, end in zip(table, size, books, ends):
         _, _, extremes, own, state = march(sdof_kernels, row[2], row[1], row[5], 20, z=row[7], v=row[8])
         assert found == pytest.approx([extremes[-5:, 0].min(), extremes[-5:, 1].max()], abs=1e-10)

@@ -40,7 +40,8 @@ def marched(table, cycles=3000, last=10):
     """Half peak to peak of the last cycles of runs from rest; table (n, 6): w, decay, static, kinetic, B, om."""
     n = len(table)
     size, books, ends = np.zeros((n, 2)), np.zeros((n, 10)), np.zeros((n, 2))
-    assert events().batch(np.column_stack([table, np.zeros((n, 3))]), float(cycles), last, size, books, ends) == 1
+    room = np.zeros((0, 10)), np.zeros(9), np.zeros((1, 6)), np.zeros((cycles, 2))
+    assert events().batch(np.column_stack([table, np.zeros((n, 3))]), float(cycles), last, room, size, books, ends) == 1
     return (size[:, 1] - size[:, 0]) / 2
 
 
@@ -51,7 +52,7 @@ def table_of(zeta, ratios, frictions):
 def points(table):
     rows = np.column_stack([table, np.zeros((len(table), 2))])
     found, phases = np.zeros((len(table), 12)), np.full((len(table), orbit_kernels.PHASES), np.nan)
-    kernels().points(rows, 4000, found, phases)
+    kernels().points(rows, 4000, np.empty(orbit_kernels.OUT), found, phases)
     return found, phases
 
 

@@ -51,7 +51,8 @@ def runs_of(models, cycles: int, window: int, say=None) -> Runs:
     kernels, given = load(KERNELS, say), np.ascontiguousarray(table[:, :9])
 
     def go(part: slice) -> None:
-        room = (np.zeros((PHASES * cycles + 256, 10)), np.zeros((read.TURNS, 4)), np.zeros(6), np.zeros((cycles, 2)))
+        room = (np.zeros((PHASES * cycles + 256, 10)), np.zeros((read.TURNS, 4)), np.zeros(6), np.zeros((cycles, 2)),
+                np.zeros(9), np.zeros((1, 6)))
         kernels.runs(given[part], (cycles, window), room,
                      tuple(one[part] for one in (extremes, phasors, books, numbers, ends)), codes[part])
 
