@@ -18,6 +18,7 @@ length = "0.9 mm"
 width = "0.9 mm"
 height = "0.5 mm"
 load = "20 N"
+element_size = "2 um"
 substrate = "Ti-8Al-1Mo-1V"
 [contact.profile]
 file = "before.csv"

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from typing import Annotated, Any, get_args
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    Strict,
-    WithJsonSchema,
-    field_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field_validator
 from pydantic.types import AllowInfNan
+from pydantic_core import core_schema
 
 from .quantities import EXAMPLES, parse
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """pydantic's BeforeValidator of a function of the value alone; that one looks at its signature for every key of
+    every table, which is a twentieth of a short command."""
+
+    function: Callable
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
+        return core_schema.no_info_before_validator_function(self.function, handler(source))
+
+
+@dataclass(frozen=True, slots=True)
+class After:
+    """pydantic's AfterValidator, as `Before`."""
+
+    function: Callable
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable) -> Any:
+        return core_schema.no_info_after_validator_function(self.function, handler(source))
 
 
 class Kind(str):
@@ -41,14 +55,14 @@ def quantity(kind: str, **limits: float) -> Any:
     """The type of a key that holds a quantity of this kind, within limits as `pydantic.Field` names them."""
     schema = {"type": "string", "examples": [EXAMPLES[kind]]}
     return Annotated[
-        float, Kind(kind), BeforeValidator(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits),
-        AfterValidator(partial(_within, least=1 / LARGEST if kind in DIVIDED_BY else 0.0)),
+        float, Kind(kind), Before(partial(parse, kind=kind)), WithJsonSchema(schema), Field(**limits),
+        After(partial(_within, least=1 / LARGEST if kind in DIVIDED_BY else 0.0)),
     ]
 
 
 def number(**limits: float) -> Any:
     """The type of a key that holds a plain finite number within limits; neither a text nor a boolean."""
-    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), AfterValidator(partial(_within, least=0.0))]
+    return Annotated[float, Strict(), AllowInfNan(False), Field(**limits), After(partial(_within, least=0.0))]
 
 
 def whole(least: int) -> Any:
