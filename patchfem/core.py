@@ -145,8 +145,9 @@ class ModalBasis:
     acceleration a(t), or of a force over the mass, a(t) = F/mass, with its sign turned. damping: (n, n) D [1/s] where
     it couples the coordinates; None: D = diag(2 zeta omega). faces: (i, n) slide of every interface; None: the one
     interface `slide`. normal (away from the contact, 1), pitch [rad/m], lateral [1], yaw [rad/m]: (n,) motion of the
-    patch per coordinate, None where no mode has any. shapes: (p, n) the modes or masses of the scene, which `names` are
-    of, per coordinate; None: they are the coordinates.
+    patch per coordinate, None where no mode has any. gauge: (n,) motion that the displacement is measured of, where it
+    is not that of `output`, which the acceleration is measured of; None where they are one. shapes: (p, n) the modes or
+    masses of the scene, which `names` are of, per coordinate; None: they are the coordinates.
     """
 
     names: tuple
@@ -163,6 +164,7 @@ class ModalBasis:
     lateral: np.ndarray | None = None
     yaw: np.ndarray | None = None
     shapes: np.ndarray | None = None
+    gauge: np.ndarray | None = None
 
     @property
     def interfaces(self) -> np.ndarray:
@@ -289,7 +291,8 @@ class Response:
     time [s]; modal (k, n) [m]; modal_rate (k, n) [m/s]; slide [m], slide_rate [m/s] of the interface; output [m],
     output_rate [m/s]; acceleration [m s-2], absolute, at the accelerometer; base_acceleration [m s-2]; force: friction
     resultant [N]; slip: irreversible part of `slide` [m]. `extra` may hold "ledger" (4, k) [J]: friction work, energy
-    stored in the interface, dissipated, created.
+    stored in the interface, dissipated, created; "felt", "felt_rate" (k,): motion [m] and rate [m/s] of an
+    accelerometer that does not move as the output does.
     """
 
     time: np.ndarray

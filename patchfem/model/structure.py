@@ -21,7 +21,7 @@ def modes_of(scene) -> ModalBasis:
     on drive.mass (structure.output_mass unless given), at the output of [[structure.mode]] and of a file without a
     force of its own. PatchfemError names what a file lacks.
     """
-    found = _over_strips(scene, _unbonded(scene))
+    found = _over_strips(scene, _instrumented(scene.structure.mode, _unbonded(scene)))
     if found.faces is not None and not len(found.faces):
         found = replace(found, faces=None)  # nothing rubs: the output stands for a slide without friction
     bonded = scene.structure.bonded
@@ -31,6 +31,15 @@ def modes_of(scene) -> ModalBasis:
         raise PatchfemError(f"{scene.where('structure.bonded')}: stands beside one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
     return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
+
+
+def _instrumented(modes, found: ModalBasis) -> ModalBasis:
+    """The basis with the accelerometer as its output and the gauge beside it, where [[structure.mode]] tells them
+    apart."""
+    felt, seen = (np.array([getattr(mode, key) for mode in modes], float) for key in ("accelerometer", "gauge"))
+    if not modes or (np.array_equal(felt, found.output) and np.array_equal(seen, found.output)):
+        return found
+    return replace(found, output=frozen_array(felt), gauge=None if np.array_equal(felt, seen) else frozen_array(seen))
 
 
 def _over_strips(scene, found: ModalBasis) -> ModalBasis:

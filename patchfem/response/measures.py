@@ -142,6 +142,19 @@ def peaks_between(window: Response) -> dict:
     return out
 
 
+def half_swing(time, place, rate) -> float:
+    """Half peak-to-peak [m] of the cubics through samples of a place (k,) [m] and its rate [m/s] at times (k,) [s]."""
+    h = np.diff(time)
+    k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
+    p, q, rise = rate[k] * h[k], rate[k + 1] * h[k], place[k + 1] - place[k]
+    two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
+    # p + 2 two s + 3 three s^2 = 0, by the root that keeps its digits where the cubic is nearly a parabola
+    root = np.sqrt(np.maximum(two**2 - 3 * three * p, 0.0))
+    s = np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
+    every = np.concatenate([place, place[k] + s * (p + s * (two + s * three))])
+    return float(every.max() - every.min()) / 2
+
+
 def swing(window: Response) -> float:
     """Half peak-to-peak of the output [m] over samples that hold both sides of every jump of its acceleration.
 

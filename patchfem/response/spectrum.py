@@ -104,5 +104,7 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
 
 def _harmonic(window, drive, n: int) -> complex:
     """Complex harmonic n [m s-2] of the absolute acceleration, from the motion by parts: nothing is lost at a jump."""
-    found = acceleration_harmonic(window.time, window.output, window.output_rate, n * drive.omega)
+    place, rate = (window.extra.get(name, own) for name, own in (("felt", window.output),
+                                                                 ("felt_rate", window.output_rate)))
+    found = acceleration_harmonic(window.time, place, rate, n * drive.omega)
     return found - 1j * drive.acceleration if n == 1 and drive.moving else found

@@ -269,7 +269,8 @@ def _law(law: tables.Friction) -> tables.Friction:
 
 def _mode(mode: tables.Mode, first: bool) -> tables.Mode:
     share = mode.slide if first else 0.0
-    return _filled(mode, {"base": share, "output": share})
+    mode = _filled(mode, {"base": share, "output": share})
+    return _filled(mode, {"accelerometer": mode.output, "gauge": mode.output})
 
 
 def _filled(table: Any, values: dict[str, Any]) -> Any:

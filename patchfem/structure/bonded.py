@@ -7,7 +7,7 @@ import numpy as np
 from ..core import ModalBasis, frozen_array
 from .matrices import decouple, split, trimmed
 
-ROWS = ("slide", "base", "output", "normal", "pitch", "lateral", "yaw")
+ROWS = ("slide", "base", "output", "gauge", "normal", "pitch", "lateral", "yaw")
 
 
 def bonded(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:

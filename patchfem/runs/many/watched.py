@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import NotConverged, Outcome, Response
+from ...response.measures import half_swing
 from ..rig.engines import ENGINES, HARMONIC, steady_by
 from ..rig.numerics import choose
 
@@ -43,12 +44,20 @@ class Watcher:
 
     def __call__(self, drive, near=None) -> Watched | None:
         try:
-            return {"yields": self._yields, "balance": self._balance, "events": self._events,
-                    "line": self._line}.get(self.by, self._run)(drive, near)
+            return self._gauged({"yields": self._yields, "balance": self._balance, "events": self._events,
+                    "line": self._line}.get(self.by, self._run)(drive, near))
         except NotConverged:
             if near is None:
                 return None
         return self(drive)
+
+    def _gauged(self, seen: Watched | None) -> Watched | None:
+        """The displacement at the gauge, where it moves otherwise than the accelerometer."""
+        gauge = self.model.rig.modes.gauge
+        if seen is None or gauge is None:
+            return seen
+        window = seen.window
+        return seen._replace(displacement=half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge))
 
     def _once(self, name: str, make):
         if name not in self.made:

@@ -21,6 +21,7 @@ from ...scene.rules import methods
 from ..effort import too_long
 from .pieces.costs import pieces, seconds_of_pieces, seconds_of_steps
 from .smooth.choice import not_smooth
+from .solution import gauged
 
 FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
@@ -60,7 +61,8 @@ class Engine(NamedTuple):
     def run(self) -> Callable:
         """The function that solves, imported when it is first wanted."""
         module, function = self.solve.split()
-        return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
+        solve = getattr(import_module(f"patchfem.runs.rig.{module}"), function)
+        return lambda model, *given: gauged(model, solve(model, *given))
 
 
 def no_closed_form(model: Model, steady: bool = False) -> str:

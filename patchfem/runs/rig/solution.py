@@ -1,11 +1,11 @@
 """The solution that an engine gives back, and the last cycles as the measures see them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...core import BaseSine, Measure, Outcome, Response
-from ...response.measures import harmonic
+from ...response.measures import half_swing, harmonic
 from ...response.rows import Seen, measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 
@@ -50,6 +50,26 @@ class Solution:
     extremes: np.ndarray | None = None
     bounded: bool = False
     extra: dict = field(default_factory=dict)
+
+
+def gauged(model, raw: Solution) -> Solution:
+    """The Solution as a gauge sees it that does not move as the accelerometer does: its displacement and histories.
+
+    How the motion settles is that of the accelerometer; where it would settle the gauge is not known.
+    """
+    gauge = model.rig.modes.gauge
+    if gauge is None:
+        return raw
+    name, moved = "relative_displacement_amplitude", []
+    for one in (raw.response, raw.window):
+        felt = {"felt": one.output, "felt_rate": one.output_rate}
+        moved.append(replace(one, output=one.modal @ gauge, output_rate=one.modal_rate @ gauge, extra=one.extra | felt))
+    seen = half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
+    share = max(1.0, seen / max(raw.values[name], 1e-300))
+    errors = raw.errors and raw.errors | {name: share * raw.errors.get(name, 0.0)}
+    values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
+    return replace(raw, values=values | {name: seen}, response=moved[0], window=moved[1], steady=(None, None),
+                   errors=errors)
 
 
 def borne(model, patch) -> float | None:

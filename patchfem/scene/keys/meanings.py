@@ -127,6 +127,8 @@ MEANINGS = {
                 "given; the squares sum to at most 1",
         "output": "motion of the accelerometer and gauge per unit of the modal coordinate; slide for the first mode, 0 "
                   "for the others unless given",
+        "accelerometer": "motion of the accelerometer per unit of the modal coordinate; output unless given",
+        "gauge": "motion of the displacement gauge per unit of the modal coordinate; output unless given",
     },
     "Stiffening": {"cubic": "force k_3 x^3 on the block at its output"},
     "Bonded": {

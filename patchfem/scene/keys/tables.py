@@ -112,6 +112,8 @@ class Mode(Table):
     yaw: PerMetre = 0.0
     base: Number | None = None
     output: Number | None = None
+    accelerometer: Number | None = None
+    gauge: Number | None = None
 
 
 class Stiffening(Table):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...effects import unbuilt
 from ..keys.types import choices
 from .draft import Draft
 
@@ -47,6 +48,7 @@ def _modes(draft: Draft) -> None:
         if mode.name is not None and mode.name in names:
             draft.say(f"structure.mode.{index}.name", f"'{mode.name}' names two modes; each name once")
         names.add(mode.name)
+    _instruments(draft, modes)
     bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
              for index, mode in enumerate(modes)]  # fmt: skip
     squares = [(base or 0.0) * (base or 0.0) for base in bases]
@@ -55,6 +57,24 @@ def _modes(draft: Draft) -> None:
         key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
         draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is wanted (base is the share of "
                        "the base motion; the first mode's is its slide unless given)")  # fmt: skip
+
+
+def _instruments(draft: Draft, modes: tuple) -> None:
+    """An accelerometer or a gauge that moves as the output does not stands beside what is judged at the output."""
+    written = []
+    for k, mode in enumerate(modes):
+        output = mode.output if mode.output is not None else mode.slide if k == 0 else 0.0
+        written += [f"structure.mode.{k}.{key}" for key in ("accelerometer", "gauge")
+                    if getattr(mode, key) not in (None, output)]
+    drive = draft.tables.drive
+    if not written:
+        return
+    beside = next((key for key in ("structure.travel", "structure.stiffening") if draft.given(key)), "")
+    if drive is not None and not beside:
+        beside = "drive.kind = 'free'" if drive.kind == "free" else \
+            f"drive.waveform = '{drive.waveform}'" if drive.waveform in ("sweep", "levels") else ""
+    if beside:
+        draft.say(written[0], unbuilt(f"beside {beside}", "output alone"))
 
 
 def _masses(draft: Draft, structure: Any) -> None:

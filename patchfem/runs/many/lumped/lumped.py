@@ -24,6 +24,8 @@ def refuses(model: Model) -> str:
     if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
             or not model.point.load > 0:
         return "its interface is not one point under a constant load"
+    if rig.modes.gauge is not None:
+        return "its gauge and its accelerometer do not move alike"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels or np.isfinite(rig.travel):
         return "it is not one mode under one sine"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:

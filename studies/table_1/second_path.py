@@ -1,0 +1,86 @@
+"""Does a second load path beside the contact explain Table 1, and does what is fitted at 143 Hz hold elsewhere?
+
+In part. Four numbers fitted to the 13 readings at 143 Hz (0.062: accelerations 0.064, displacements 0.058) predict the
+22 readings at 135, 150 and 155 Hz to 0.185, where "input times a constant" scores 0.235. That is won by the
+displacements (0.279 against 0.497); the accelerations (0.156) are predicted worse than by the constant (0.111). The
+score is the root mean square of ln(computed/measured). The four numbers are the friction, the stiffness and the damping
+of the second path, and how far the friction lies off the axis; the factor of the accelerometer, 1.2375, is read off the
+readings at 143 Hz and 4 g. A point in place of the patch, elastic over 0.243 um, does the same: 0.063, then 0.186.
+
+Run: python studies/table_1/second_path.py [starts]
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from patchfem.campaigns.rows.asked import Question
+from patchfem.campaigns.rows.cells import cells_of, scores
+from patchfem.campaigns.rows.computed import Computed
+from patchfem.campaigns.rows.fit import Beside, Search, fit_rows
+from patchfem.scene.ranges import ranges
+from patchfem.scene.scene import load, loads
+
+HERE = Path(__file__).parent
+TABLE = HERE.parent / "rig" / "table1.csv"
+HELD = "frequency=135 Hz,150 Hz,155 Hz"
+FREE = ("friction.static=0.2..0.8", "structure.bonded.stiffness=1e6 N/m..1e7 N/m",
+        "structure.bonded.damping=0 N s/m..5000 N s/m", "structure.mode.yaw.slide=0..0.3")
+POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
+
+
+def question(point: bool = False) -> Question:
+    """The scene with the patch, or with one elastic-plastic point in its place, and its free numbers."""
+    path = HERE / "second_path.toml"
+    text = path.read_text("utf-8")
+    if point:
+        text = POINT + text[text.index("static ="):]
+    return Question(loads(text, path) if point else load(path), ranges(FREE)[0], TABLE)
+
+
+def as_it_stands(point: bool = False) -> dict:
+    """Scores of the scene's own numbers and the seconds of its 27 readings, the second time that they are asked."""
+    cells, asked = cells_of(TABLE), question(point)
+    held, computed = cells.chosen(HELD), Computed(asked.asked(cells.conditions))
+    own = asked.scene
+    values = [own.friction.static, own.structure.bonded.stiffness, own.structure.bonded.damping,
+              own.structure.mode[1].slide]
+    for _ in range(2):
+        computed.forget()
+        begin = time.process_time()
+        found = computed(values, range(len(cells.conditions)))
+        seconds = time.process_time() - begin
+    logs = cells.logs(*found)
+    return {"fitted": scores(cells, logs, ~held), "held_out": scores(cells, logs, held), "seconds": seconds}
+
+
+def fitted(point: bool = False, starts: int = 8):
+    """The numbers fitted to 143 Hz from random starts, as FittedRows."""
+    return fit_rows(question(point), Beside(hold=(HELD,), how=Search(starts)))
+
+
+def main(starts: int = 8) -> dict:
+    """Print values and scores of the patch and of the point; returns {name: {"fitted", "held_out", "values"}}."""
+    out = {}
+    print(f"{'':<8}{'':<12}{'acceleration':>14}{'displacement':>14}{'all':>8}")
+    for name in ("patch", "point"):
+        begin = time.process_time()
+        found = fitted(name == "point", starts)
+        seconds = time.process_time() - begin
+        each = {"model": found.scored(found.logs, found.left),
+                "constant": found.scored(*found.nulls["constant"][:2])}
+        for what, scored in each.items():
+            for part in ("fitted", "held_out"):
+                one = scored[part]
+                print(f"{name if what == 'model' else 'null':<8}{part.replace('_', ' '):<12}"
+                      f"{one['acceleration']:>14.3f}{one['displacement']:>14.3f}{one['all']:>8.3f}")
+        print("  " + ", ".join(f"{one.key} {value:.4g}" for one, value in zip(found.asked.wanted, found.fit.values)) +
+              f"; {np.sum(found.found.rms < 1.01 * found.fit.rms)} of {starts} starts end here; {seconds:.0f} s")
+        out[name] = {**each["model"], "values": found.fit.values, "seconds": seconds}
+    return out
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 8)
