@@ -5,5 +5,5 @@ the march gives it. Between two reversals of the slide the motion is smooth: eq.
 with its exponentials of the slide where the bond length is constant. Every reversal, every kink of a law and of the
 drive is the end of a step. Read `run`, then `loop_kernels`: steps, their length and where they end; `step_kernels`: one
 step; `watch_kernels`: what is read off it. One mode under one sine moves in a lane beside seven others until its last
-cycles: `lanes`, `lane_step`, `lane_kernels`.
+cycles: `lanes`, `lane_step`, `lane_kernels`; many such motions from start to end: `many`, `reading_kernels`.
 """

@@ -34,11 +34,13 @@ class Kept(NamedTuple):
     cycles (4, c): smallest and largest output in every cycle [m], its part at the frequency of the cycle [m], NaN
     where it is not asked for; samples (s, 2 n + 7): time that is asked for, z, z', slide, its speed, force,
     irreversible slip, energy in the interface, friction work [J]; turns (r, 2 n + 7): the same at reversals. tally
-    (24,): largest |acceleration|, |force|, slip, -slip, output, -output of the last cycles; integrals over them of
+    (32,): largest |acceleration|, |force|, slip, -slip, output, -output of the last cycles; integrals over them of
     slide and force times cos and -sin; |work| of the drive, largest stored energy and energy lost to friction [J],
     steps taken and refused, rows of turns; sample that comes next, 1 where peaks are wanted;
     period [s]; time [s] in which the interface sticks in the last cycles, sums of cos and sin of twice the phases at
-    which slip starts, their number, < 0 where it sticks. room (2, N); table (10, 6).
+    which slip starts, their number, < 0 where it sticks;
+    integrals of the output times cos and -sin of one and of three times the phase, and of the
+    slide over the first and the last cycle of those; where they begin and end [s]. room (2, N); table (10, 6).
     """
 
     cycles: np.ndarray

@@ -22,11 +22,11 @@ CLOSER = 0.01  # of the tolerance, that of the last cycles, which are read betwe
 TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
 # of Moving.now
-TIME, STEP, TURNED, PACE, MASS, KIND, PIECE, MOVES = 0, 1, 2, 7, *range(10, 14)
+TIME, STEP, TURNED, PACE, STOOD, MASS, KIND, PIECE, MOVES = 0, 1, 2, 7, *range(9, 14)
 # of Kept.tally
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST = range(6)
 WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD = 6, *range(10, 19)
-HELD, START, STARTS, SIDE = 19, 20, 22, 23
+HELD, START, STARTS, SIDE, OUTPUTS, MEANS, BEGIN, END = 19, 20, 22, 23, 24, 28, 30, 31
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
 
 
@@ -37,7 +37,9 @@ class Fine:
     acceleration: largest |absolute acceleration| [m s-2], force: largest |force| [N], slip and swing: half the range
     of the irreversible slip and of the output [m]; slide, pull: first Fourier coefficients of slide [m] and force [N];
     work: of friction [J]; held: time [s] for which the interface sticks; start: mean phase [rad] modulo pi at which
-    slip starts after it, None where it never does.
+    slip starts after it, None where it never does; first, third: Fourier coefficients of the acceleration of the output
+    relative to the base [m s-2] at the drive's frequency and three times it; drift: time mean of the slide in the last
+    cycle less that in the first, per cycle between them [m], None of fewer than 1.5 cycles.
     """
 
     acceleration: float
@@ -49,6 +51,9 @@ class Fine:
     work: float
     held: float
     start: float | None
+    first: complex
+    third: complex
+    drift: float | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -60,6 +65,75 @@ class SmoothResult(MarchResult):
     turned: Response | None = None
 
 
+def started(modes: ModalBasis, drive, wave, element, cycles: float, start=None) -> tuple:
+    """(Moving, Kept) of a motion before it begins, without room for reversals; wave: that of the drive."""
+    n, l = modes.omega.size, len(element.sizes)
+    size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
+    state = np.zeros(size)
+    if start is not None:
+        state[:n], state[n:2 * n] = start.z, start.v
+    pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
+    now, tally, work = np.zeros(14), np.zeros(32), np.zeros((26, size))
+    now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
+    now[[KIND, MOVES]], tally[PERIOD] = (wave.kind, drive.moving), drive.period
+    work[24, 2 * n:-3] = element.sizes
+    rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
+    law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0]
+    own = (rows, damping, wave.pieces, *law, state, work, now)
+    moving = Moving(*(np.array(part, float, order="C") for part in own))
+    cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
+    cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
+    return moving, Kept(cycles, np.zeros((0, width)), np.zeros((0, width)), tally, np.zeros((2, size)),
+                        np.zeros((10, 6)))
+
+
+def fine_of(tally, begin, end) -> dict:
+    """The fields of Fine of n motions as columns (n,), NaN where there is none.
+
+    tally (n, 32): of Kept; begin, end (n, 4): time [s], output [m], its rate [m/s] and friction work [J] where the last
+    cycles begin and end. Accelerations are those of the motion by parts, so its jumps cost nothing.
+    """
+    span, omega = np.maximum(end[:, 0] - begin[:, 0], 1e-300), 2 * np.pi / tally[:, PERIOD]
+    slide, pull, *outputs = ((tally[:, k] + 1j * tally[:, k + 1]) * 2 / span for k in (
+        WAVES, WAVES + 2, OUTPUTS, OUTPUTS + 2))
+    gains = []
+    for n, output in zip((1j, 3j), outputs):
+        after, before = ((one[:, 2] + n * omega * one[:, 1]) * np.exp(-n * omega * one[:, 0]) for one in (end, begin))
+        gains.append(2 / span * (after - before) + (n * omega)**2 * output)
+    cycles, (before, after) = span / tally[:, PERIOD], tally[:, MEANS:MEANS + 2].T / tally[:, PERIOD]
+    drift = np.where(cycles < 1.5, np.nan, (after - before) / np.where(cycles < 1.5, 1.0, cycles - 1))
+    start = np.arctan2(tally[:, START + 1], tally[:, START]) / 2 % np.pi
+    return {"acceleration": tally[:, ACCELERATION], "force": tally[:, FORCE],
+            "slip": (tally[:, SLIP] + tally[:, SLIP_LEAST]) / 2,
+            "swing": (tally[:, OUTPUT] + tally[:, OUTPUT_LEAST]) / 2, "slide": slide, "pull": pull,
+            "work": end[:, 3] - begin[:, 3], "held": tally[:, HELD],
+            "start": np.where(tally[:, STARTS] > 0, start, np.nan), "first": gains[0], "third": gains[1],
+            "drift": drift}
+
+
+def response_of(modes, drive, rows, stored: float) -> Response:
+    """Histories of sample rows (k, 2 n + 7) of a motion; stored: its largest stored energy [J]."""
+    n = modes.omega.size
+    time, z, rate = rows[:, 0], rows[:, 1:1 + n], rows[:, 1 + n:1 + 2 * n]
+    slide, speed, force, slip, held, work = rows[:, 1 + 2 * n:].T
+    push = drive.values(time)
+    base = push if drive.moving else np.zeros_like(push)
+    damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
+    accel = -np.outer(push, modes.base) - damped - z * modes.omega**2 - np.outer(force, modes.slide) / modes.mass
+    lost = np.diff(work - held, prepend=0.0)
+    noise = 1e-8 * max(stored, float(np.abs(work).max(initial=0.0)))
+    ledger = np.stack([work, held, np.cumsum(np.maximum(lost, 0.0)),
+                       np.cumsum(np.where(lost < -noise, -lost, 0.0))])
+    return Response(time, z, rate, slide, speed, z @ modes.output, rate @ modes.output,
+                    accel @ modes.output + base, base, force, slip, {"ledger": ledger})
+
+
+def asked(count: int, window: int) -> np.ndarray:
+    """Whether the phasor of each of `count` cycles is asked for: of the last one and of the TAIL windows before."""
+    back = np.arange(count)[::-1]
+    return (back % window == 0) & (back < TAIL * window)
+
+
 class Run:
     """A motion as it stands: the arrays that its loops move, and what was read off it."""
 
@@ -67,25 +141,8 @@ class Run:
                  start=None):
         self.modes, self.drive, self.element, self.tolerance, self.travel = modes, drive, element, tolerance, travel
         self.cycles, self.loops, self.wave = cycles, loops_of(element.kernels), wave_of(drive)
-        n, l = modes.omega.size, len(element.sizes)
-        size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
-        state = np.zeros(size)
-        if start is not None:
-            state[:n], state[n:2 * n] = start.z, start.v
-        pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
-                   2 * np.pi / drive.period)
-        now, tally, work = np.zeros(14), np.zeros(24), np.zeros((26, size))
-        now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
-        now[[KIND, MOVES]], tally[PERIOD] = (self.wave.kind, drive.moving), drive.period
-        work[24, 2 * n:-3] = element.sizes
-        rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
-        own = (rows, damping, self.wave.pieces, element.numbers[None], element.memory[None], [1.0, np.inf, 1.0], state,
-               work, now)
-        self.moving = Moving(*(np.array(part, float, order="C") for part in own))
-        cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
-        cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
-        self.kept = Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), tally,
-                         np.zeros((2, size)), np.zeros((10, 6)))
+        self.moving, self.kept = started(modes, drive, self.wave, element, cycles, start)
+        self.kept = self.kept._replace(turns=np.zeros((ROOM, self.kept.turns.shape[1])))
         self.turns, self.begun, self.outcome, self.message = [], 0.0, None, ""
         self.swift = fits(modes, element, self.wave, travel)
         self.until(0.0)
@@ -106,9 +163,7 @@ class Run:
     def ends_only(self, window: int) -> None:
         """Ask for the phasors of the last cycle and of the TAIL windows of `window` cycles before alone, at the start
         of a run."""
-        back = np.arange(self.kept.cycles.shape[1])[::-1]
-        left_out = (back % window > 0) | (back >= TAIL * window)
-        self.kept.cycles[2:, left_out] = np.nan
+        self.kept.cycles[2:, ~asked(self.kept.cycles.shape[1], window)] = np.nan
 
     def extremes(self, count: int) -> np.ndarray:
         """Smallest and largest output (c, 2) [m] of the first `count` cycles."""
@@ -180,28 +235,18 @@ class Run:
 
     def response(self, rows) -> Response:
         """Histories of sample rows (k, 2 n + 7)."""
-        n, modes, drive = self.modes.omega.size, self.modes, self.drive
-        time, z, rate = rows[:, 0], rows[:, 1:1 + n], rows[:, 1 + n:1 + 2 * n]
-        slide, speed, force, slip, stored, work = rows[:, 1 + 2 * n:].T
-        push = drive.values(time)
-        base = push if drive.moving else np.zeros_like(push)
-        damped = rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
-        accel = -np.outer(push, modes.base) - damped - z * modes.omega**2 - np.outer(force, modes.slide) / modes.mass
-        lost = np.diff(work - stored, prepend=0.0)
-        noise = 1e-8 * max(float(self.kept.tally[STORED]), float(np.abs(work).max(initial=0.0)))
-        ledger = np.stack([work, stored, np.cumsum(np.maximum(lost, 0.0)),
-                           np.cumsum(np.where(lost < -noise, -lost, 0.0))])
-        return Response(time, z, rate, slide, speed, z @ modes.output, rate @ modes.output,
-                        accel @ modes.output + base, base, force, slip, {"ledger": ledger})
+        return response_of(self.modes, self.drive, rows, float(self.kept.tally[STORED]))
 
-    def fine(self, begin: float, work: float) -> Fine:
-        """The last cycles since the time `begin` [s], where the work of friction stood at `work` [J]."""
-        peaks, span = self.kept.tally, max(self.time - begin, 1e-300)
-        slide, pull = (complex(*pair) * 2 / span for pair in peaks[WAVES:POWER].reshape(2, 2))
-        start = float(np.arctan2(peaks[START + 1], peaks[START]) / 2 % np.pi) if peaks[STARTS] else None
-        return Fine(float(peaks[ACCELERATION]), float(peaks[FORCE]), float(peaks[SLIP] + peaks[SLIP_LEAST]) / 2,
-                    float(peaks[OUTPUT] + peaks[OUTPUT_LEAST]) / 2, slide, pull, float(self.moving.y[-1]) - work,
-                    float(peaks[HELD]), start)
+    def ends(self) -> np.ndarray:
+        """Where the motion stands: time [s], output [m], its rate [m/s], friction work [J]."""
+        n, y, output = self.modes.omega.size, self.moving.y, self.modes.output
+        return np.array([self.time, y[:n] @ output, y[n:2 * n] @ output, y[-1]])
+
+    def fine(self, begin) -> Fine:
+        """The last cycles since `begin`, as `ends` gave it."""
+        found = {name: column[0].item() for name, column in fine_of(
+            self.kept.tally[None], begin[None], self.ends()[None]).items()}
+        return Fine(**found | {name: None for name in ("start", "drift") if np.isnan(found[name])})
 
     def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
         """Move on to the time `end` [s] and keep the last `window` [s]: (rows, Fine).
@@ -210,8 +255,9 @@ class Run:
         """
         begin = max(end - window, self.time)
         self.until(begin)
-        tally, work = self.kept.tally, float(self.moving.y[-1])
+        tally, since = self.kept.tally, self.ends()
         tally[:WAVES], tally[WAVES:POWER], tally[HELD:], tolerance = -np.inf, 0.0, 0.0, self.tolerance
+        tally[BEGIN], tally[END] = begin, end
         self.tolerance *= CLOSER  # the extension of a step errs more than the step does
         self.moving.now[STEP] *= CLOSER**0.125
         count = max(LEAST, round((end - begin) / self.drive.period * SAMPLES) + 1)
@@ -224,7 +270,7 @@ class Run:
             if self.outcome is not None:
                 break
         tally[WANTED], self.tolerance = 0, tolerance
-        return np.concatenate(rows), self.fine(begin, work)
+        return np.concatenate(rows), self.fine(since)
 
     def _snapshot(self) -> dict:
         row, _, memory, _ = self.settled()

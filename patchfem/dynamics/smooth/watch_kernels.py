@@ -20,7 +20,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST, SLOTS = range(7)  # of the peaks
 # of Kept.tally
 PEAKS, WAVES, POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, WANTED, PERIOD = 0, 6, *range(10, 19)
-HELD, START, STARTS, SIDE = 19, 20, 22, 23
+HELD, START, STARTS, SIDE, OUTPUTS, MEANS, BEGIN, END = 19, 20, 22, 23, 24, 28, 30, 31
 SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
 BESIDE = 1e-3  # of a step, over which the share is taken
 STILL = 1e-14  # of the slide, below which it does not slide
@@ -218,11 +218,28 @@ def peaks(m, h, k):
         share, weight = 0.5 * (1 + NODES[j]), 0.5 * h * WEIGHTS[j]
         steps.between(m, share, k.room[0])
         q, _, force, _, _ = state_of(m, k.room[0])
-        turn = omega * (t + share * h)
-        k.tally[WAVES + 0] += weight * q * cos(turn)
-        k.tally[WAVES + 1] -= weight * q * sin(turn)
-        k.tally[WAVES + 2] += weight * force * cos(turn)
-        k.tally[WAVES + 3] -= weight * force * sin(turn)
+        turn, x = omega * (t + share * h), output_of(m, k.room[0])[0]
+        c, s = cos(turn), sin(turn)
+        k.tally[WAVES + 0] += weight * q * c
+        k.tally[WAVES + 1] -= weight * q * s
+        k.tally[WAVES + 2] += weight * force * c
+        k.tally[WAVES + 3] -= weight * force * s
+        k.tally[OUTPUTS + 0] += weight * x * c
+        k.tally[OUTPUTS + 1] -= weight * x * s
+        k.tally[OUTPUTS + 2] += weight * x * c * (4 * c * c - 3)
+        k.tally[OUTPUTS + 3] -= weight * x * s * (3 - 4 * s * s)
+
+
+@njit(error_model="numpy", **INNER)
+def mean_of(m, h, k, begin, which):
+    """Take what of the step of h [s] lies in the cycle from `begin` [s] into an integral of the slide."""
+    t = m.now[steps.TIME]
+    low, high = max(t, begin), min(t + h, begin + k.tally[PERIOD])
+    if high <= low:
+        return
+    for j in range(NODES.size):
+        steps.between(m, (low + 0.5 * (1 + NODES[j]) * (high - low) - t) / h, k.room[0])
+        k.tally[which] += 0.5 * (high - low) * WEIGHTS[j] * steps.slide_of(m, k.room[0])[0]
 
 
 @njit(error_model="numpy", **INNER)
@@ -301,4 +318,6 @@ def watch(m, h, k):
     bounds(m, h, k, 1 if m.rows.shape[1] == 1 else 4)
     if k.tally[WANTED] > 0:
         peaks(m, h, k)
+        mean_of(m, h, k, k.tally[BEGIN], MEANS)
+        mean_of(m, h, k, k.tally[END] - k.tally[PERIOD], MEANS + 1)
         holds(m, h, k)

@@ -105,16 +105,22 @@ def _notes(model, patch, raw) -> list:
 def _said(model, patch, raw, outcome, found) -> list:
     """Warnings of the law and of the load, in this run."""
     f, out = model.friction, warming(model, patch, raw.response, raw.book["friction"])
-    if f is not None and has(f.law, "creeps"):
-        out = [*out, f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
-               f"{0.5493 * f.reference_speed:.3g} m/s"]
-    if f is not None and has(f.law, "bonds"):
-        law = model.bonds
-        peak = float(np.abs(raw.window.slide_rate).max())
-        out = [*out, *unbounded(law), *unripe(law, peak), *creeping(law, outcome, found)]
+    if f is not None:
+        out = [*out, *said_of_law(model, outcome, found, float(np.abs(raw.window.slide_rate).max()))]
     out = [*out, *created_warning(model, raw.book, model.rig.cycles)]
     if patch is not None and model.rig.load_varies:
         out = [*out, *shear_note(model, raw.contact)]
+    return out
+
+
+def said_of_law(model, outcome, found, peak: float) -> list:
+    """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
+    f, out = model.friction, []
+    if has(f.law, "creeps"):
+        out = [f"law '{f.law}' never holds: under a constant force of half its limit it creeps at "
+               f"{0.5493 * f.reference_speed:.3g} m/s"]
+    if has(f.law, "bonds"):
+        out = [*out, *unbounded(model.bonds), *unripe(model.bonds, peak), *creeping(model.bonds, outcome, found)]
     return out
 
 

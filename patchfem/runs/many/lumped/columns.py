@@ -1,5 +1,6 @@
 """Measures of many runs as columns, with errors, outcome and reasons: what `runs.rig.rig` makes of one Solution."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -28,7 +29,8 @@ class Runs:
     whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside `least` of its
     value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck run, whether
     what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is known to settle
-    to, NaN where none is.
+    to, NaN where none is; chosen: what each run chose besides; said(model, outcome, Answers, case) -> its warnings,
+    those of measures that are known less well than asked among them: without it such a case is run by itself.
     """
 
     cycles: int
@@ -44,6 +46,8 @@ class Runs:
     closes: float
     loads: np.ndarray | bool = False
     steady: tuple | None = None
+    chosen: tuple = ()
+    said: Callable | None = None
 
     @property
     def amplitudes(self) -> np.ndarray:
@@ -58,7 +62,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     numerics: as `results.chosen` has it.
     """
     n, values = len(models), dict(runs.values)
-    values[MAIN] = runs.amplitudes
+    values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
     values["energy_balance"] = energy_balance(runs.book)
     nothing = np.zeros(n)
     errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
@@ -78,14 +82,16 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         if not there.any():
             continue
         row, floor = TABLE[name], floor_of(name, moved)
-        alone |= there & ~grows & (errors[name] > tolerance * np.abs(value) + floor)
+        if runs.said is None or name == MAIN:
+            alone |= there & ~grows & (errors[name] > tolerance * np.abs(value) + floor)
         found.units[name], found.values[name] = row.unit, value
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, runs, found)
     for case, model in enumerate(models):
-        found.numerics[case] = numerics
-        if said := [*model.source.remarks, *model.rig.notes]:
+        found.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
+        said = runs.said(model, outcome[case], found, case) if runs.said is not None else []
+        if said := [*model.source.remarks, *model.rig.notes, *said]:
             found.warnings[case] = said
     return found, alone
 

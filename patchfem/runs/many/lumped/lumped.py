@@ -9,10 +9,10 @@ from ....core import BaseSine
 from ....model.model import Model
 from .. import one_by_one
 from ..answers import Answers
-from . import coulomb, pieces
+from . import coulomb, pieces, smooth
 from .columns import answered
 
-KINDS = coulomb, pieces
+KINDS = coulomb, pieces, smooth
 TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
 
 
@@ -69,5 +69,9 @@ def _solved(models, say) -> Answers:
                 column[case] = np.nan
         for kept in (found.warnings, found.notes, found.numerics, *found.reasons.values()):
             kept.pop(case, None)
+    empty = [name for name, column in found.values.items() if np.isnan(column).all() and not found.reasons.get(name)]
+    for name in empty:
+        for columns in (found.values, found.errors, found.floors, found.units):  # it was of these cases alone
+            columns.pop(name)
     found.place(again, one_by_one.solve([models[case] for case in again], say))
     return found

@@ -31,13 +31,13 @@ def not_smooth(model: Model) -> str:
         return "of points that slide by themselves"
     if model.side == "lower" and has(model.friction.law, "bonds"):
         return "under a pressure that stays"
-    element = _element(model)
+    element = element_of(model)
     if element is None or element.sizes is None:
         return f"for law '{model.friction.law}'"
     return "in so many steps" if steps_of(model, element) > MORE * max(steps_per_cycle(model), 400) else ""
 
 
-def _element(model: Model) -> Element | None:
+def element_of(model: Model) -> Element | None:
     """The law of the interface as compiled code takes it, None where its bonds have no state."""
     f = model.friction
     load = model.nominal_load
@@ -67,7 +67,7 @@ def steps_of(model: Model, element: Element) -> float:
 
 def smooth_cost(model: Model) -> tuple:
     """Steps of all runs, and their seconds."""
-    steps = 2 * model.rig.cycles * steps_of(model, _element(model))
+    steps = 2 * model.rig.cycles * steps_of(model, element_of(model))
     return int(steps), 0.02 + STEP * steps
 
 

@@ -10,6 +10,7 @@ from ....dynamics.smooth import run as hub
 from ....response.errors import change
 from ....response.measures import slip_measures, slip_noise
 from ....response.rows import measures_of
+from ....response.spectrum import distorted
 from ....structure.drive_sizes import sinusoidal, whole
 from ..interface import model_of
 from ..march import Read
@@ -18,8 +19,6 @@ from ..solution import Solution, seen
 SAFE = 0.2  # of the change at half the samples, the error: what is read off them is of fourth order
 CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
 LOCATED = 1e-7  # what a crossing of that share may be off: the extension of a step errs more than its end
-# of a harmonic of the acceleration, which bends sharply where a steep law turns: 3.7 times the change was seen
-BENT = {"acceleration_distortion": (5.0, 0.0)}
 # of what is read off samples below that, of second order in them: times the change, and the samples that it may be off
 STUCK = {"stick_fraction": (2.5, 0.5), "slip_start_phase": (2.5, 1.0)}
 
@@ -67,10 +66,23 @@ class _Smooth(Read):
             slips = {"stick_fraction": min(fine.held / span, 1.0), "slip_start_phase": fine.start}
         known |= {"stick_fraction": slips["stick_fraction"],
                   "slip_start_phase": slips.get("slip_start_phase") if sinusoidal(drive) else None}
+        if fine.drift is not None:
+            known |= {"drift_per_cycle": fine.drift}
         if whole(span, drive):
+            known |= {"acceleration_distortion": self._distorted(fine)}
             loop = turned.slide, fine.slide, fine.pull, fine.work * drive.period / span
         return measures_of(seen(self.model, self.patch, turned, extremes, book, self.numerics.steps, loop=loop,
                                 ledger=ledger, known=known))
+
+    def _distorted(self, fine) -> float | None:
+        """Third over first harmonic of the absolute acceleration at the output [1]; None for none at all."""
+        drive = self.model.rig.drive
+        if not sinusoidal(drive):
+            return None
+        last = drive.segments[-1]
+        base = -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start)) if drive.moving else 0.0
+        found = distorted(abs(fine.first + base), abs(fine.third), abs(last.amplitude))
+        return None if np.isnan(found) else float(found)
 
     @staticmethod
     def _clear(part, even) -> bool:
@@ -85,7 +97,7 @@ class _Smooth(Read):
         every, second = (self._measured(done, *pair, done.amplitudes, None) for pair in (
             (turned, even), (fewer, half)))
         clear = self._clear(done, even)
-        read = BENT if clear else BENT | STUCK
+        read = {} if clear else STUCK
         share = {name: read.get(name, (SAFE, 0.0)) for name in every}
         found = {name: share[name][0] * gap + share[name][1] / hub.SAMPLES
                  for name, gap in change(every, second).items()}

@@ -1,0 +1,101 @@
+"""Motions of one mode under sines from their start to their last cycles, many in one call: what `run.simulate` does."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .arrays import Kept, Moving
+from .lanes import OF_KEPT, OF_MOVING, advance, loops_of
+from .run import (
+    BEGIN,
+    CLOSER,
+    END,
+    HELD,
+    POWER,
+    SAMPLE,
+    SAMPLES,
+    STEP,
+    STORED,
+    WANTED,
+    WAVES,
+    asked,
+    started,
+)
+from .waves import wave_of
+
+TURNING = 3  # reversals of a cycle for which there is room, beside those of the first ones
+AT_REST = 128
+
+
+class Motions(NamedTuple):
+    """What n motions of c cycles leave behind.
+
+    moving, kept: as they stand, kept.samples (n, s, 9) of the last cycles and kept.turns (n, r, 9), of which the first
+    kept.tally[TURNS] are there; begin, end (n, 4): as `Run.ends`, where the last cycles begin and end; begun, stored
+    (n,): energy [J] at the start and at the end; lost (n,): whether one did not come to its end.
+    """
+
+    moving: Moving
+    kept: Kept
+    begin: np.ndarray
+    end: np.ndarray
+    begun: np.ndarray
+    stored: np.ndarray
+    lost: np.ndarray
+
+
+def together(cases, cycles: int, window: int, tolerances) -> Motions:
+    """Motions of n cases (modes, drive, element, core.Start or None), each with the tolerances (t, n) of its steps.
+
+    All elements name the same kernels, all cases `lanes.fits`; the motions of the first tolerance come first.
+    """
+    count, law = len(cases), cases[0][2].kernels
+    pairs = [started(modes, drive, wave_of(drive), element, cycles, start) for modes, drive, element, start in cases]
+    moving = _stacked(Moving, [pair[0] for pair in pairs], OF_MOVING, len(tolerances))
+    kept = _stacked(Kept, [pair[1] for pair in pairs], (*OF_KEPT, "turns"), len(tolerances))
+    period = np.array([drive.period for _, drive, _, _ in cases] * len(tolerances))
+    number, tolerance = period.size, np.ravel(tolerances)
+    kept = kept._replace(turns=np.zeros((number, TURNING * cycles + AT_REST, 9)))
+    kept.cycles[:, 2:, ~asked(cycles, window)] = np.nan
+    loops, begun, stored, lost = loops_of(law), np.zeros(number), np.zeros(number), np.zeros(number, bool)
+    for j in range(count):
+        m, k = _one(moving, kept, j, kept.samples)
+        loops.advance(m, k, 0.0, np.inf, tolerance[j], np.inf)
+    for array in (*(array for name, array in moving._asdict().items() if name not in OF_MOVING), kept.tally):
+        array.reshape(len(tolerances), -1)[1:] = array[:count].reshape(1, -1)
+    begun[:] = kept.tally[:, STORED]
+    until = cycles * period
+    first = until - window * period
+    lost |= advance(law, moving, kept, first, tolerance) != 0
+    begin = _ends(moving)
+    times = np.linspace(moving.now[:, 0], until, window * SAMPLES + 1, axis=1)
+    samples = np.zeros((*times.shape, 9))
+    samples[:, :, 0] = times
+    kept.tally[:, :WAVES], kept.tally[:, WAVES:POWER], kept.tally[:, HELD:] = -np.inf, 0.0, 0.0
+    kept.tally[:, SAMPLE], kept.tally[:, WANTED], kept.tally[:, BEGIN], kept.tally[:, END] = 0, 1, begin[:, 0], until
+    moving.now[:, STEP] *= CLOSER**0.125
+    end, row = np.zeros((number, 4)), np.zeros(9)
+    for j in range(number):
+        m, k = _one(moving, kept, j, samples[j])
+        lost[j] |= loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf) != 0
+        end[j] = _ends(moving, slice(j, j + 1))
+        stored[j] = loops.settled(m, k, row)
+    return Motions(moving, kept._replace(samples=samples), begin, end, begun, stored, lost)
+
+
+def _stacked(kind, parts, shared, times: int):
+    """One Moving or Kept of many, each of `parts` as often as `times`."""
+    return kind(*(getattr(parts[0], name) if name in shared else np.stack([getattr(one, name) for one in parts] * times)
+                  for name in kind._fields))
+
+
+def _one(moving, kept, j: int, samples) -> tuple:
+    """Moving and Kept of one of many motions, in the same memory."""
+    return (Moving(*(array if name in OF_MOVING else array[j] for name, array in moving._asdict().items())),
+            Kept(*(samples if name == "samples" else array if name in OF_KEPT else array[j]
+                   for name, array in kept._asdict().items())))
+
+
+def _ends(moving, part=slice(None)) -> np.ndarray:
+    y, output = moving.y[part], moving.rows[part, 4, 0]
+    return np.stack([moving.now[part, 0], output * y[:, 0], output * y[:, 1], y[:, -1]], axis=1)
