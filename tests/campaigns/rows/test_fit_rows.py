@@ -12,6 +12,7 @@ from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.fit import Beside, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
+from patchfem.export.fit_rows import Starts
 from patchfem.runs.run import run
 from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import SceneError, load, loads
@@ -255,3 +256,48 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
         linear(143.0, 1 * G_N, one["value"], answer["values"]["structure.mode.axial.damping"]["value"])[0], rel=1e-4)
     assert row["acceleration"]["computed"] == pytest.approx(20 / G_N *
         again["measures"]["absolute_acceleration_peak"]["value"], rel=1e-4)
+
+
+def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
+    """With the ends of all starts, or of the first alone, kept on disk: the same bits with less work; those of another
+    question count for nothing."""
+    scene, path, wanted = scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(0.05)), free(*LINEAR_FREE)
+    file = tmp_path / "starts.json"
+
+    def go(question, resume):
+        how = Search(2, 0, "bound", Starts(file, question, resume))
+        return fit_rows(Question(scene, wanted, path), Beside(how=how))
+
+    first = go("one", False)
+    again = go("one", True)
+    kept = json.loads(file.read_text())
+    kept["ends"].pop("all/1")
+    file.write_text(json.dumps(kept))
+    half, other = go("one", True), go("other", True)
+    assert again.runs < half.runs < first.runs == other.runs
+    for one in (again, half, other):
+        assert np.array_equal(one.fit.values, first.fit.values) and np.array_equal(one.found.rms, first.found.rms)
+
+
+def test_placebos_are_whole_fits_of_their_own(tmp_path):
+    """The rows of a rig with a damping of 0.03, fitted with it and with another."""
+    scene = scene_of(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
+    found = fitted(scene, table(tmp_path, linear_rows()), free("structure.mode.axial.frequency=120 Hz..160 Hz"),
+                   placebos=("structure.mode.axial.damping=0.03,0.1",), starts=1)
+    own, other = found.placebos
+    assert own.text == "structure.mode.axial.damping=0.03" and other.text == "structure.mode.axial.damping=0.1"
+    assert own.found.fit.values == pytest.approx(found.fit.values, rel=1e-12)
+    rms = [float(np.sqrt(np.mean(one.logs**2))) for one in (own, other)]
+    assert rms[0] < 1e-6 and rms[1] > 0.1
+
+
+@pytest.mark.parametrize("words, said", [
+    (["--offset", "force"], "belong to a loop"), (["--starts", "0"], "one at least"),
+    (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
+    (["--leave-out", "input"], "nothing would be left"), (["--unstable", "maybe"], "unstable")])
+def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
+    given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",
+             *LINEAR_FREE, "-o", str(tmp_path / "out"), *words]
+    code, _, err = cli(*given)
+    assert code == 2 and said in err
+    assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
