@@ -13,12 +13,14 @@ from ...friction.flags_kernels import FAST, LEAN
 from ..piecewise.drive_kernels import AMPLITUDE, CONSTANT, OMEGA, PHASE
 from ..piecewise.march_kernels import AT_ONCE, DONE, FULL, HEAD, MOST_IDLE, PILED, arrive, left_of
 from ..piecewise.memory_kernels import carried, give_way, tangent, threshold, turn
-from ..piecewise.search_kernels import NOTHING, TURNS, YIELDS, crossing, heading
+from ..piecewise.search_kernels import NOTHING, TURNS, YIELDS, heading
 from ..piecewise.series_kernels import (
     _PLACE,
     _ROOM,
     _WEIGHT,
+    EPS,
     MOST,
+    NONE,
     REACH,
     first_root,
     points,
@@ -32,7 +34,8 @@ FINE = 64  # places of a table of orders per unit of piece times rate
 _TOPS = np.array([next((k for k in range(4, MOST) if _ROOM[k] >= x / FINE), MOST)
                   for x in range(int(REACH * FINE) + 2)])
 TWICE = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 6)])  # of two integrations
-LONG = 0.7  # piece times rate from which the energies follow from its ends
+OVER = np.array([0.0] + [1 / k for k in range(1, MOST + 6)])  # of one integration
+LONG = 0.05  # piece times rate from which the energies follow from its ends
 APART = 1e-6  # of omega^4: so near its resonance they do not
 
 
@@ -56,9 +59,10 @@ def one_series(z, v, gain, beta, alpha, push, side, turned, h, top, c, wave):
     c[0], c[1], c[2], wave[0] = z, here, after, push
     for k in range(1, top, 2):
         wave[k], wave[k + 1] = odd, even
-        here, after = after, TWICE[k + 2] * (squared * odd - stiff * here - damp * (k + 1) * after)
+        # in this order what comes from the last term but one is ready when the last term is
+        here, after = after, TWICE[k + 2] * (squared * odd - stiff * here) - damp * OVER[k + 2] * after
         c[k + 2] = after
-        here, after = after, TWICE[k + 3] * (squared * even - stiff * here - damp * (k + 2) * after)
+        here, after = after, TWICE[k + 3] * (squared * even - stiff * here) - damp * OVER[k + 3] * after
         c[k + 3] = after
         odd, even = -odd * turn * TWICE[k + 2], -even * turn * TWICE[k + 3]
 
@@ -92,16 +96,16 @@ def by_parts(span, alpha, beta, omega, ends):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def by_points(x, h, u, alpha, constant, top, c, wave):
+def by_points(x, h, u, alpha, constant, top, poly, wave):
     """(work of the drive, viscous loss, integral of the drive's |power|) over the mass of a piece of x times the
-    fastest rate up to u, by Gauss points; constant: part of the drive [m s-2]."""
+    fastest rate up to u, by Gauss points; constant: part of the drive [m s-2], poly: series of the speed over u."""
     work, lost, passed, count = 0.0, 0.0, 0.0, points(x)
     for g in range(count):
         place, weight = u * _PLACE[count, g], u * _WEIGHT[count, g]
-        rate, push = top * c[top], wave[top - 1]
-        for k in range(top - 1, 0, -1):
-            rate = rate * place + k * c[k]
-            push = push * place + wave[k - 1]
+        rate, push = poly[top - 1], wave[top - 1]
+        for k in range(top - 2, -1, -1):
+            rate = rate * place + poly[k]
+            push = push * place + wave[k]
         power = weight * (push + constant) * rate
         work += power
         passed += abs(power)
@@ -110,7 +114,7 @@ def by_points(x, h, u, alpha, constant, top, c, wave):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def energies(x, times, regime, ends, top, c, wave):
+def energies(x, times, regime, ends, top, c, poly, wave):
     """What `by_points` gives, from the ends of a long piece where they tell it.
 
     times: (span, h, u) with span = u h; regime: damping, stiffness and gain at first over the mass, constant push and
@@ -121,7 +125,7 @@ def energies(x, times, regime, ends, top, c, wave):
     closed = x > LONG and constant == 0.0 and beta > 1e-3 * most and alpha * alpha < 16 * beta \
         and far * far + alpha * alpha * most > APART * most * most
     if not closed:
-        return by_points(x, h, u, alpha, constant, top, c, wave)
+        return by_points(x, h, u, alpha, constant, top, poly, wave)
     work, lost = by_parts(span, alpha, beta, omega, ends)
     passed = abs(work)
     if ends[2] * ends[6] < 0.0:  # the drive turns its sign
@@ -177,36 +181,88 @@ def write(row, z, v, span, theta, first, spring, share, limit, memory, clock):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def first_event(top, face, c, poly, spare, hulls, table, memory, rests):
-    """(u, what, sign) of the first event of a piece, as `search_kernels.next_event` has it; poly: room for speeds."""
+def reached(gap, face, top, c, limit, near, bend):
+    """u in (0, limit] at which the slide, monotone there, has moved by `gap` [m], signed; NONE where it does not.
+
+    near: a guess, or 0; bend: sum of the sizes of the second derivatives of the slide over the speed at first.
+    """
+    went, slope = value_and_slope(c, 1, top, limit)
+    if face * went * limit / gap < 1.0:
+        return NONE
+    wanted, left, right, last = gap / face, 0.0, limit, limit
+    u = near if 0.0 < near < limit else limit * wanted / (went * limit)
+    for _ in range(100):
+        went, slope = value_and_slope(c, 1, top, u)
+        miss, slope = u * went - wanted, went + u * slope
+        if miss * wanted > 0.0:
+            right = u
+        elif miss == 0.0:
+            return u
+        else:
+            left = u
+        new = u - miss / slope if slope != 0.0 else left
+        if not left < new < right:
+            new = 0.5 * (left + right)
+        step = abs(new - u)
+        # what Newton's method leaves is the square of its step times half the bend over the slope
+        if step <= 2 * EPS * u or (step < 0.01 * last and step * min(step * bend, (step / last)**2) <= 0.1 * EPS * u):
+            return new
+        u, last = new, step
+    return u
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def first_event(top, near, face, c, poly, spare, hulls, table, memory, rests):
+    """(u, what, sign) of the first event of a piece, as `search_kernels.next_event` has it; poly: gets the speed;
+    near: a guess of the u of a yield, or 0."""
     for k in range(top):
-        poly[k] = face * (k + 1) * c[k + 1]
+        poly[k] = (k + 1) * c[k + 1]
     order, way = heading(poly, top, rests)
     if way == 0.0:
         return 1.0, NOTHING, 0.0
+    sense = way
+    way = way if face > 0.0 else -way
     if memory.slipping[0] > 0 and way != memory.way[0]:
         return 0.0, TURNS, way
     gap = threshold(0, way, table, memory) - memory.place[0]
     if way * gap <= 0.0:
         return 0.0, YIELDS, way
-    u, what, sign, rest = 1.0, NOTHING, 0.0, 0.0
+    u, what, sign, rest, bend = 1.0, NOTHING, 0.0, 0.0, 0.0
     for k in range(order + 1, top):
         rest += abs(poly[k])
+        bend += k * abs(poly[k])
     if abs(poly[order]) <= rest:
         for k in range(order, top):
-            spare[k] = way * poly[k]
+            spare[k] = sense * poly[k]
         root = first_root(spare, order, top - 1, hulls)
         if root < u:
             u, what, sign = root, TURNS, -way
-    root = crossing(poly, top, gap, u, spare)
+    if way * gap > abs(face) * (abs(poly[order]) + rest):
+        return u, what, sign
+    sure = order == 0 and abs(poly[0]) > 2 * rest  # the speed stays above half of its first
+    root = reached(gap, face, top, c, u, near, bend / abs(poly[0]) if sure else 1e300)
     return (root, YIELDS, way) if root <= u else (u, what, sign)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def length(left, slowest, regime, v, face, table, memory, rests):
-    """(length [s] of the next piece, its product with the fastest rate): a little more than the next yield wants.
+def turned_by(push, side, angle, theta, size):
+    """The drive and its quadrature an angle later, at theta; of a short one by its series, so that a cycle of many
+    pieces keeps them to round-off of each."""
+    if abs(angle) > 0.1:
+        return size * sin(theta), size * cos(theta)
+    square = angle * angle
+    sine = angle * (1 - square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72))))
+    less = square / 2 * (1 - square / 12 * (1 - square / 30 * (1 - square / 56)))
+    return push + (side * sine - push * less), side - (push * sine + side * less)
 
-    left [s]: to a border; slowest [1/s]: least rate; regime as in `energies`; rests: the slide stands still at a turn.
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def length(left, slowest, regime, v, side, face, table, memory, rests):
+    """(length [s] of the next piece, its product with the fastest rate, u at which to look for a yield, or 0): the
+    length is a little more than the next yield wants.
+
+    left [s]: to a border; slowest [1/s]: least rate; regime as in `energies`; side: quadrature of the drive; rests: the
+    slide stands still at a turn.
     """
     alpha, beta, gain, _, omega = regime
     rate = max(0.5 * alpha + sqrt(0.25 * alpha * alpha + beta), omega, slowest)
@@ -214,7 +270,11 @@ def length(left, slowest, regime, v, face, table, memory, rests):
     gap = way * (threshold(0, way, table, memory) - memory.place[0])
     wait = reach_of(gap, way * face * v, way * face * (gain - alpha * v)) if gap < 1e290 else 1e300
     h = min(REACH / rate * min(1.0, max(1.1 / REACH * rate * wait, 0.01)), left)
-    return h, rate * h
+    near, speed = wait / h, v + (gain - alpha * v) * wait
+    if near < 1.0 and speed != 0.0:  # the third derivative's share, by one step of Newton's method
+        jerk = omega * side - alpha * (gain - alpha * v) - beta * v
+        near -= jerk * wait * wait * wait / (6 * speed * h)
+    return h, rate * h, near if near < 1.0 and rate * h < 0.5 else 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -265,10 +325,11 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
         ledger[7] = 1.0 if share >= 0.5 else ledger[7]
         beta, gain = rig[SQUARE] + spring * soft, push + constant - rig[SQUARE] * z - face * memory.force[0] / rig[MASS]
         regime = rig[DAMPING], beta, gain, constant, omega
-        h, x = length(left, slowest, regime, v, face, table, memory, clock.rest[0] == 1.0)
+        h, x, near = length(left, slowest, regime, v, side, face, table, memory, clock.rest[0] == 1.0)
         top = order_of(x)
         one_series(z, v, gain, beta, rig[DAMPING], push, side, omega * h, h, top, c, wave)
-        u, what, sign = first_event(top, face, c, poly, spare, hulls, table, memory, clock.rest[0] == 1.0)
+        u, what, sign = first_event(top, near, face, c, poly, spare, hulls, table, memory,
+                                    clock.rest[0] == 1.0)
         if u > 0.0:
             span = u * h
             if now[1] == 0.0:
@@ -279,10 +340,10 @@ def march(stop, motion, rig, table, memory, clock, books, room, rows):
             if books.wanted[int(now[0])] == 1.0:
                 phasor(u, h, output, top, c, clock, books)
             went, close = moved_to(u, h, top, c)
-            p, q = size * sin(theta + omega * span), size * cos(theta + omega * span)
+            p, q = turned_by(push, side, omega * span, theta + omega * span, size)
             ends = (v, gain - rig[DAMPING] * v, push, side,
                     close, gain - rig[DAMPING] * close - beta * went + p - push, p, q)
-            work, lost, passed = energies(x * u, (span, h, u), regime, ends, top, c, wave)
+            work, lost, passed = energies(x * u, (span, h, u), regime, ends, top, c, poly, wave)
             ledger[0] += rig[MASS] * work
             ledger[1] += rig[MASS] * lost
             ledger[2] += rig[MASS] * passed

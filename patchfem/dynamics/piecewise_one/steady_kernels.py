@@ -94,10 +94,10 @@ def period(point, rig, segment, table, memory, room, slopes, marks, clock, out):
         spring, _, _ = tangent(0, table, memory)
         beta, constant = rig[SQUARE] + spring * face * face / rig[MASS], -base * segment[CONSTANT]
         gain = push + constant - rig[SQUARE] * z - face * force / rig[MASS]
-        h, x = length(left, slowest, (alpha, beta, gain, constant, omega), v, face, table, memory, rests)
+        h, x, near = length(left, slowest, (alpha, beta, gain, constant, omega), v, side, face, table, memory, rests)
         top = order_of(x)
         one_series(z, v, gain, beta, alpha, push, side, omega * h, h, top, c, wave)
-        u, what, sign = first_event(top, face, c, poly, spare, hulls, table, memory, rests)
+        u, what, sign = first_event(top, near, face, c, poly, spare, hulls, table, memory, rests)
         if u > 0.0:
             went, v = moved_to(u, h, top, c)
             z += went
