@@ -138,7 +138,9 @@ def _shot(one: PeriodMap, drive, point: Point, half: bool, tolerance: float) -> 
         better = _newton(one, drive, point, found, miss, half)
         closed = miss <= tolerance and miss * size <= GROWN
         if closed and _alike(point, found.end) and _same(point, found.end):
-            return _result(one, drive, *(better or (point, found)), half, used)  # the last step squares what is left
+            # the last step squares what is left, where it keeps the turning places
+            last = better if better is not None and _alike(better[0], better[1].end) else (point, found)
+            return _result(one, drive, *last, half, used)
         if better is None:
             point = _early(one, drive, _next(found, one.table.count, half), periods, half)
             periods, found = min(2 * periods, LATER[1]), one(drive, point, half)

@@ -259,7 +259,7 @@ def settled(motion, rig, segment, table, memory, clock, room, more, answer, slop
                     and missed(trial, other, close, beyond, face, omega)[0] < (1 - 0.4 * share) * miss
                 share = share * 0.5 if share == 1.0 else share * 0.4 if share == 0.5 else share * 0.25
         if miss <= CLOSED and miss * most / moved <= GROWN and alike(here, after) and same(here, after):
-            if better:
+            if better and alike(other, beyond):
                 told(trial, other, close, beyond, next_found, next_slopes, next_marks, rig, omega, answer, slope)
             else:
                 told(point, here, end, after, found, slopes, marks, rig, omega, answer, slope)

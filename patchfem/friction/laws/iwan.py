@@ -10,9 +10,11 @@ phi_max^-(chi + 1) (chi + 1)/R, the share of the last slider, determine all four
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
+from ...core import frozen_array
 from ..protocol import Element, Step
 from .elastic_plastic import parallel
 
@@ -74,15 +76,21 @@ def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
     force of a first loading at every border of a cell. The cells are as narrow as the root of the density asks for, the
     best for a given number of straight pieces.
     """
-    top, low = largest(force, stiffness, chi, beta), np.log(SMALL)
-    power = stiffness / (1 + beta)  # of the power law alone
+    k, most = _shape(chi, beta)
+    return stiffness * k, largest(force, stiffness, chi, beta) * most
+
+
+@lru_cache(32)
+def _shape(chi: float, beta: float) -> tuple:
+    """The `sliders` of unit stiffness and unit phi_max, which a sweep of forces and stiffnesses shares."""
+    low, power = np.log(SMALL), 1 / (1 + beta)  # of the power law alone
     x = np.concatenate([[0.0], np.exp(np.linspace(low, 0.0, 20 * CELLS + 1))])
     share = (1 - LOW) * x**(1 + chi / 2) + LOW * np.clip(1 - np.log(np.maximum(x, SMALL)) / low, 0.0, 1.0)
     edges = np.interp(np.linspace(0.0, 1.0, CELLS + 1), share, x)
     k = power * np.diff(edges**(chi + 1))
-    moment = power * top * (chi + 1) / (chi + 2) * np.diff(edges**(chi + 2))
-    last = [stiffness - power] if beta > 0 else []
-    return np.append(k, last), np.append(moment / k, [top] if last else [])
+    moment = power * (chi + 1) / (chi + 2) * np.diff(edges**(chi + 2))
+    last = [1 - power] if beta > 0 else []
+    return frozen_array(np.append(k, last)), frozen_array(np.append(moment / k, [1.0] if last else []))
 
 
 def from_keys(friction, load: float) -> Iwan:

@@ -152,7 +152,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Rungs of the engine of pieces: the mesh, where its nodes make the elements, and half the cells of a density."""
     out = [space_rung(Variant(numerics, coarse))] if coarse is not None and model.soft else []
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
-    return [*out, Rung((Variant(replace(numerics, paired=True), patch),), cells_error)] if cells else out
+    return [*out, Rung((Variant(replace(numerics, pairs=numerics.pairs + 1), patch),), cells_error)] if cells else out
 
 
 def _fewer(numerics, share: int):

@@ -12,6 +12,7 @@ from ...model.model import Model
 from ...structure.drive_sizes import omega_of, sinusoidal
 from ..effort import steps_per_cycle
 from .engines import COMPARED, engine_of
+from .pieces.costs import pairs_of
 
 COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
@@ -24,7 +25,7 @@ class Numerics:
     """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
     how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
     the last cycles, which a run for an error need not; local: relative error that a step of the smooth engine may
-    make; paired: whether each two cells of a law's density count as one."""
+    make; pairs: how often each two cells of a law's density count as one."""
 
     engine: str
     steps: int
@@ -36,10 +37,13 @@ class Numerics:
     choice: object = None
     whole: bool = True
     local: float = 0.0
-    paired: bool = False
+    pairs: int = 0
 
     def finer(self):
-        """The choices with twice the steps, or a hundredth of the error of each."""
+        """The choices with four times the cells where some count as one, with twice the steps, or a hundredth of the
+        error of each."""
+        if self.pairs:
+            return replace(self, pairs=max(0, self.pairs - 2))
         return replace(self, local=0.01 * self.local) if self.local else replace(self, steps=2 * self.steps)
 
 
@@ -64,7 +68,8 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     if engine in COMPARED:
         steps, pinned = accuracy.steps_per_cycle or COMPARED_STEPS, pinned | {"steps_per_cycle"}
     return Numerics(engine, steps, rig.cycles, window, accuracy.shear_modes, per_point or model.side == "lower",
-                    frozenset(pinned), local=local_of(accuracy.tolerance) if engine == "smooth" else 0.0)
+                    frozenset(pinned), local=local_of(accuracy.tolerance) if engine == "smooth" else 0.0,
+                    pairs=pairs_of(model) if engine == "piecewise" else 0)
 
 
 def local_of(tolerance: float) -> float:

@@ -168,6 +168,8 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         time, more = estimate(solve, found.values, engine.in_time(model, numerics, patch), made)
         spent += more
         measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
+        if numerics.pairs and not resolved(measures, model.accuracy.tolerance):
+            return _solved(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
         if found.levels and time:
             rung = engine.in_time(model, numerics, patch)[0]
             found = replace(found, levels=_level_errors(found, rung, made, numerics), halved=made[rung.runs[0]])
@@ -180,6 +182,11 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         numerics = numerics.finer()
         found = go(model, numerics, patch, frames, say, progress)
         seconds["march"] = found.seconds
+
+
+def resolved(measures, tolerance: float) -> bool:
+    """Whether the errors of all Measures by name are within a tolerance of their values, or their floors."""
+    return all(one.error <= tolerance * abs(one.value) + one.floor for one in measures.values())
 
 
 def _whole_period(model, numerics, found) -> int:

@@ -106,6 +106,17 @@ def test_exact_settled_as_the_map_of_any_modes():
     assert alike >= 5
 
 
+def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
+    """Newton's last step may leave a turning place that the period behind it slips past: the point before it counts."""
+    modes, drive, k, y = random_run(1068)
+    groups = [elements_of(k, y)]
+    done = histories.simulate(modes, drive, groups, 40, window=4)
+    one = settled(modes, drive, groups, *done.end)
+    on = histories.simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)
+    assert one.amplitude == pytest.approx(on.swing, rel=1e-9)
+    np.testing.assert_allclose([on.end[0].z, on.end[0].v], [one.start.z, one.start.v], atol=1e-9 * on.swing)
+
+
 def test_exact_ring_of_an_element_that_holds():
     """In closed form, as a fit to the samples finds it, at the frequency of mode and element together."""
     modes, drive = basis(1.0, 0.02), BaseSine(1.0, 0.31)

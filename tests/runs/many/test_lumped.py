@@ -97,13 +97,16 @@ def held_against(cases, ones, many, of_bar: float = 0.0) -> None:
             assert many.floors[name][case] == ones.floors[name][case]
             assert many.values[name][case] == pytest.approx(value, rel=0, abs=near, nan_ok=True), (case, name)
             if name not in DIFFERENCES:
-                same = pytest.approx(bar, rel=1e-11, abs=1e-9 * near + of_bar * abs(value), nan_ok=True)
+                told = 1e-9 * near + of_bar * abs(value)
+                if cases[case].friction.law == "iwan":  # a coarser run tells it
+                    told = 3 * near
+                same = pytest.approx(bar, rel=1e-11, abs=told, nan_ok=True)
                 assert many.errors[name][case] == same, (case, name)
 
 
-@pytest.mark.parametrize("law", [one for one in LAWS if one != "iwan"])
-def test_exact_batch_is_the_single_runs(law):
-    cases = models(law, 1, 8 if law in SMOOTH else 20)
+@pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 8 if law in SMOOTH else 20) for law in LAWS])
+def test_exact_batch_is_the_single_runs(law, count):
+    cases = models(law, 1, count)
     held_against(cases, one_by_one.solve(cases), batch(cases), OF_RUNS * (law in SMOOTH))
 
 
@@ -153,3 +156,17 @@ def test_exact_a_case_beyond_the_room_is_run_by_itself(monkeypatch):
     assert seen == cases[1:]
     monkeypatch.undo()
     held_against(cases, one_by_one.solve(cases), many)
+
+
+def test_always_few_cells_are_told_from_many():
+    """Cells of a density that a tolerance asks for: the answers of all 769 lie within the bars, where small cycles
+    slip too, for which the first cells are too few."""
+    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
+    for push in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
+        few, all_of = (build(base.changed([f"drive.acceleration={push}", f"accuracy.tolerance={one}"]))
+                       for one in ("1e-3", "1e-6"))
+        found, best = lumped.solve([few]), lumped.solve([all_of])
+        for name, value in found.values.items():
+            if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
+                assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
+                assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name

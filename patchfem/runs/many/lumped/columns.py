@@ -57,7 +57,8 @@ class Runs:
 
 
 def answered(models, runs: Runs, numerics: dict) -> tuple:
-    """(Answers of the models, (n,) whether a case must be run by itself, for a warning that needs its whole result).
+    """(Answers of the models, (n,) whether a case must be run by itself, for a warning that needs its whole result,
+    (n,) whether all its errors but that of the steady estimate are within its tolerance).
 
     numerics: as `results.chosen` has it.
     """
@@ -76,14 +77,17 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
     still = np.array([one is Outcome.TRANSIENT for one in outcome]) & ~np.isnan(steady) & ~runs.stuck
     values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
     errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
-    moved = np.array([model.rig.displacement for model in models])
+    moved, resolved = np.array([model.rig.displacement for model in models]), np.ones(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
             continue
         row, floor = TABLE[name], floor_of(name, moved)
+        wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         if runs.said is None or name == MAIN:
-            alone |= there & ~grows & (errors[name] > tolerance * np.abs(value) + floor)
+            alone |= wide & ~grows
+        if not name.endswith("_steady"):
+            resolved &= ~wide
         found.units[name], found.values[name] = row.unit, value
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
@@ -93,7 +97,7 @@ def answered(models, runs: Runs, numerics: dict) -> tuple:
         said = runs.said(model, outcome[case], found, case) if runs.said is not None else []
         if said := [*model.source.remarks, *model.rig.notes, *said]:
             found.warnings[case] = said
-    return found, alone
+    return found, alone, resolved
 
 
 def _outcome(models, runs: Runs, tolerance) -> tuple:

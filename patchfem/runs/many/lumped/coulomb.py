@@ -43,8 +43,13 @@ def row_of(model) -> tuple:
             model.point.load, abs(drive.acceleration))
 
 
-def runs_of(models, cycles: int, window: int, say=None) -> Runs:
-    """Runs of models of this kind, all of `cycles` cycles from their starts."""
+def coarsened(model) -> int:
+    """Nothing is made coarser in a first run."""
+    return 0
+
+
+def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
+    """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: 0."""
     table, n, windows = np.array([row_of(model) for model in models]), len(models), (cycles - 1) // window + 1
     extremes, phasors, books = np.empty((n, cycles, 2)), np.empty((n, windows, 2)), np.empty((n, 10))
     numbers, ends, codes = np.full((n, read.NUMBERS), np.nan), np.full((n, 3), np.nan), np.zeros(n, np.int64)

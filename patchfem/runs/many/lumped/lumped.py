@@ -41,7 +41,8 @@ def _kind(model: Model):
 
 def group(model: Model) -> tuple:
     """Equal for models of one compiled call."""
-    return int(model.rig.cycles), _kind(model).__name__, model.friction.law
+    kind = _kind(model)
+    return int(model.rig.cycles), kind.__name__, model.friction.law, kind.coarsened(model)
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:
@@ -49,21 +50,29 @@ def solve(models: Sequence[Model], say=None) -> Answers:
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first:first + TOGETHER]
-        found.place(range(first, first + len(part)), _solved(part, say))
+        found.place(range(first, first + len(part)), _solved(part, say, _kind(part[0]).coarsened(part[0])))
     return found
 
 
-def _solved(models, say) -> Answers:
+def _solved(models, say, pairs: int) -> Answers:
     begin, cycles = perf_counter(), int(models[0].rig.cycles)
     window = min(10, cycles // 10)
     kind = _kind(models[0])
-    runs = kind.runs_of(models, cycles, window, say)
-    found, alone = answered(models, runs, kind.NUMERICS | {"window_cycles": window})
+    runs = kind.runs_of(models, cycles, window, say, pairs)
+    found, alone, resolved = answered(models, runs, kind.NUMERICS | {"window_cycles": window})
     found.seconds[:] = (perf_counter() - begin) / len(models)
-    again = np.flatnonzero(alone).tolist()
-    if not again:
-        return found
-    for case in again:  # nothing of them is kept
+    finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
+    for cases, solve_again in ((np.flatnonzero(alone & ~finer).tolist(), lambda these: one_by_one.solve(these, say)),
+                               (np.flatnonzero(finer).tolist(), lambda these: _solved(these, say, max(0, pairs - 2)))):
+        if cases:
+            _forget(found, cases)
+            found.place(cases, solve_again([models[case] for case in cases]))
+    return found
+
+
+def _forget(found: Answers, cases: list) -> None:
+    """Take out what was found of cases."""
+    for case in cases:
         for columns in (found.values, found.errors, found.floors):
             for column in columns.values():
                 column[case] = np.nan
@@ -73,5 +82,3 @@ def _solved(models, say) -> Answers:
     for name in empty:
         for columns in (found.values, found.errors, found.floors, found.units):  # it was of these cases alone
             columns.pop(name)
-    found.place(again, one_by_one.solve([models[case] for case in again], say))
-    return found

@@ -18,7 +18,7 @@ from ....response.loops import interface_loops
 from ....response.measures import ROUND, energy_balance
 from ....response.ringing import FAINT
 from ...rig.engines import PIECES, engine_of
-from ...rig.pieces.costs import pieces
+from ...rig.pieces.costs import pairs_of, pieces
 from ...rig.pieces.run import group_of, settled_of, stuck_share
 from .columns import MAIN, Runs
 from .threads import in_threads
@@ -50,17 +50,22 @@ def row_of(model) -> tuple:
             (rig.stiffness, model.point.load))
 
 
-def runs_of(models, cycles: int, window: int, say=None) -> Runs:
-    """Runs of models of this kind, all of `cycles` cycles from their starts."""
+def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
+    """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: as `Numerics` has it."""
     rows, kernels = [row_of(model) for model in models], load(KERNELS, say)
     rigs, starts, segments, others = (np.array([row[k] for row in rows]) for k in (0, 1, 2, 4))
-    most = ceil(ROOM * window * max(map(pieces, models))) + 256
     groups = [row[3] for row in rows]
+    for _ in range(pairs):
+        groups = [paired(one) for one in groups]
+    yields = 2 * max(one.stiffness.size for one in groups)
+    most = ceil(ROOM * window * (max(map(pieces, models)) + yields)) + 256
     found = _solved(kernels, (rigs, starts, segments), groups, (cycles, window), most)
     out = _read(found, others, cycles, window)
     if has(models[0].friction.law, "cells"):
-        coarse = _solved(kernels, (rigs, starts, segments), [paired(one) for one in groups], (cycles, window), most)
-        return _with_cells(out, _read(coarse, others, cycles, window))
+        starts = starts.copy()
+        starts[:, read.TOLERANCE] = np.inf  # an error run looks for no steady motion
+        half = _solved(kernels, (rigs, starts, segments), [paired(one) for one in groups], (cycles, window), most)
+        return _with_cells(out, _read(half, others, cycles, window))
     return out
 
 
@@ -116,7 +121,7 @@ def _read(found: _Found, others, cycles: int, window: int) -> Runs:
         slopes = np.linalg.eigvals(found.slopes[settles])
         steady[:, settles] = settled_of(*found.steady[settles][:, [read.AMOUNT, read.RESIDUAL]].T, slopes)
     lost = (found.codes == read.LOST) | ((found.codes == read.UNKNOWN) & ~stuck) | (x[read.EDGE] > 0)
-    rings = (found.counts > 1) & (x[read.LONGEST] * _fastest(found) >= 0.999 * 3 * np.pi)
+    rings = (found.counts > 1) & (x[read.LONGEST] * _fastest(found) >= 0.999 * 3 * np.pi) & ((ledger[7] > 0) | stuck)
     errors = {name: np.zeros(len(stuck)) for name in values}
     return Runs(cycles, window, values, book, found.extremes, found.phasors @ [1, 1j], stuck, lost | rings, errors,
                 PIECES.least, PIECES.closes, loads, tuple(steady))
@@ -165,3 +170,8 @@ def _with_cells(fine: Runs, coarse: Runs) -> Runs:
 
 
 NUMERICS = {"engine": "piecewise"}
+
+
+def coarsened(model) -> int:
+    """How often each two elements count as one in a first run."""
+    return pairs_of(model)

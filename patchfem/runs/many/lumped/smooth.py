@@ -59,7 +59,12 @@ def refuses(model) -> str:
     return "" if fit else "its motion does not stand beside others"
 
 
-def runs_of(models, cycles: int, window: int, say=None) -> Runs:
+def coarsened(model) -> int:
+    """Nothing is made coarser in a first run."""
+    return 0
+
+
+def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Runs of models of this kind, all of `cycles` cycles from their starts."""
     hub.loops_of(element_of(models[0]).kernels, say)
     parts = {}

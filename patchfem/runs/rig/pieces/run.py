@@ -115,7 +115,7 @@ class Interfaces:
             parts = [self.contact.element]
         self.held = 1e-3 * min(one.length for one in parts)
         self.groups = tuple(group_of(one) for one in parts)
-        if numerics.paired:
+        for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.paired, self.groups))
 
     def holds(self, done) -> bool:
