@@ -213,6 +213,7 @@ class Run:
         edges = np.unique(np.linspace(0, size, max(frames, 1) + 1).round().astype(int))
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
+            rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet
             kept = keep(self.contact, *self._moving())
             did, status = self._steps(int(piece), rows)
             while status == FULL:

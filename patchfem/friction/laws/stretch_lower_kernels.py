@@ -18,9 +18,11 @@ __all__ = ["closed", "commit", "mean", "middle", "state"]
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def points(num, mem, e):
-    """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds (5, m)) of element e, as views of its numbers."""
-    m = int(num[e, 1])
-    return num[e, WEIGHT:WEIGHT + m], num[e, WEIGHT + m:WEIGHT + 2 * m], mem[e, 1:1 + 5 * m].reshape((5, m))
+    """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds 5 x (m,)) of element e, as views of its numbers."""
+    m, row = int(num[e, 1]), mem[e]
+    bonds = row[1:1 + m], row[1 + m:1 + 2 * m], row[1 + 2 * m:1 + 3 * m], row[1 + 3 * m:1 + 4 * m], \
+        row[1 + 4 * m:1 + 5 * m]
+    return num[e, WEIGHT:WEIGHT + m], num[e, WEIGHT + m:WEIGHT + 2 * m], bonds
 
 
 @njit(error_model="numpy", **LEAN)
@@ -58,9 +60,9 @@ def mean(num, mem, e, q, dq, eps, dt):
         end[j] = pressure_at(here + dq, x, sigma)
         source[j] = 0.5 * (pressure_at(here, x, sigma) + end[j])
         if num[e, FREE] > 0:
-            f, s = loose_mean(bonds[0, j], bonds[1, j], bonds[4, j], num[e, FREE] * eps, dq, source[j], eps)
+            f, s = loose_mean(bonds[0][j], bonds[1][j], bonds[4][j], num[e, FREE] * eps, dq, source[j], eps)
         else:
-            f, s = bond_mean(bonds[0, j], bonds[1, j], dq, source[j], eps)
+            f, s = bond_mean(bonds[0][j], bonds[1][j], dq, source[j], eps)
         force += weight[j] * f
         slope += weight[j] * s
     return force, slope
@@ -76,17 +78,17 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     _, end, _, _ = pattern(num, e)
     lost = 0.0
     for j in range(weight.size):
-        m, z, s2, play = bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j]
+        m, z, s2, play = bonds[0][j], bonds[1][j], bonds[2][j], bonds[4][j]
         if num[e, FREE] > 0:
             m, z, s2, play, part = loose_step(m, z, s2, play, num[e, FREE] * eps, dq, source[j], eps)
         else:
             m, z, s2, part = bond_step(m, z, s2, dq, source[j], eps)
         lost += weight[j] * part / 2
-        bonds[3, j] += dq
+        bonds[3][j] += dq
         if end[j] <= 0:
             lost += weight[j] * s2 / 2
             m, z, s2 = 0.0, 0.0, 0.0
-        bonds[0, j], bonds[1, j], bonds[2, j], bonds[4, j] = m, z, s2, play
+        bonds[0][j], bonds[1][j], bonds[2][j], bonds[4][j] = m, z, s2, play
     mem[e, 0] = grow(mem[e, 0], v0, v1, abs(dq), dt, num[e, GROWTH:WEIGHT])[0]
     return lost
 
@@ -100,10 +102,10 @@ def state(num, mem, e, q, v):
     weight, source, bonds = points(num, mem, e)
     force, energy, slip, total = 0.0, 0.0, 0.0, 0.0
     for j in range(weight.size):
-        force += weight[j] * bonds[1, j]
-        energy += 0.5 * weight[j] * bonds[2, j]
+        force += weight[j] * bonds[1][j]
+        energy += 0.5 * weight[j] * bonds[2][j]
         share = weight[j] * source[j]
-        if bonds[0, j] > 0:
-            slip += share * (bonds[3, j] - bonds[1, j] / bonds[0, j])
+        if bonds[0][j] > 0:
+            slip += share * (bonds[3][j] - bonds[1][j] / bonds[0][j])
             total += share
     return force, energy, slip / total if total > 0 else q
