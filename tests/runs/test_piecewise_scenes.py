@@ -117,8 +117,10 @@ def test_always_auto_takes_the_cheaper_engine():
 
     assert engine(RIG) == "piecewise"
     assert engine(RIG.replace("1 um", "1e-5 um")) == "march"  # a spring so stiff that it rings without end
-    assert engine(POINT + IWAN + MODE + DRIVE) == "march"  # 769 elements slip one after the other
-    assert engine(POINT + IWAN + MODE + DRIVE, tolerance="1e-5") == "piecewise"
+    assert engine(POINT + IWAN + MODE + DRIVE) == "piecewise"  # 49 cells, as the tolerance asks for
+    many = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
+    assert engine(many) == "march"  # 1271 elements slip one after the other
+    assert engine(many, tolerance="1e-5") == "piecewise"
     assert engine(RIG, steps_per_cycle="400") == "march"  # steps that are named are taken
     assert engine(POINT + PLASTIC + MODE + SWEEP) == "piecewise"
     assert engine(POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE) == "march"

@@ -3,9 +3,9 @@
 Measured on one core: a piece of one mode takes 1 us, of which 0.5 us are its motion and the rest what is read off it; a
 step of the march 0.43 us and 0.9 ns per element, and a cycle of it 0.3 ms besides. With one element the run from yield
 to yield takes an eighth of the march with its two coarser runs at 400 steps a cycle, with 100 elements a third, with
-769 of the Iwan law a fifth more. So at a tolerance of 1e-3 the border lies at about 600 elements that slip one after
-the other, and grows as the root of the tolerance falls; a spring that rings hundreds of times a cycle is left to the
-march too.
+all 769 cells of the Iwan law a fifth more. So at a tolerance of 1e-3 the border lies at about 600 elements that slip
+one after the other, and grows as the root of the tolerance falls; a spring that rings hundreds of times a cycle is left
+to the march too.
 """
 
 from math import inf, log2, pi, sqrt
