@@ -115,14 +115,18 @@ def span(measures: dict, outcome) -> str:
         there = np.isfinite(values)
         there = there & settled if np.any(there & settled) else there
         values, errors = np.asarray(values, float)[there], np.asarray(errors, float)[there]
-        unit, scale = axis_unit(values, unit) if unit in LADDERS else (unit, 1.0)
-        low, high = (f"{value * scale:.4g}" for value in (values.min(), values.max()))
-        unit = "" if unit == "1" else f" {unit}"
-        ran = f"is {low}{unit} throughout" if low == high else f"runs from {low} to {high}{unit}"
+        low, high = _said(values.min(), unit, 4), _said(values.max(), unit, 4)
+        ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
         known = errors[np.isfinite(errors)]
-        band = f", numerical error at most {known.max() * scale:.1g}{unit}" if known.size else ""
+        band = f", numerical error at most {_said(known.max(), unit, 1)}" if known.size else ""
         return f"{label(name).capitalize()} {ran}{band}."
     return ""
+
+
+def _said(value: float, unit: str, digits: int) -> str:
+    """A value with so many digits and the unit that suits it."""
+    unit, scale = axis_unit(np.array([value]), unit) if unit in LADDERS else (unit, 1.0)
+    return f"{float(f'{value * scale:.{digits}g}'):g} {unit}".removesuffix(" 1")
 
 
 def _lead(table: dict) -> str:

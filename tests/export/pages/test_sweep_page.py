@@ -128,11 +128,13 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_error(
     measures = {"loop_area": ([lost] * 3, [lost] * 3, "J"),
                 "pressure_peak": ([2e6, 3.1415926e6, 9e9], [2e3, lost, 1e9], "Pa")}
     outcome = ["steady", "steady", "grows"]
-    assert span(measures, outcome) == "Pressure peak runs from 2 to 3.142 MPa, numerical error at most 0.002 MPa."
+    assert span(measures, outcome) == "Pressure peak runs from 2 MPa to 3.142 MPa, numerical error at most 2 kPa."
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
     assert span(measures, outcome) == "Loop area is 1 mJ throughout."
     assert span({"pressure_peak": ([lost, lost, 9e6], [0.0] * 3, "Pa")}, outcome) == \
-        "Pressure peak is 9 MPa throughout, numerical error at most 0 MPa."
+        "Pressure peak is 9 MPa throughout, numerical error at most 0 Pa."
+    assert span({"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}, outcome[:2]) == \
+        "Relative displacement amplitude runs from 29.39 nm to 8.261 mm, numerical error at most 80 nm."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, ["steady"]) == ""
 
 
