@@ -32,15 +32,15 @@ def test_always_between_one_and_all():
 
 
 def test_cycles_that_repeat_count_once():
-    """A residual that is the same in each of three cycles tells as much as in one of them."""
-    same, other = [], []
-    for seed in range(40):
+    """A residual that is the same in each of four cycles tells as much as in one of them, four others as 800/8 rows."""
+    alike, other = [], []
+    for seed in range(400):
         rng = np.random.default_rng(seed)
         cycles = [np.convolve(rng.normal(size=207), np.ones(8), "valid") for _ in range(4)]
-        same.append(effective_rows(np.tile(cycles[0], 4)))
+        alike.append(effective_rows(np.tile(cycles[0], 4)) / effective_rows(cycles[0]))
         other.append(effective_rows(np.concatenate(cycles)))
-    assert np.median(same) == pytest.approx(200 / 8, rel=0.25)
-    assert np.median(other) == pytest.approx(800 / 8, rel=0.25)
+    assert np.median(alike) == pytest.approx(1, abs=0.01)
+    assert np.median(other) == pytest.approx(800 / 8, rel=0.03)  # three standard errors of the median
 
 
 def covered(bars, seeds, tie):
