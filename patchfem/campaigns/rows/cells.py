@@ -135,11 +135,12 @@ def cells_of(path: Path) -> Cells:
 
 def scores(cells: Cells, logs, among) -> dict | None:
     """{"acceleration", "displacement", "all"}: root mean square of logs (n,) over the readings `among` (n,) bool, of
-    each kind (None where there is none) and of all; None where there are no readings at all."""
+    each kind and of all, None where there is none or where one is NaN, not predicted; None where there are no readings
+    at all."""
     if not np.any(among):
         return None
     logs, out = np.asarray(logs), {}
     for name, which in (("acceleration", cells.felt), ("displacement", ~cells.felt), ("all", np.ones(len(logs), bool))):
         part = logs[which & among]
-        out[name] = float(np.sqrt(np.mean(part**2))) if part.size else None
+        out[name] = float(np.sqrt(np.mean(part**2))) if part.size and not np.isnan(part).any() else None
     return out

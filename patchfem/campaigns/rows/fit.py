@@ -76,12 +76,12 @@ class FittedRows:
         return self.fit.outcome
 
     def scored(self, logs, left, stable: bool = False) -> dict:
-        """{"fitted", "held_out", "left_out"}: `cells.scores` of logs (n,) and of those of left-out readings (n,);
-        stable: without the readings flagged U."""
+        """{"fitted", "held_out", "left_out"}: `cells.scores` of logs (n,) and of those of left-out readings (n,), the
+        same readings whoever predicts them; stable: without the readings flagged U."""
         among = ~self.cells.unstable if stable else np.ones(self.held.size, bool)
         return {"fitted": scores(self.cells, logs, among & ~self.held),
                 "held_out": scores(self.cells, logs, among & self.held),
-                "left_out": scores(self.cells, left, among & ~np.isnan(left))}
+                "left_out": scores(self.cells, left, among & ~np.isnan(self.left))}
 
 
 @dataclass(frozen=True, slots=True)

@@ -258,6 +258,22 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
         again["measures"]["absolute_acceleration_peak"]["value"], rel=1e-4)
 
 
+def test_nulls_have_no_score_where_a_kind_was_never_fitted(tmp_path):
+    """Displacements that are held out alone are predicted by the rig, and by nothing without mechanics; no score of
+    theirs is that of the accelerations alone."""
+    rows = [(*row[:3], row[3] if row[0] == 160 else "", "") for row in linear_rows()]
+    given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, rows)), "--free", *LINEAR_FREE,
+             "--starts", "1", "-o", str(tmp_path / "out")]
+    for words, part in ((["--hold", "frequency=160 Hz"], "held_out"), (["--leave-out", "frequency"], "left_out")):
+        code, _, said = cli(*given, *words)
+        assert code == 0, said
+        answer = json.loads((tmp_path / "out" / "fit.json").read_text())
+        assert answer["scores"][part]["displacement"] < 1e-3 and answer["scores"][part]["all"] < 1e-3
+        for null in answer["nulls"].values():
+            assert null[part]["displacement"] is None and null[part]["all"] is None
+            assert null[part]["acceleration"] > 0.05
+
+
 def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     """With the ends of all starts, or of the first alone, kept on disk: the same bits with less work; those of another
     question count for nothing."""
