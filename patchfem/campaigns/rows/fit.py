@@ -114,18 +114,20 @@ def fit_rows(question: Question, beside: Beside, say: Callable | None = None,
     if len(parts) == 1:
         raise PatchfemError(f"--leave-out {beside.leave_out}: the rows that are not held have one value of it, so that "
                             "nothing would be left")
-    placebos = [text for one in beside.placebos for text in _texts(one)]
+    for _, part in parts:
+        _enough(cells, ~held & ~part, count, how)
+    placebos = [(text, question.asked(cells.conditions, text)) for one in beside.placebos
+                for text in _texts(one, question.wanted)]  # what is wrong with them is said before hours of work
     tell = _told(progress, how.starts * (1 + len(parts) + len(placebos)))
     found = searched(cells, computed, ~held, how, name="all", tell=tell)
     answer = _predicted(computed, found.fit.values, range(len(cells.conditions)))
     logs, left, folds = cells.logs(*answer), np.full(held.size, np.nan), []
     for name, part in parts:
-        _enough(cells, ~held & ~part, count, how)
         fold = Fold(name, part, searched(cells, computed, ~held & ~part, how, "", f"without {name}", tell))
         seen = _predicted(computed, fold.found.fit.values, sorted(set(cells.condition[part].tolist())))
         left[part] = cells.logs(*seen)[part]
         folds.append(fold)
-    tried = tuple(_tried(question, text, cells, held, how, (say, tell)) for text in placebos)
+    tried = tuple(_tried(*one, cells, held, how, (say, tell)) for one in placebos)
     nulls = {name: _null(cells, name, held, parts) for name in NULLS}
     warnings = [*asked.scene.remarks, *asked.notes, *_said(cells, asked, found, logs, how)]
     return FittedRows(asked, cells, how, held, found, answer, logs, tuple(folds), left, tried, nulls, computed.runs,
@@ -157,17 +159,23 @@ def _told(progress: Callable | None, total: int) -> Callable | None:
     return tell
 
 
-def _texts(one: str) -> list:
+def _texts(one: str, wanted) -> list:
+    """The --set strings of a placebo; PatchfemError where the fit or the rows would put another value in its place."""
     key, equals, values = (part.strip() for part in one.partition("="))
     if not equals or not values:
         raise PatchfemError(f"--placebo {one}: table.key=value,value is wanted, such as "
                             "structure.mode.yaw.frequency=110 Hz,138 Hz")
+    if key in ("drive.frequency", "drive.acceleration"):
+        raise PatchfemError(f"--placebo {one}: the rows give the drive; name a value of the rig")
+    if any(key == each.key for each in wanted):
+        raise PatchfemError(f"--placebo {one}: the key is free, so that every fit would find its own value of it; "
+                            "leave it out of --free, or name another key")
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
-def _tried(question: Question, text: str, cells: Cells, held, how: Search, heard: tuple) -> Placebo:
+def _tried(text: str, asked: Asked, cells: Cells, held, how: Search, heard: tuple) -> Placebo:
     """A whole fit with a key at another value, by a --set string; heard: (say, tell)."""
-    computed = Computed(question.asked(cells.conditions, text), heard[0])
+    computed = Computed(asked, heard[0])
     found = searched(cells, computed, ~held, how, "", text, heard[1])
     logs = cells.logs(*_predicted(computed, found.fit.values, range(len(cells.conditions))))
     return Placebo(text, found, logs)
