@@ -27,6 +27,7 @@ SCATTERED = {  # between which ends each is drawn
     "friction.static": "0.36..0.44"}              # assumed: ten per cent either way
 CONDITIONS = {"drive.frequency": ["135 Hz", "143 Hz", "150 Hz", "155 Hz"],
               "drive.acceleration": ["4 g", "5 g", "6 g", "7 g", "8 g"]}
+FEWEST = 5  # cases of a condition: a mean and a slope per key leave one to scatter by
 
 
 def main(cases: int = 2000, processes: int = 1, seed: int = 7) -> dict:
@@ -34,28 +35,33 @@ def main(cases: int = 2000, processes: int = 1, seed: int = 7) -> dict:
 
     spread: {(frequency [Hz], input [g]): (cases, standard deviation of the logarithm of the acceleration)}; shares: key
     -> its share of that variance, from a linear fit in every condition, pooled; all: the pooled spread; repeats: that
-    of the repeated readings of Table 1.
+    of the repeated readings of Table 1. Conditions of fewer than FEWEST cases are left out and counted; ValueError
+    where that leaves none.
     """
     found = pf.sweep(HERE / "rig.toml", SCATTERED | CONDITIONS, draw=cases, seed=seed, jobs=processes)
     frequency, level = found.drive_frequency.values, np.round(found.drive_acceleration.values / G_N, 9)
     acceleration = np.log(found.absolute_acceleration_peak.values)
     keys = np.log([found[key.replace(".", "_")].values for key in SCATTERED])
     spread, parts, within = {}, np.zeros(len(SCATTERED)), 0.0
+    asked = int(np.prod([len(values) for values in CONDITIONS.values()]))
     for condition in sorted(set(zip(frequency.tolist(), level.tolist()))):
         here = (frequency == condition[0]) & (level == condition[1]) & np.isfinite(acceleration)
-        if here.sum() < 5:
+        if here.sum() < FEWEST:
             continue
         y, x = acceleration[here] - acceleration[here].mean(), keys[:, here] - keys[:, here].mean(axis=1)[:, None]
         slope = np.linalg.lstsq(x.T, y, rcond=None)[0]
         parts += slope**2 * (x**2).sum(axis=1)  # the keys are drawn independently of each other
         within += (y**2).sum()
         spread[condition] = (int(here.sum()), float(y.std(ddof=1)))
+    if not spread:
+        raise ValueError(f"{cases} cases leave none of {asked} conditions {FEWEST} or more; ask for {10 * asked} cases "
+                         "or more")
     counted = sum(count - 1 for count, _ in spread.values())
     out = {"spread": spread, "shares": dict(zip(SCATTERED, parts / within)), "all": float(np.sqrt(within / counted)),
            "repeats": repeats(), "outcomes": sorted(set(found.outcome.values.tolist()))}
     for (hertz, size), (count, value) in spread.items():
         print(f"{hertz:3.0f} Hz {size:.0f} g   {count:5d} cases   {value:.4f}")
-    print(f"all conditions {out['all']:.4f}; repeated readings {out['repeats']:.4f}")
+    print(f"{len(spread)} of {asked} conditions {out['all']:.4f}; repeated readings {out['repeats']:.4f}")
     print("shares of the variance: " + ", ".join(f"{key} {share:.2f}" for key, share in out["shares"].items()))
     print("outcomes: " + ", ".join(out["outcomes"]))
     return out

@@ -23,6 +23,12 @@ def test_a_share_of_the_cases_scatters_less_than_the_repeats(scatter, monkeypatc
     assert found["shares"]["contact.tilt.angle"] < 0.1 < found["shares"]["friction.static"]
 
 
+def test_refuses_too_few_cases_for_any_condition(scatter, monkeypatch):
+    monkeypatch.setattr(scatter, "CONDITIONS", {"drive.acceleration": ["5 g"], "drive.frequency": ["143 Hz"]})
+    with pytest.raises(ValueError, match="4 cases leave none of 1 conditions 5 or more; ask for 10 cases"):
+        scatter.main(4)
+
+
 @pytest.mark.slow
 def test_the_sentence(scatter, capsys):
     found = scatter.main(2000)
