@@ -83,6 +83,34 @@ def test_exact_the_height_of_the_load_is_stored():
     assert work - lost == pytest.approx(115 * 15e-6, rel=1e-9)
 
 
+def test_exact_a_slow_slide_breaks_away_and_goes_on_by_coefficients_of_their_own():
+    """F/N = tan(flank + angle of friction): the static one at the start, on a flank that falls, then the kinetic."""
+    found = run(BENCH, **{"friction.kinetic": "0.3"})
+    assert value(found, "loop_area") == pytest.approx(area(115, 0.3, 7.5e-6, 30e-6), rel=1e-9)
+    flank = np.arctan(7.5e-6 * WAVE * np.sin(-0.3))
+    short = BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "1 um"')
+    found = run(short, **{"friction.kinetic": "0.1", "normal.grooves.phase": "0.3 rad"})
+    assert value(found, "friction_force_peak") == pytest.approx(115 * np.tan(flank + np.arctan(0.4)), rel=1e-9)
+
+
+def test_always_a_long_slow_slide_samples_every_flank():
+    """100 waves in a cycle: the trapezoidal rule on the samples finds the work, one of them stands near the steepest
+    flank."""
+    found = run(BENCH, **{"slide.amplitude": "2 mm"})
+    steep = 7.5e-6 * WAVE
+    assert value(found, "work_check") < 1e-4
+    assert value(found, "friction_force_peak") == pytest.approx(115 * (steep + 0.4) / (1 - 0.4 * steep), rel=1e-3)
+
+
+def test_exact_a_rig_slips_by_the_kinetic_coefficient():
+    """Flanks of a slope of 1e-12 and the exact engine without grooves."""
+    there = run(RIG, **{"friction.kinetic": "0.3", "normal.grooves.amplitude": "1e-11 um", "drive.cycles": "10"})
+    here = run(flat(RIG), **{"friction.kinetic": "0.3", "drive.cycles": "10"})
+    assert there.extra["engine"] == "march" and here.extra["engine"] != "march"
+    for name in ("friction_work", "loop_area", "relative_displacement_amplitude"):
+        assert value(there, name) == pytest.approx(value(here, name), rel=1e-5)
+
+
 def test_exact_a_slow_slide_of_a_force_that_follows_the_speed():
     """Far above v_0 it is Coulomb's; far below v_0 it is a dashpot along the flank: c ds/dt with c = mu N/v_0."""
     rate = BENCH.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 um/s"')
@@ -211,9 +239,14 @@ substrate = "Ti-8Al-1Mo-1V"
         loads(BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]"))
 
 
-def test_always_a_lifted_mass_of_a_bench_is_remarked():
+def test_always_a_lifted_mass_of_a_bench_is_remarked_and_not_used():
     assert any("lifted_mass has no meaning" in one
                for one in loads(BENCH, sets=["normal.grooves.lifted_mass=1 kg"]).remarks)
+    text = BENCH.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
+    here, there = (run(text, **{"slide.speed": "50 mm/s", "normal.grooves.lifted_mass": mass}) for mass in (
+        "0 kg", "1 kg"))
+    assert {name: one.value for name, one in there.measures.items()} == \
+        {name: one.value for name, one in here.measures.items()}
 
 
 def test_always_nothing_of_grooves_is_imported_unasked():

@@ -11,6 +11,7 @@ from .watch import Watch
 
 GAUSS = 8  # points in a step over a flank
 
+
 def closed(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     """Slide the interface of a law without memory along path = (time (k,) [s], slide (k,) [m]), in closed form.
 
