@@ -88,7 +88,11 @@ class ClimbingRun(Run):
     def __init__(self, modes, drive, model, steps_per_cycle, travel, hub, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, hub, start)
         q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
-        self.contact.now_at[RISE] = float(model.grooves.slope(q) * v)
+        steep, c = float(model.grooves.slope(q)), self.contact
+        c.now_at[RISE] = steep * v
+        normal = model.load * np.hypot(1.0, steep)
+        c.memory[:] *= normal / c.before  # it was built at the slide 0
+        c.before[:] = c.now[:] = normal
         self.ledger[0] += self.strained()
 
     def _judge(self, status: int) -> None:

@@ -15,7 +15,7 @@ from ...friction.grooves import Grooves
 from ..harmonic.laws import SHARPEST, Sampled, Track
 from .climbing import ClimbingModel
 
-WAVES = 24  # samples over a radian of a groove
+WAVES = 24  # samples over a groove, where the slide is fastest
 MOST = 12  # cycles until the law repeats
 CLOSE = 1e-9  # share of the limit within which an element slips
 ROUND = 1e-12  # of the limit, to which the law repeats

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from patchfem.core import BaseSine, ModalBasis, Outcome
+from patchfem.core import BaseSine, ModalBasis, Outcome, Start
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.hub import follow_path
-from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.march import fresh, march
 from patchfem.dynamics.march.models import element_model, points_model
 from patchfem.dynamics.march.varying_load import bonds, plastic
 from patchfem.friction.bonds.parameters import Bonds
@@ -116,3 +116,26 @@ def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
     model = ClimbingModel(Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, plastic(MU, 1e-6))
     done = march(BASIS, BaseSine(400.0, 2 * np.pi * 143), model, 5, 100)
     assert done.outcome is Outcome.NOT_CONVERGED and "leaves the grooves" in done.message
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_exact_a_motion_may_start_on_a_flank(law):
+    """The law starts under the normal force of a contact without friction there, R = N sqrt(1 + t^2), as it would under
+    that load on flat ground."""
+    grooves, place = Grooves(80e-6, 7.5e-6, 0.4), 17e-6
+    normal = LOAD * np.hypot(1, grooves.slope(place))
+    model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
+    on = fresh(BASIS, DRIVE, model, 100, start=Start(np.array([place]), np.zeros(1))).contact
+    flat = ClimbingModel(Grooves(80e-6, 0.0), normal, LAWS[law][0](2e-6)).build()[0]
+    for there, here in zip((on.before, on.now, on.memory), (flat.before, flat.now, flat.memory)):
+        np.testing.assert_allclose(there, here, rtol=1e-14)
+
+
+def test_order_two_a_lifted_mass_that_starts_with_a_speed():
+    """Next to no friction, no drive: the motion of the exact steps without any."""
+    grooves, start = Grooves(80e-6, 7.5e-6, 0.4, 0.5), Start(np.array([10e-6]), np.array([0.02]))
+    still = BaseSine(0.0, DRIVE.omega)
+    true = march(BASIS, still, model_of(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start).response.slide
+    coarse, fine = (np.abs(march(BASIS, still, ClimbingModel(grooves, LOAD, plastic(1e-9, 1e-6)), 1, 100 * part,
+                                 start=start).response.slide[::part] - true).max() for part in (4, 8))
+    assert fine < 3e-4 * np.abs(true).max() and coarse > 3.8 * fine

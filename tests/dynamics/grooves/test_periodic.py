@@ -65,3 +65,15 @@ def test_always_what_sticks_all_the_cycle_is_a_spring():
     force = law.sample(track).force
     stiff = law.sample(track).slope
     assert np.ptp(force) == pytest.approx(2e-9 * stiff.mean(), rel=1e-2)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_exact_the_stiffness_at_rest_is_that_of_a_tiny_slide_about_the_bottom(number):
+    law, track = laws(0.0)[number], Track(np.array([0.0, 1e-10, 0.0]), OMEGA, 64)
+    assert law.total == pytest.approx(law.sample(track).slope.mean(), rel=1e-6)
+
+
+def test_always_a_cycle_samples_every_flank_that_it_passes():
+    """Twenty samples or more over a groove, where a slide of 100 um is fastest."""
+    fastest = 100e-6 * 2 * np.pi  # per cycle
+    assert all(fastest / law.sharpness(100e-6) < 80e-6 / 20 for law in laws(0.0))
