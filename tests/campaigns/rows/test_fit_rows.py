@@ -1,5 +1,6 @@
 """Rigs identified from rows of responses: tables made by known rigs, and what a fit may not see."""
 
+import csv
 import json
 
 import numpy as np
@@ -320,3 +321,65 @@ def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
     code, _, err = cli(*given)
     assert code == 2 and said in err
     assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
+
+
+def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instruments(tmp_path):
+    """A root mean square of a sine is its peak over sqrt 2; the seed says where the starts are."""
+    path = table(tmp_path, linear_rows(scale=1.3 / np.sqrt(2)))
+    scene = scene_of(tmp_path, LINEAR, "measured.file=rows.csv", "measured.acceleration_gain=1.3",
+                     "measured.reading=rms")
+    one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
+    assert one.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
+    assert not np.array_equal(one.found.starts, two.found.starts)
+
+
+def test_the_table_of_a_fit_holds_what_was_measured_and_computed(tmp_path):
+    given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",
+             *LINEAR_FREE, "--hold", "frequency=160 Hz", "--starts", "1", "-o", str(tmp_path / "out")]
+    assert cli(*given)[0] == 0
+    with open(tmp_path / "out" / "fit.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row, (f, level, a, y, _) in zip(rows, linear_rows(), strict=True):
+        assert float(row["frequency [Hz]"]) == f and float(row["input [g]"]) == pytest.approx(level / G_N)
+        for name in ("acceleration [g]", "computed acceleration [g]"):
+            assert float(row[name]) == pytest.approx(a / G_N, rel=1e-4)
+        for name in ("displacement [mil]", "computed displacement [mil]"):
+            assert float(row[name]) == pytest.approx(y / MIL, rel=1e-4)
+        assert row["held"] == ("1" if f == 160 else "0")
+
+
+def test_always_an_interrupted_fit_keeps_its_starts_for_the_same_table_alone(tmp_path, monkeypatch):
+    """Interrupted behind its search and resumed, it makes fewer motions; resumed with other rows it is the fit of
+    these."""
+    def stopped(*given):
+        raise KeyboardInterrupt
+
+    tables = [table(tmp_path, linear_rows(0.05, seed=seed), f"{seed}.csv") for seed in (1, 2)]
+    words = ["fit", str(scene_of(tmp_path, LINEAR).path), "--free", *LINEAR_FREE, "--starts", "1"]
+
+    def answer(path, out, *more):
+        assert cli(*words, "--to", str(path), "-o", str(tmp_path / out), *more)[0] == 0
+        return json.loads((tmp_path / out / "fit.json").read_text())
+
+    for k, path in enumerate(tables):
+        out, kept = f"out{k}", tmp_path / f"out{k}.partial"
+        with monkeypatch.context() as patched:
+            patched.setattr("patchfem.campaigns.rows.fit._null", stopped)
+            assert cli(*words, "--to", str(tables[0]), "-o", str(tmp_path / out))[0] == 130
+        assert [one.name for one in kept.iterdir()] == ["starts.json"] and not (tmp_path / out).exists()
+        whole, resumed = answer(path, f"whole{k}"), answer(path, out, "--resume")
+        assert resumed["values"] == whole["values"] and not kept.exists()
+        assert (resumed["motions"] < whole["motions"]) == (k == 0)
+
+
+def test_exact_a_free_load_presses_the_patch_anew(tmp_path):
+    """The pressure of the patch carries the load of each model, 100 N and then 150 N."""
+    text = RUBS.replace("[normal]\nload", '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\n'
+                        'element_size = "2.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\nload', 1)
+    text = text.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
+    path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, "")])
+    computed = Computed(Asked(scene_of(tmp_path, text), cells_of(path).conditions, free("contact.load=50 N..200 N"),
+                              path))
+    for load_of in (100.0, 150.0):
+        patch = computed._pressed(computed.asked.model([load_of]))
+        assert patch.pressure.load == pytest.approx(load_of, rel=1e-3)
