@@ -74,12 +74,14 @@ def test_exact_a_push_that_stays_and_levels_one_after_the_other():
     same(modes, release(2 * np.pi), groups, start=Start(np.array([2.0]), np.array([0.0])))
 
 
-def test_exact_power_of_a_drive_of_two_signs():
-    """Elements that never yield are a spring, so the power is that of a linear oscillator from rest."""
-    modes, omega = basis(1.0, 0.05, base=-1.0), 2.0
+@pytest.mark.parametrize("omega", [2.0, 1.3, 2.9])
+def test_exact_power_of_a_drive_of_two_signs(omega):
+    """Elements that never yield are a spring, so the power is that of a linear oscillator from rest: in resonance at
+    2.0, where it keeps its sign, and beside it, where it does not."""
+    modes = basis(1.0, 0.05, base=-1.0)
     done = histories.simulate(modes, BaseSine(1.0, omega), [elements_of([3.0], [1e3])], 6, window=2)
     own = np.sqrt(4.0 - 0.05**2)
-    time = np.linspace(0, 6 * np.pi, 400_001)
+    time = np.linspace(0, 12 * np.pi / omega, 400_001)
     gain = 1 / (4.0 - omega**2 + 0.1j * omega)
     forced = (gain * np.exp(1j * omega * time)).imag, (1j * omega * gain * np.exp(1j * omega * time)).imag
     a, b = -forced[0][0], (-forced[1][0] - 0.05 * forced[0][0]) / own
