@@ -54,6 +54,7 @@ KINDS = {
     "no friction": changed(("static = 0.3", "static = 0")),
     "no push": changed(("slide = 1.0", "slide = 1.0\nbase = 0")),
     "no output": changed(("slide = 1.0", "slide = 1.0\noutput = 0")),
+    "a gauge of its own": changed(("slide = 1.0", "slide = 1.0\ngauge = 0.5")),
     "a mass": MASS,
     "an averaged law": changed(('law = "coulomb"', 'law = "convolution"\nbond_length = "1 um"')),
 }
