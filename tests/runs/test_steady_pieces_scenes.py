@@ -73,10 +73,10 @@ def test_exact_a_patch_behind_its_shear_shows_its_own_stress():
 def test_exact_a_curve_meets_the_point_at_its_peak():
     curve = pf.run(POINT + PLASTIC + MODE + NEAR, **STEADY)
     found = curve.extra["curve"]
-    assert found["amplitude"].size == 121 and np.all(found["multiplier"] < 1)
+    assert found["amplitude"].size >= 121 and np.all(found["multiplier"] < 1)
     best = int(np.argmax(found["amplitude"]))
     assert curve.measures["peak_frequency"].value == found["frequency"][best]
-    for k in (0, best, 120):
+    for k in (0, best, -1):
         keys = {"drive.frequency": f"{float(found['frequency'][k])!r} Hz", "drive.acceleration": "6 g"}
         point = pf.run(RIG, **STEADY, **keys).measures["relative_displacement_amplitude"]
         assert point.value == pytest.approx(found["amplitude"][k], rel=1e-9)

@@ -1,16 +1,18 @@
 """The steady motion of Coulomb interfaces, or of none at all, by the event map; its curve over frequency or level."""
 
 from dataclasses import replace
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
 
 from ...compiled import load
-from ...core import Outcome
+from ...core import Outcome, PatchfemError
 from ...dynamics.events.steady_events import steady
 from ...dynamics.one_mode.steady import response
+from ...structure.response import receptance
 from .exact import forces_of, run_exact
-from .solution import drives_of, largest_of
+from .solution import traced
 
 
 class Events:
@@ -39,23 +41,40 @@ class Events:
 
     def curve(self, drive) -> tuple:
         """Curve as arrays by name, and the sine of its largest amplitude; None: the motion there is the only one."""
-        drives = drives_of(drive)
-        if self.modes.omega.size == 1 and len(self.modes.interfaces) == 1:
-            curve = self._single(drives)
+        alone = self.modes.omega.size == 1 and len(self.modes.interfaces) == 1
+        if not any(limit.any() for limit in self.forces):
+            row = self._linear
+        elif alone:
+            load("dynamics.one_mode.steady_kernels", self.say)
+            row = self._single
         else:
-            names = ("frequency", "level", "amplitude", "regime", "multiplier")
-            rows = [self._row(one) for one in drives]
-            curve = {name: np.array(column) for name, column in zip(names, zip(*rows))}
-        return curve, drives[largest_of(curve["amplitude"])], None
+            row = self._row
+        curve, best, _ = traced(self.modes, drive, lambda sine, _: (row(sine), None))
+        return curve, best, None
 
-    def _single(self, drives) -> dict:
-        """The curve of one mode by its own map, compiled."""
-        load("dynamics.one_mode.steady_kernels", self.say)
-        found = response(self.modes, drives, float(self.forces[0][0]), float(self.forces[1][0]))
-        names = [f"{stops:g} stops" if str(regime) == "stops" else str(regime)
-                 for regime, stops in zip(found.regime, found.stops)]
-        return {"frequency": found.omega / (2 * np.pi), "level": np.array([one.acceleration for one in drives]),
-                "amplitude": found.amplitude, "regime": np.array(names), "multiplier": np.abs(found.multiplier)}
+    def _linear(self, drive) -> tuple:
+        """A point of a curve without friction, in closed form; on a resonance that nothing damps as `_row`."""
+        modes = self.modes
+        try:
+            seen = receptance(modes, drive.omega, modes.output, modes.base)[0, 0, 0] * modes.mass
+        except PatchfemError:
+            return self._row(drive)
+        return drive.omega / (2 * np.pi), drive.acceleration, drive.acceleration * abs(seen), "sliding", \
+            float(np.exp(self.decay * drive.period))
+
+    @cached_property
+    def decay(self) -> float:
+        """Rate [1/s] at which the slowest free motion of the modes alone dies out, <= 0."""
+        n = self.modes.omega.size
+        state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]])
+        return float(np.linalg.eigvals(state).real.max())
+
+    def _single(self, drive) -> tuple:
+        """A point of the curve of one mode by its own map, compiled."""
+        found = response(self.modes, [drive], float(self.forces[0][0]), float(self.forces[1][0]))
+        regime, stops = str(found.regime[0]), float(found.stops[0])
+        return (float(found.omega[0]) / (2 * np.pi), drive.acceleration, float(found.amplitude[0]),
+                f"{stops:g} stops" if regime == "stops" else regime, float(np.abs(found.multiplier[0])))
 
     def _row(self, drive) -> tuple:
         found = self.found(drive)

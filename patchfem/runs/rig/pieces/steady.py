@@ -13,7 +13,7 @@ from ....core import Outcome
 from ....dynamics.piecewise import histories
 from ....dynamics.piecewise.elements import books_begin
 from ....dynamics.piecewise.steady import steady
-from ..solution import drives_of, largest_of
+from ..solution import traced
 from .run import Interfaces, solution_of
 
 
@@ -43,15 +43,10 @@ class Yields:
 
     def curve(self, drive) -> tuple:
         """Curve as arrays by name, the sine of its largest amplitude, and the Point of the motion there."""
-        drives, found, near = drives_of(drive), [], None
-        for sine in drives:
-            found.append(steady(self.modes, sine, self.found.groups, near))
-            near = found[-1].point
-        best = largest_of([one.amplitude for one in found])
-        largest = np.array([np.abs(one.multipliers).max(initial=0.0) for one in found])
-        curve = {"frequency": np.array([one.omega / (2 * np.pi) for one in drives]),
-                 "level": np.array([one.acceleration for one in drives]),
-                 "amplitude": np.array([one.amplitude for one in found]),
-                 "regime": np.array([one.regime if size <= 1 else f"{one.regime}, unstable"
-                                     for one, size in zip(found, largest)]), "multiplier": largest}
-        return curve, drives[best], found[best].point
+        def find(sine, near):
+            one = steady(self.modes, sine, self.found.groups, near)
+            largest = np.abs(one.multipliers).max(initial=0.0)
+            regime = one.regime if largest <= 1 else f"{one.regime}, unstable"
+            return (sine.omega / (2 * np.pi), sine.acceleration, one.amplitude, regime, largest), one.point
+
+        return traced(self.modes, drive, find)
