@@ -61,7 +61,7 @@ def test_always_the_fixture_decides_the_contact_fraction():
 
 
 def test_figure_13_curves_of_the_study(tmp_path):
-    rows = {row["order"]: row for row in study("figures/figure_13.py").main(tmp_path / "figure.svg")}
+    rows = {row["order"]: row for row in study("report/figure_13.py").main(tmp_path / "figure.svg")}
     assert list(rows) == [-0.5, 0.0, 1.0, 2.0]
     assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
     assert [rows[p]["top_at"] for p in (0.0, 1.0, 2.0)] == [0, 1, 2]
@@ -71,7 +71,7 @@ def test_figure_13_curves_of_the_study(tmp_path):
 
 
 def test_figure_14_curve_of_the_study(tmp_path):
-    rows = study("figures/figure_14.py").main(tmp_path / "figure.svg")
+    rows = study("report/figure_14.py").main(tmp_path / "figure.svg")
     assert [weight for _, weight, _ in rows] == pytest.approx([0.3989, 0.2420, 0.0540, 0], abs=5e-5)
     assert [share for *_, share in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
     assert "<svg" in (tmp_path / "figure.svg").read_text()

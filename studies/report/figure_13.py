@@ -1,11 +1,12 @@
 """What does Fig. 13 of the report show? The weight of a bond along the path (eq. 2.14), phi(R/eps) for several p.
 
 Each curve encloses unit area, so p moves the force along the path and leaves steady friction alone. p = 0 starts at 1
-and only falls; p = 1 and 2 rise from 0 to 0.3679 and 0.2707 at R = p eps, a bond strongest after p bond lengths; p =
--0.5 is infinite at the start. Nine tenths of the force are gone after R/eps = 1.35, 2.30, 3.89 and 5.32. Of the print
-only the caption could be read, neither axes nor the values of p: these p span the kinds of curve that 2.14 has.
+and only falls; p = 1 and 2 rise from 0 to 0.3679 and 0.2707 at R = p eps, a bond strongest after p bond lengths.
 
-Run: python studies/figures/figure_13.py
+p = -0.5 is infinite at the start. Nine tenths of the force are gone after R/eps = 1.35, 2.30, 3.89 and 5.32. Of the
+print only the caption could be read, neither axes nor the values of p: these p span the kinds of curve that 2.14 has.
+
+Run: python studies/report/figure_13.py
 """
 
 import sys
@@ -16,11 +17,14 @@ from scipy.special import gammaincinv
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from told import told
 
 from patchfem.closed_forms.friction import weight_along
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
+QUESTION, ANSWER = told(__doc__)
+REPRODUCED = "in part: equation and kind of curve, as neither axes nor values of p could be read"
 ORDERS = (-0.5, 0.0, 1.0, 2.0)
 COLOURS = (GREY, ORANGE, BLUE, "#4f9bd9")
 
@@ -37,6 +41,7 @@ def main(path: Path | None = HERE / "figure_13.svg") -> list:
               f"nine tenths within R/eps = {rows[-1]['nine_tenths']:.3f}")
     if path is not None:
         draw(path, x)
+    print(ANSWER)
     return rows
 
 

@@ -1,11 +1,12 @@
 """What does Fig. 14 of the report show? The weight of a bond across the path (eq. 2.15), W(eta/rho).
 
 A normal density in eta/rho: 0.3989 on the path, 0.2420 at one rho, 0.0540 at two; 68.3 and 95.4 % of a bond lie within.
+
 Over eta its area is rho, which 2.16 divides out, so where the pressure does not change across the path rho drops out
 of the law: only a pad narrower than a few rho or roughness finer than rho can show it. Of the print only the caption
 could be read.
 
-Run: python studies/figures/figure_14.py
+Run: python studies/report/figure_14.py
 """
 
 import sys
@@ -16,11 +17,14 @@ from scipy.integrate import quad
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from told import told
 
 from patchfem.closed_forms.friction import weight_across
 from patchfem.export.drawing.pictures import BLUE
 
 HERE = Path(__file__).parent
+QUESTION, ANSWER = told(__doc__)
+REPRODUCED = "in part: equation and kind of curve, as its axes could not be read"
 
 
 def main(path: Path | None = HERE / "figure_14.svg") -> list:
@@ -33,6 +37,7 @@ def main(path: Path | None = HERE / "figure_14.svg") -> list:
         with drawing(path, (6.0, 3.4)) as (_, axis):
             axis.plot(y, weight_across(y), color=BLUE)
             axis.set(xlabel="η/ρ", ylabel="W", xlim=(-4, 4), ylim=(0, 0.45), title="Weight across the path (2.15)")
+    print(ANSWER)
     return rows
 
 
