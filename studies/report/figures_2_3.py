@@ -9,7 +9,11 @@ Onsets measured on the rig are 3.8 to 4.2 g. q = 0.15 is 0.359 mil for 0.23 meas
 q = 0.15 is the report's own: Newmark's method with a stick speed. With an onset of 4.00 g and a block stopped below
 0.2075 of the input's largest speed, q is 0.156 and the acceleration 0.95; below 0.21 q is 0.062. Its velocity drops to
 zero from up to 0.2075, which makes the kinks that the report sees in its phase plane and in conclusion 9. The exact
-velocity arrives at zero without a XX
+velocity arrives at zero without a jump, only the acceleration jumps, by 0.70, and the limit cycle has no kink. With a
+damping ratio of 0.003 every motion settles; without damping none is bounded above 4/pi times the onset, 5.27 g. Lines
+and ranges of the prints could not be read: these are their quantities over the phase of the input, steady, and the
+growth from rest.
+
 Run: python studies/report/figures_2_3.py
 """
 
