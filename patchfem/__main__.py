@@ -25,18 +25,21 @@ from .commands.profile import profile  # noqa: E402
 from .commands.run import run  # noqa: E402
 from .commands.scene import check, mesh, plan  # noqa: E402
 from .commands.shared import Ended, Refused, say  # noqa: E402
+from .commands.start import cite, demo, doctor, new, schema  # noqa: E402
 from .commands.study import cost, fit  # noqa: E402
 from .commands.sweep import sweep  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-VERBS = (check, plan, run, sweep, profile, compare, cost, fit, mesh, export, view, report)
-NOT_BUILT = ("import", "demo", "new", "schema", "doctor", "cite")
+VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, export, view, report, schema, doctor,
+         cite)
+NOT_BUILT = ("import",)
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
 for verb in VERBS:
     app.command(verb)
+app.register_install_completion_command(help="Complete commands and options in this shell (bash, zsh, fish).")
 
 
 def main(argv: list | None = None) -> None:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "load", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "demo", "load", "plan", "run", "run_many", "sweep"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
@@ -91,6 +91,14 @@ def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], Non
     what = scene if isinstance(scene, Plan) else plan(scene, **sets)
     done = run_plan(what, _on_stderr if say is None else say, progress)
     return Result(**{one.name: getattr(done, one.name) for one in fields(done)} | {"measures": Measures(done.measures)})
+
+
+def demo(**sets: Any) -> Result:
+    """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g; sets as `load` takes
+    them."""
+    from .scene.starting import shipped
+
+    return run(shipped(), **sets)
 
 
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,

@@ -21,6 +21,12 @@ MATERIALS: dict[str, Elastic] = {
     ),
     "WC-Co sintered": Elastic(600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."),
     "steel": Elastic(210e9, 0.30, 7850.0, "Handbook values of plain carbon steel at 20 degC."),
+    "stainless steel": Elastic(193e9, 0.29, 8000.0, "Handbook values of austenitic steel 304 at 20 degC."),
+    "cast iron": Elastic(110e9, 0.26, 7200.0, "Handbook values of grey iron, middle of 66-140 GPa by grade."),
+    "aluminium": Elastic(69e9, 0.33, 2700.0, "Handbook values of alloy 6061 at 20 degC."),
+    "bronze": Elastic(110e9, 0.34, 8800.0, "Handbook values of tin bronze, about 100-115 GPa by alloy."),
+    "alumina": Elastic(370e9, 0.22, 3900.0, "Handbook values of dense sintered ceramic with 99.5 % Al2O3."),
+    "PTFE": Elastic(0.5e9, 0.46, 2200.0, "Handbook values of the unfilled polymer at 20 degC, 0.4-0.6 GPa; it creeps."),
 }
 
 

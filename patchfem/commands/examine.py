@@ -1,0 +1,97 @@
+"""What an installation has and lacks, each with the line that cures it."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import NamedTuple
+
+PICTURE = """\
+import pyvista
+plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
+plotter.add_mesh(pyvista.Sphere())
+assert plotter.screenshot(None, return_img=True).std() > 0
+"""
+SECONDS = 60  # for a first picture on a slow disk
+EXTRAS = {"SurfaceTopography": ("profiles", "files of more instruments"),
+          "distributed": ("cluster", "sweeps over several machines"), "trame": ("web", "fields in a browser"),
+          "gmsh": ("gmsh", "meshes by gmsh"), "scikit-sparse": ("cholmod", "another factorisation"),
+          "pypardiso": ("pardiso", "another factorisation")}
+
+
+class Finding(NamedTuple):
+    """One thing looked at: its name, whether it is fine, what was found, what to do ("" where nothing)."""
+
+    name: str
+    fine: bool
+    found: str
+    cure: str
+
+
+def examined() -> list[Finding]:
+    """Everything that a run may need, looked at now; a picture is drawn in a process of its own."""
+    return [*_packages(), _cache(), _threads(), _picture(), *_extras()]
+
+
+def _packages() -> Iterator[Finding]:
+    from .. import __version__
+
+    yield Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
+    yield Finding("patchfem", True, __version__, "")
+    for name in dict.fromkeys(_needed()):
+        found = _version(name)
+        yield Finding(name, bool(found), found or "not installed", "" if found else f"pip install {name}")
+
+
+def _needed() -> Iterator[str]:
+    """Names of the packages that this one cannot do without."""
+    for line in requires("patchfem") or ():
+        if "extra ==" not in line:
+            yield line.split(";")[0].split(">")[0].split("<")[0].split("=")[0].split("[")[0].strip()
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
+
+
+def _cache() -> Finding:
+    """Compiled code: a folder that cannot be written makes every command compile anew."""
+    from ..compiled import cache_folder
+
+    folder = cache_folder()
+    wanted = Path(os.environ.get("PATCHFEM_CACHE") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
+    fine = folder.is_relative_to(wanted)
+    return Finding("compiled code", fine, f"{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}",
+                   "" if fine else f"{wanted} cannot be written; name another folder in PATCHFEM_CACHE")
+
+
+def _threads() -> Finding:
+    try:
+        cores = len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        cores = os.cpu_count() or 1
+    return Finding("threads", True, f"{cores} of {os.cpu_count()} cores; -j {cores} lets a sweep use them", "")
+
+
+def _picture() -> Finding:
+    """Whether a picture of the pieces can be drawn here (patchfem view -o)."""
+    try:
+        done = subprocess.run([sys.executable, "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS)
+        fine, why = done.returncode == 0, (done.stderr.strip().splitlines() or ["it crashed"])[-1][:100]
+    except (OSError, subprocess.TimeoutExpired) as error:
+        fine, why = False, str(error)[:100]
+    cure = "" if fine else "apt-get install libgl1 libxrender1, or look at report.html, which needs none"
+    return Finding("pictures by OpenGL", fine, "drawn" if fine else why, cure)
+
+
+def _extras() -> Iterator[Finding]:
+    for name, (extra, what) in EXTRAS.items():
+        found = _version(name)
+        yield Finding(f"{name} ({what})", bool(found), found or "not installed, optional",
+                      "" if found else f'pip install "patchfem[{extra}]"')

@@ -1,0 +1,75 @@
+"""Verbs for the first hour: a scene to start from, a run to look at, help for editors, what to cite."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .run import run
+from .shared import Json, Out, Refused, say
+
+
+def new(kind: str = "", /, *, out: Out = None):
+    """Print a scene of this KIND to start from, or write it to -o FILE.toml; without KIND the kinds are named."""
+    from ..scene.starting import KINDS, text_of
+
+    if not kind:
+        width = max(map(len, KINDS))
+        print("\n".join(f"{name:<{width}}  {about}" for name, about in KINDS.items()))
+        return
+    text = text_of(kind)
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        with out.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise Refused(f"{out}: is there already; name another file by -o, or remove it") from None
+    print(f"{out}: {KINDS[kind]}\nnext: patchfem {'sweep' if '[sweep]' in text else 'run'} {out}")
+
+
+def demo(*, out: Out = None, no_page: Annotated[bool, Parameter(negative=())] = False):
+    """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g, into out/demo or -o
+    DIR."""
+    from ..scene.starting import shipped
+
+    scene = shipped()
+    say(f"scene: {scene}; another to start from: patchfem new")
+    run(scene, out=out if out is not None else Path("out") / "demo", no_page=no_page)
+
+
+def schema(*, out: Out = None):
+    """Print the JSON schema of a scene, or write it to -o FILE.json, for editors that complete keys and check units:
+    in VS Code with Even Better TOML a scene begins with the line #:schema FILE.json."""
+    from ..scene.schema import schema as make
+
+    text = json.dumps(make(), indent=1, ensure_ascii=False) + "\n"
+    if out is None:
+        print(text, end="")
+        return
+    out.write_text(text, encoding="utf-8")
+    print(f"{out}: begin a scene with the line #:schema {out}")
+
+
+def doctor(*, json_: Json = False):
+    """Say what this installation has: versions, kept compiled code, pictures, threads, optional packages and the line
+    that installs each."""
+    from .examine import examined
+
+    found = examined()
+    if json_:
+        print(json.dumps([one._asdict() for one in found]))
+        return
+    width = max(len(one.name) for one in found)
+    for one in found:
+        print(f"{'ok' if one.fine else '--'}  {one.name:<{width}}  {one.found}" + (f"; {one.cure}" if one.cure else ""))
+
+
+def cite(scene: Path | None = None, /):
+    """Print BibTeX of the report and of this program; with SCENE also of the papers that its effects stand on."""
+    from ..scene.scene import load
+    from .sources import bibtex
+
+    print(bibtex(load(scene).named() if scene is not None else ()), end="")

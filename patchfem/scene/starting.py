@@ -1,0 +1,36 @@
+"""Scenes to start from, one file per kind of question; each runs as it stands, in seconds.
+
+`text_of` gives the text of one. `shipped` is the place of the scene of the rig with the rows measured on it, which lies
+in `studies/rig` of a checkout and in `templates/shipped` of an installed package.
+"""
+
+from pathlib import Path
+
+from ..core import Missing, PatchfemError
+from .keys.types import choices
+
+HERE = Path(__file__).parent / "templates"
+KINDS = {
+    "patch": "two coated pieces pressed together: where they touch, how hard, how stiff",
+    "joint": "a bolted lap joint shaken to and fro: its friction loop, stiffness and damping",
+    "bench": "a law of friction on one contact point, along a prescribed slide",
+    "rig": "a rubbing block on flexures, shaken at one frequency",
+    "linear": "a mass on flexures without friction",
+    "misalignment": "a sweep: what a tilt does to a rubbing block",
+    "wear": "how a tilted patch wears in over many cycles",
+}
+
+
+def text_of(kind: str) -> str:
+    """The text of a scene of one of KINDS; PatchfemError for any other word."""
+    if kind not in KINDS:
+        raise PatchfemError(f"{kind}: no kind of scene; {choices(kind, KINDS)}")
+    return (HERE / f"{kind}.toml").read_text(encoding="utf-8")
+
+
+def shipped() -> Path:
+    """The scene of the rig that comes with the program; Missing where it was taken out of the installation."""
+    for folder in (HERE / "shipped", HERE.parents[2] / "studies" / "rig"):
+        if (folder / "rig.toml").is_file():
+            return folder / "rig.toml"
+    raise Missing("the scene of the rig is not in this installation; install patchfem anew")

@@ -1,0 +1,97 @@
+"""The verbs of the first hour: a scene to start from, the shipped run, the schema, the doctor, what to cite."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from command_line import cli
+
+import patchfem as pf
+from patchfem.__main__ import app
+from patchfem.commands import examine
+from patchfem.commands.sources import SOURCES, bibtex
+from patchfem.effects import EFFECTS
+from patchfem.scene.scene import loads
+from patchfem.scene.starting import KINDS, shipped, text_of
+
+
+def test_exact_new_writes_what_it_prints(tmp_path):
+    path = tmp_path / "mine.toml"
+    assert cli("new", "joint").out == text_of("joint")
+    answer = cli("new", "joint", "-o", path)
+    assert answer.code == 0 and path.read_text("utf-8") == text_of("joint") and f"patchfem run {path}" in answer.out
+    assert "patchfem sweep" in cli("new", "misalignment", "-o", tmp_path / "tilts.toml").out
+    path.write_text("mine", "utf-8")
+    answer = cli("new", "rig", "-o", path)
+    assert answer.code == 2 and "is there already" in answer.err and path.read_text("utf-8") == "mine"
+
+
+def test_exact_new_names_its_kinds():
+    assert [line.split()[0] for line in cli("new").out.splitlines()] == list(KINDS)
+    said = f"joitn: no kind of scene; did you mean 'joint'? one of {', '.join(KINDS)}\n"
+    assert cli("new", "joitn")[::2] == (2, said)
+
+
+def test_exact_the_demo_is_the_rig_of_the_report(tmp_path):
+    answer = cli("demo", "-o", tmp_path / "out", "--no-page")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    amplitude = summary["measures"]["relative_displacement_amplitude"]
+    assert answer.code == 0 and amplitude["value"] == pytest.approx(14.8028e-6, abs=amplitude["error"])
+    few = {"drive.cycles": 3}
+    assert pf.demo(**few).measures["loop_area"].value == pf.run(shipped(), **few).measures["loop_area"].value > 0
+
+
+def test_exact_the_schema_is_written_as_it_is_printed(tmp_path):
+    assert cli("schema", "-o", tmp_path / "a.json").code == 0
+    assert (tmp_path / "a.json").read_text("utf-8") == cli("schema").out
+    assert json.loads(cli("schema").out)["$defs"]["Contact"]["properties"]["length"]["examples"] == ["12.7 mm"]
+
+
+def test_always_the_doctor_tells_what_is_missing(monkeypatch):
+    monkeypatch.setattr(examine, "PICTURE", "raise OSError('no display')")
+    monkeypatch.setattr(examine, "_version", lambda name: "" if name in ("scipy", "gmsh") else "1.0")
+    found = {one["name"]: one for one in json.loads(cli("doctor", "--json").out)}
+    assert not found["scipy"]["fine"] and found["scipy"]["cure"] == "pip install scipy" and found["numpy"]["fine"]
+    assert found["gmsh (meshes by gmsh)"]["cure"] == 'pip install "patchfem[gmsh]"'
+    assert "no display" in found["pictures by OpenGL"]["found"] and found["pictures by OpenGL"]["cure"]
+    lines = cli("doctor").out.splitlines()
+    assert len(lines) == len(found) and sum(line.startswith("--") for line in lines) == 3
+
+
+def test_always_the_doctor_says_where_compiled_code_cannot_be_kept(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "file" / "below"))
+    assert not examine._cache().fine and "PATCHFEM_CACHE" in examine._cache().cure
+
+
+def test_exact_a_scene_cites_what_its_effects_stand_on(tmp_path):
+    keys = lambda text: re.findall(r"^@\w+\{(\w+),", text, re.M)  # noqa: E731
+    assert keys(cli("cite").out) == ["srinivasan1985", "patchfem"]
+    path = tmp_path / "a.toml"
+    path.write_text(text_of("rig").replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"'), "utf-8")
+    assert keys(cli("cite", path).out) == ["srinivasan1985", "patchfem", "oden1983"]
+    assert {"hueber2005", "archard1953"} <= set(keys(bibtex(loads(text_of("wear")).named())))
+    assert {name for names, _ in SOURCES for name in names} <= set(EFFECTS)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_always_every_verb_completes(shell):
+    script = app.generate_completion(shell=shell)
+    assert all(verb in script for verb in ("sweep", "doctor", "no-page"))
+    if shell == "bash":
+        asked = 'COMP_WORDS=(patchfem sw); COMP_CWORD=1; COMP_LINE="patchfem sw"; COMP_POINT=11\n'
+        name = re.search(r"complete .*-F (\S+) patchfem", script)[1]
+        done = subprocess.run(["bash", "-c", f'{script}\n{asked}{name} patchfem sw patchfem; echo "${{COMPREPLY[@]}}"'],
+                              capture_output=True, text=True, check=True, timeout=30)
+        assert "sweep" in done.stdout.split()
+
+
+def test_always_help_imports_nothing_of_them():
+    """`patchfem --help` names the verbs without the modules behind them."""
+    code = "import sys, patchfem.__main__; print([m for m in sys.modules if m.startswith('patchfem.')])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "patchfem.commands.start" in done.stdout
+    for name in ("examine", "sources", "starting", "schema"):
+        assert name not in done.stdout

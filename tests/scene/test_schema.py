@@ -1,0 +1,73 @@
+"""The JSON schema of a scene: it accepts what the program reads and refuses what an editor should mark."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from patchfem.scene.keys.quantities import EXAMPLES, KINDS, parse
+from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.schema import pattern, schema
+from patchfem.scene.starting import KINDS as TEMPLATES
+from patchfem.scene.starting import text_of
+
+ROOT = Path(__file__).parents[2]
+SCENES = sorted((ROOT / "studies").rglob("*.toml"))
+RIG = text_of("rig")
+WRONG = {  # what is changed in the scene of a rig, as neither the program nor the schema reads it
+    "a bare number": ('"115 N"', "115"), "a unit of another kind": ('"115 N"', '"115 mm"'),
+    "an ambiguous unit": ('"115 N"', '"115 lb"'), "no blank": ('"115 N"', '"115N"'),
+    "an unknown key": ("acceleration =", "acelleration ="), "an unknown value": ('"base"', '"bass"'),
+    "an unknown law": ('"coulomb"', '"coulom"'), "beyond a limit": ("1e-3", "-1e-3"),
+    "a text for a number": ("static = 0.3", 'static = "0.3"'),
+    "a fraction of a whole": ("1e-3", "1e-3\nsteps_per_cycle = 10.5"),
+    "a table for a value": ('"115 N"', "{value = 115}"), "an unknown table": ("[normal]", "[nromal]")}
+
+
+@pytest.fixture(scope="module")
+def check():
+    made = schema()
+    Draft202012Validator.check_schema(made)
+    return Draft202012Validator(made)
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: "-".join(path.parts[-2:]))
+def test_always_it_accepts_the_scenes_that_ship(check, path):
+    assert [one.message for one in check.iter_errors(tomllib.loads(path.read_text("utf-8")))] == []
+
+
+@pytest.mark.parametrize("kind", TEMPLATES)
+def test_always_it_accepts_the_scenes_to_start_from(check, kind):
+    assert check.is_valid(tomllib.loads(text_of(kind)))
+
+
+@pytest.mark.parametrize("right, wrong", WRONG.values(), ids=WRONG)
+def test_refuses_what_the_program_refuses(check, right, wrong):
+    text = RIG.replace(right, wrong, 1)
+    assert not check.is_valid(tomllib.loads(text)) and check.is_valid(tomllib.loads(RIG))
+    with pytest.raises(SceneError):
+        loads(text)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_a_quantity_is_what_the_unit_table_reads(kind):
+    """Every unit of every kind, with each spelling of micro, powers and products: both read it or neither does."""
+    units = {unit for units in KINDS.values() for unit in units}
+    units |= {unit.translate(signs) for unit in units for signs in (
+        {ord("u"): "µ"}, {ord("u"): "μ"}, {ord(" "): "·"})} | {u.replace("^2", "²").replace("^3", "³") for u in units}
+    for text in [f"{number} {unit}" for unit in units for number in ("1", "-2.5e-3", ".5")] + [EXAMPLES[kind], "1", ""]:
+        try:
+            reads = bool(parse(text, kind)) or True
+        except ValueError as error:
+            reads = "below 0 K" in str(error)
+        assert bool(re.search(pattern(kind), text)) == reads, text
+
+
+def test_always_every_key_says_what_it_means():
+    made = schema()
+    for table in (made, *made["$defs"].values()):
+        for one in (table, *table.get("anyOf", ())):
+            for key, found in one.get("properties", {}).items():
+                assert found.get("description") or "$ref" in str(found), key
