@@ -87,7 +87,8 @@ def test_exact_key_follows_the_kernels_only(tmp_path, monkeypatch):
     (package / "core.py").write_text("# edited", "utf-8")
     assert compiled.kernel_key() == same
     seen = {same}
-    for path in sorted(package.rglob("*kernels.py")):
+    tuples = [package / "dynamics" / name for name in compiled.TUPLES]
+    for path in (*sorted(package.rglob("*kernels.py")), *tuples):
         path.write_text(path.read_text("utf-8") + "# edited\n", "utf-8")
         seen.add(compiled.kernel_key())
     (package / "mesh" / "new_kernels.py").write_text("", "utf-8")
@@ -96,7 +97,7 @@ def test_exact_key_follows_the_kernels_only(tmp_path, monkeypatch):
     seen.add(compiled.kernel_key())
     monkeypatch.setattr(compiled, "_cpu", lambda: "another")
     seen.add(compiled.kernel_key())
-    assert len(seen) == 1 + len(list(package.rglob("*kernels.py"))) + 2
+    assert len(seen) == 1 + len(list(package.rglob("*kernels.py"))) + len(tuples) + 2
 
 
 def test_exact_cache_folder(tmp_path, monkeypatch):

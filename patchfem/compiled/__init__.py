@@ -25,14 +25,18 @@ from pathlib import Path
 from . import machine
 
 HERE = Path(__file__).parents[1]  # the package
+# tuples that kernels take: numba's cache would not notice two of their fields that change places
+TUPLES = "plant.py", "contacts/arrays.py", "smooth/arrays.py", "piecewise/plant.py", "piecewise/elements.py"
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
 
 def kernel_key() -> str:
-    """Hash of every *kernels.py of the package, how they are compiled, the kind of CPU and what it can do."""
+    """Hash of every *kernels.py of the package and of the tuples that they take, how they are compiled, the kind of CPU
+    and what it can do."""
     digest = hashlib.sha256()
-    for source in (HERE / "compiled" / "inner.py", *sorted(HERE.rglob("*kernels.py"))):
+    for source in (HERE / "compiled" / "inner.py", *sorted(HERE.rglob("*kernels.py")),
+                   *(HERE / "dynamics" / name for name in TUPLES)):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
     made_by = f"{version('numba')} {version('llvmlite')} {sys.version_info[:2]}"
     digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())

@@ -13,28 +13,24 @@ from patchfem.runs.many.many import taken
 from patchfem.scene.scene import SceneError, loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
-BENCH = f"""
+PRESSED = f"""
 [normal]
 load = "115 N"
 {GROOVES}
 [friction]
 law = "coulomb"
 static = 0.4
+"""
+BENCH = PRESSED + """
 [slide]
 kind = "triangle"
 amplitude = "30 um"
 speed = "1 mm/s"
 """
-RIG = f"""
-[normal]
-load = "115 N"
-{GROOVES}
-[friction]
-law = "coulomb"
-static = 0.4
+RIG = PRESSED + """
 [structure]
 moving_mass = "1.2 kg"
-mode = [{{name = "axial", frequency = "143 Hz", damping = 0.003, slide = 1.0}}]
+mode = [{name = "axial", frequency = "143 Hz", damping = 0.003, slide = 1.0}]
 [drive]
 kind = "base"
 frequency = "143 Hz"

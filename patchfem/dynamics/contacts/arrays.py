@@ -1,5 +1,7 @@
-"""Arrays of the contacts that a march can meet: one law on one slide, points behind shear modes, a list of bonds."""
+"""Arrays of the contacts that a march can meet: one law on one slide, points behind shear modes, points under
+a changing load or on flanks, a list of bonds."""
 
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +59,32 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1) -> dict:
             "count": np.full(1, m + more), "y": np.zeros((2, size)), "last": np.zeros(size),
             "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))), "room": np.zeros((3, size)),
             "hess": np.zeros((2, size, size)), "ready": np.zeros(2)}
+
+
+class Rub(namedtuple("Rub", ("force", "memory", "before", "now", "modes", "under", *Sheared._fields))):
+    """The law of `march.varying_friction_kernels` under a load that changes.
+
+    force (4,): mu_s, mu_k (v_0 of a rate law), bond length [m], initial density m_0; memory (3, m): elastic-plastic
+    traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; before, now (m,): nodal forces at the ends of the step
+    [N]; modes (r, m): shear modes at all points, none of pieces that are rigid in shear; under (m,): numbers of the
+    points under load, in the order in which they come in the rest, which is as of `Sheared`; there they have the memory
+    after half of the change of load, and the mean load.
+    """
+
+    __slots__ = ()
+
+
+class Climbing(namedtuple("Climbing", ("flank", "now_at", *Rub._fields))):
+    """A law with memory along flanks, `grooves.contact_kernels`.
+
+    flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
+    `march.varying_friction_kernels`; now_at (12,): speed of what rises [m/s], vertical force of the step before [N],
+    the last two slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried
+    last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and 1 where
+    a slide was kept; the rest is as of `Rub`, with the normal force for the load.
+    """
+
+    __slots__ = ()
 
 
 class Stops(NamedTuple):

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...compiled import load as compiled
 from ...core import Outcome
 from ...friction.grooves import Grooves
-from ..contacts.arrays import sheared
+from ..contacts.arrays import Climbing, sheared
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, POINTS, Rubbing, bonds, plastic
 from .run import lifts, refuse_heavy
@@ -73,9 +72,8 @@ class ClimbingModel:
         at = np.zeros(12)
         at[VERTICAL] = self.load
         flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind])
-        kernels = compiled(HERE)
-        return kernels.Climbing(flank, at, np.array(law.force, float), memory, normal.copy(), normal, np.zeros((0, 1)),
-                                np.arange(1), **sheared(weight, law.length, law.growth, np.zeros((1, 0)), ())), None
+        return Climbing(flank, at, np.array(law.force, float), memory, normal.copy(), normal, np.zeros((0, 1)),
+                        np.arange(1), **sheared(weight, law.length, law.growth, np.zeros((1, 0)), ())), None
 
     def shown(self, contact) -> dict:
         """Nothing: one point has no field."""

@@ -8,7 +8,6 @@ functions are those that `march.loop_kernels` asks of every contact.
 """
 
 from math import cos, sin, sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,41 +18,10 @@ from ..march.varying_friction_kernels import press_all, rub_commit, rub_force, r
 from ..modal_kernels import narrowed
 
 SET_VALUED = False
-LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND = range(6)  # of Climbing.flank
+LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND = range(6)  # of contacts.arrays.Climbing.flank
 RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE = range(12)  # of now
 INNER = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
-
-
-class Climbing(NamedTuple):
-    """flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
-    `march.varying_friction_kernels`; now_at (12,): speed of what rises [m/s], vertical force of the step before [N],
-    the last two slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried
-    last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and 1 where
-    a slide was kept; the rest is as of `march.varying_friction_kernels.Rub`, with the normal force for the load."""
-
-    flank: np.ndarray
-    now_at: np.ndarray
-    force: np.ndarray
-    memory: np.ndarray
-    before: np.ndarray
-    now: np.ndarray
-    modes: np.ndarray
-    under: np.ndarray
-    weight: np.ndarray
-    eps: np.ndarray
-    growth: np.ndarray
-    psi: np.ndarray
-    kappa: np.ndarray
-    b: np.ndarray
-    points: np.ndarray
-    count: np.ndarray
-    y: np.ndarray
-    last: np.ndarray
-    scale: np.ndarray
-    room: np.ndarray
-    hess: np.ndarray
-    ready: np.ndarray
 
 
 @njit(error_model="numpy", **LEAN)

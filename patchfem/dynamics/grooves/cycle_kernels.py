@@ -24,7 +24,7 @@ def kept(dq, q, c):
 
 @njit(error_model="numpy", cache=True, **LEAN)
 def cycle(q, c, along, normal, stretch, most, goal):
-    """Slide the contact c (`contact_kernels.Climbing`, no lifted mass) along the samples q (N,) [m] of a cycle until
+    """Slide the contact c (`contacts.arrays.Climbing`, no lifted mass) along the samples q (N,) [m] of a cycle until
     the force along the flank repeats to `goal` [N], `most` times at most: the cycles that it took.
 
     along, normal (N,): force along the flank and normal force there [N] at the samples; stretch (N,) [m] along the

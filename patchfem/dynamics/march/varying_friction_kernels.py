@@ -7,8 +7,6 @@ It leaves the points out of balance with pieces that give way in shear, which a 
 every step; so a step ends with the pieces springing back while the holder stands.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...compiled.inner import njit
@@ -20,35 +18,6 @@ from ..modal_kernels import safe_point
 
 COULOMB, RATE = 0, 4
 TIGHT = 0.01  # share of the goal down to which pieces that give way are solved: their loss is a small difference
-
-
-class Rub(NamedTuple):
-    """force (4,): mu_s, mu_k (v_0 of a rate law), bond length [m], initial density m_0; memory (3, m): elastic-plastic
-    traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; before, now (m,): nodal forces at the ends of the step
-    [N]; modes (r, m): shear modes at all points, none of pieces that are rigid in shear; under (m,): numbers of the
-    points under load, in the order in which they come in the rest, which is as of `contacts.arrays.Sheared`; there they
-    have the memory after half of the change of load, and the mean load."""
-
-    force: np.ndarray
-    memory: np.ndarray
-    before: np.ndarray
-    now: np.ndarray
-    modes: np.ndarray
-    under: np.ndarray
-    weight: np.ndarray
-    eps: np.ndarray
-    growth: np.ndarray
-    psi: np.ndarray
-    kappa: np.ndarray
-    b: np.ndarray
-    points: np.ndarray
-    count: np.ndarray
-    y: np.ndarray
-    last: np.ndarray
-    scale: np.ndarray
-    room: np.ndarray
-    hess: np.ndarray
-    ready: np.ndarray
 
 
 @njit(error_model="numpy", **LEAN)

@@ -16,7 +16,7 @@ from ...core import ModalBasis, Outcome, PatchfemError, Response
 from ...effects import unbuilt
 from ...friction.laws.stretch import growth_numbers
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
-from ..contacts.arrays import sheared
+from ..contacts.arrays import Rub, sheared
 from .march import GOAL, Run
 from .march import march as run
 from .models import coulomb_model
@@ -197,7 +197,7 @@ class VaryingLoadRun(Run):
         memory[1 if law.kind == PLASTIC else 0] = now * (1.0 if law.kind == PLASTIC else law.force[3])
         psi, kappa = (np.zeros((x.size, 0)), ()) if model.shear is None else (model.shear.shape, model.shear.stiffness)
         weight = np.full(x.size, law.static / (law.length if law.kind == POINTS else 1.0))
-        self.rub = compiled("dynamics.march.varying_friction_kernels").Rub(
+        self.rub = Rub(
             np.array(law.force, float), memory, now.copy(), now, np.array(psi.T, order="C"), np.arange(x.size),
             **sheared(weight, law.length, law.growth, psi, kappa))
         self.held, self.room = np.zeros(3), (np.empty(30), np.empty((3, modes.omega.size)))

@@ -209,7 +209,7 @@ def march(first, steps, state, held, at_set, plant, ports, table, kind, rub, set
     """March `steps` steps from row `first` of the table of the drive.
 
     held (3,): last friction force, mean force of the step before, 1 while Coulomb friction holds; at_set (1,): slot of
-    the present set; rub: `dynamics.march.varying_friction_kernels.Rub`; loads (steps + 1,) [N]: prescribed load at the
+    the present set; rub: `dynamics.contacts.arrays.Rub`; loads (steps + 1,) [N]: prescribed load at the
     steps, empty where the contact says it; room: (numbers (30,), (3, n)) to work in;
     ledger as in `dynamics.march.loop_kernels.march`; rows (steps + 1, 2 n + 12) as there, then load, moment, energy of
     the preloaded contact, heave, pitch. Returns (steps done, status): 0 finished, 1 travel exceeded, 3 not finite, 4 no

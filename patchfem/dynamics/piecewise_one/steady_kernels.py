@@ -127,25 +127,25 @@ def period(point, rig, segment, table, memory, room, slopes, marks, clock, out):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def alike(one, other):
-    """Whether two memories have turning places of the same kind."""
-    if one.depth[0] != other.depth[0]:
-        return False
-    for k in range(one.depth[0]):
-        if one.side[0, k] != other.side[0, k]:
+def equal(some, others, count):
+    """Whether the first numbers of two rows are the same."""
+    for k in range(count):
+        if some[0, k] != others[0, k]:
             return False
     return True
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def alike(one, other):
+    """Whether two memories have turning places of the same kind."""
+    return one.depth[0] == other.depth[0] and equal(one.side, other.side, one.depth[0])
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def same(one, other):
     """Whether two memories that are alike hold the same elements in every group, and let the same ones slip."""
-    if one.slipping[0] != other.slipping[0] or one.way[0] != other.way[0]:
-        return False
-    for k in range(one.depth[0]):
-        if one.upto[0, k] != other.upto[0, k]:
-            return False
-    return True
+    slips = one.slipping[0] == other.slipping[0] and one.way[0] == other.way[0]
+    return slips and equal(one.upto, other.upto, one.depth[0])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
