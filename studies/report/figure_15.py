@@ -1,0 +1,114 @@
+"""Does a released block come to rest as eq. 3.11 and Fig. 15 say, at pi N0/w0, about 11 units of time?
+
+In part: with N0 rounded up 3.11 is exact, to 3e-16 of x0, and 11 is N0 = 7 with w0 = 2 (10.996) or N0 = 5 with w0 =
+1.414 (11.107); as printed N0 = 3.5 gives 10.996 with w0 = 1 and k x0/F = 8, when the block still moves: it rests at
+12.566.
+
+The report prints N0 = (k x0/F - 1)/2 without a word of rounding. (-1)^N0 is no real number then, and the size that goes
+with it is F/k whatever the start: every block would rest where friction just holds it. In truth the block stops at the
+first turn at which the spring pulls with less than F, so N0 is the next whole number. With w0 = 1 no whole number gives
+11 (9.425 or 12.566). The print's "very slight tendency to oscillate" beyond rest is the report's method: its steps
+(3.10) of 0.05, iterated without relaxation, follow 3.11 to 0.003 x0 and then swing by 0.005 x0 for ever, as friction
++-F has no value that holds a block; 15 % of them do not converge. The exact engine stops it for good. The print gives
+no x0, F or w0.
+
+Run: python studies/report/figure_15.py
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from drawing import drawing
+from problems import PLAIN
+from told import told
+
+import patchfem as pf
+from patchfem.closed_forms.dynamics import decay
+from patchfem.core import Segment, Start
+from patchfem.dynamics.comparison import duhamel
+from patchfem.dynamics.comparison.point_laws import Coulomb
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from patchfem.structure.drives import Piecewise
+
+HERE = Path(__file__).parent
+QUESTION, ANSWER = told(__doc__)
+REPRODUCED = "in part: 3.11 holds with N0 rounded up; as printed a block with w0 = 1 would rest before it does"
+READINGS = ((1.0, 8.0), (2.0, 14.5), (np.sqrt(2), 10.5))  # w0, k x0/F: three that give about 11
+END = 18.0
+
+
+class Row(NamedTuple):
+    """omega, ratio = k x0/F; printed: pi N0/w0 with N0 unrounded; moving: displacement then over x0; stop, place: time
+    and displacement over x0 of the rest by the engine; error: largest difference of its samples from 3.11 rounded."""
+
+    omega: float
+    ratio: float
+    printed: float
+    moving: float
+    stop: float
+    place: float
+    error: float
+
+
+def solve(omega: float, ratio: float) -> Row:
+    """The row of a block of unit mass released at x0 = 1."""
+    found = pf.run(HERE / "figure_15.toml", **{"structure.mode.block.frequency": omega / (2 * np.pi),
+                                               "friction.static": omega**2 / ratio, "drive.cycles": ratio}).to_xarray()
+    time, x = found.time.values, found.relative_displacement.values
+    printed = np.pi * (ratio - 1) / 2 / omega
+    return Row(omega, ratio, printed, float(decay(printed, 1.0, 1 / ratio, omega)), float(found.event_time[-1]),
+               float(x[-1]), float(np.abs(x - decay(time, 1.0, 1 / ratio, omega)).max()))
+
+
+def stepped(step: float = 0.05) -> tuple:
+    """(time, x, share of steps that do not converge) of the first reading by the report's steps."""
+    drive = Piecewise((Segment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
+    found = duhamel.run(PLAIN, drive, (Coulomb(0.125, 0.125),), END, 1000, "velocity", 1e-4, 1.0,
+                        Start(np.array([1.0]), np.array([0.0])))
+    return found.time, found.z[:, 0], found.failures / found.time.size
+
+
+def picture(rows: list, steps: tuple, path: Path) -> Path:
+    """Displacement over time as in Fig. 15 for three readings of 11, and what the report's steps do after rest."""
+    time = np.linspace(0, END, 1801)
+    with drawing(path, (9.6, 5.6), 2, 1, height_ratios=(2, 1)) as (_, (upper, lower)):
+        for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
+            upper.plot(time, decay(time, 1.0, 1 / r.ratio, r.omega), color=colour,
+                       label=f"ω0 = {r.omega:.4g}, k x0/F = {r.ratio:g}: at rest from {r.stop:.3f}")
+            upper.plot(r.stop, r.place, "o", color=colour, ms=5)
+        upper.axvline(rows[0].printed, color="black", lw=0.8, ls=":")
+        upper.text(rows[0].printed - 0.1, 0.88, "3.11 with N0 = 3.5", ha="right", fontsize=9)
+        upper.set(xlabel="time", ylabel="displacement [x0]", xlim=(0, END))
+        upper.legend(loc="lower right")
+        late = steps[0] > 10
+        lower.plot(steps[0][late], steps[1][late], color=ORANGE, label="the report's steps (3.10) of 0.05")
+        shown = time > 10
+        lower.plot(time[shown], decay(time[shown], 1.0, 0.125, 1.0), color=BLUE, label="exact, ω0 = 1, k x0/F = 8")
+        lower.set(xlabel="time", ylabel="displacement [x0]", xlim=(10, END), ylim=(-0.012, 0.012))
+        lower.legend(loc="upper right")
+    return path
+
+
+def main(path: Path | None = HERE / "figure_15.svg") -> tuple:
+    """([Row], what `stepped` gives), printed and drawn."""
+    rows, steps = [solve(*each) for each in READINGS], stepped()
+    for r in rows:
+        print(f"w0 {r.omega:.4f}, k x0/F {r.ratio:g}: N0 unrounded {r.printed:.3f} (there x is {r.moving:+.4f} x0), at "
+              f"rest from {r.stop:.3f}, x {r.place:+.4f} x0; engine less 3.11 rounded {r.error:.0e}")
+    after = steps[0] > rows[0].stop + 0.5
+    off = np.abs(steps[1] - decay(steps[0], 1.0, 0.125, 1.0))
+    print(f"the report's steps of 0.05: off by {off[~after].max():.4f} x0 before rest, swing by "
+          f"{np.ptp(steps[1][after]) / 2:.4f} x0 after it, {100 * steps[2]:.0f} % do not converge")
+    if path is not None:
+        picture(rows, steps, path)
+    print(ANSWER)
+    return rows, steps
+
+
+if __name__ == "__main__":
+    main()
