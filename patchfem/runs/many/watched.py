@@ -95,7 +95,7 @@ class Watcher:
         except NotConverged:
             if near is not None or len(self.model.rig.interfaces) > 1:
                 raise
-            return self._balance(drive, None)
+            return self._balance(drive, None)._replace(near=None)  # a start for a balance is none for a map of yields
         done = histories.simulate(modes, drive, groups, 1.0, 1, np.inf, 0, None, one.start, one.memory)
         return Watched(done.window, done.acceleration, done.swing, one.point)
 
