@@ -1,4 +1,4 @@
-"""The second load path beside the contact: its scores as an independent program has them."""
+"""Table 1 by models with nothing fitted and by the second load path, with the scores that other programs have."""
 
 import pytest
 from study_module import study
@@ -31,3 +31,28 @@ def test_table_1_the_second_path_fitted_at_143_hz(point, wanted, values):
     found = study("table_1/second_path.py").fitted(point)
     near(found.scored(found.logs, found.left), wanted)
     assert found.fit.values == pytest.approx(values, rel=2e-3)
+
+
+def test_table_1_scores_of_the_rigid_coulomb_block():
+    """An independent event-driven model with an onset of 4.00 g scored 1.62 / 3.68 / 2.26 (200 cycles or more)."""
+    found = study("table_1/unfitted.py").main(400, models=("coulomb",))
+    assert found["coulomb"]["acceleration"] == pytest.approx(1.62, abs=0.01)
+    assert found["coulomb"]["displacement"] == pytest.approx(3.68, abs=0.01)
+    assert found["coulomb"]["all"] == pytest.approx(2.26, abs=0.01)
+    assert found["null"] == pytest.approx(0.116, abs=0.001)
+    assert found["coulomb"]["cells"][0, 6] == pytest.approx(5.42 * 9.80665, abs=0.1)  # 143 Hz, 5 g
+
+
+@pytest.mark.parametrize("frequency, measured", [(143.0, 0.08), pytest.param(135.0, 0.25, marks=pytest.mark.slow)])
+def test_table_1_cells_of_the_patch_at_four_g(frequency, measured):
+    """Partial slip and yaw move at 4 g a block that Coulomb holds still; 400 cycles, at 135 Hz in the slow run."""
+    cell = study("table_1/unfitted.py").answer("patch", frequency, 4 * 9.80665, 400)["relative_displacement_amplitude"]
+    assert cell.value == pytest.approx(measured * 25.4e-6, rel=0.15)
+    assert cell.error < 0.05 * cell.value
+
+
+@pytest.mark.slow
+def test_table_1_scores_of_the_patch():
+    found = study("table_1/unfitted.py").main(800, models=("patch",))
+    assert found["patch"]["acceleration"] == pytest.approx(1.625, abs=0.01)
+    assert found["patch"]["displacement"] == pytest.approx(3.37, abs=0.02)

@@ -1,0 +1,104 @@
+"""The table of the ladder, from scores.json: every rung under every reading, models without mechanics beside them.
+
+A score is the root mean square of ln(computed/measured) of all readings, accelerations, displacements. README.md beside
+this file holds what `main` prints; a test compares the two.
+
+Run: python studies/table_1/table.py
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from fitting import training
+from ladder import known
+from rungs import EACH, RUNGS, TABLE, variants
+
+from patchfem.campaigns.rows.cells import cells_of, scores
+from patchfem.campaigns.rows.nulls import NULLS, predicted
+
+UNITS = {"static": "", "stiffness": "MN/m", "damping": "kN s/m", "slide": "", "accelerometer": "", "load": "N",
+         "amplitude": "um", "acceleration_gain": ""}
+SIZES = {"stiffness": 1e-6, "damping": 1e-3, "amplitude": 1e6}
+SHORT = {"static": "μ", "stiffness": "k", "damping": "c", "slide": "yaw", "accelerometer": "seen", "load": "N",
+         "amplitude": "A", "acceleration_gain": "gain"}
+
+
+def three(found: dict | None) -> str:
+    """"all / acceleration / displacement" of scores; a dash where one is missing."""
+    if found is None:
+        return "-"
+    return " / ".join("-" if found[name] is None else f"{found[name]:.3f}".lstrip("0")
+                      for name in ("all", "acceleration", "displacement"))
+
+
+def left_out(rows: dict, rung: str, reading: str) -> dict | None:
+    """Scores of every reading by the fit that did not see its frequency; None where a fold is missing."""
+    cells, folds = cells_of(TABLE), [rows.get((rung, reading, protocol, "")) for protocol in EACH[1:]]
+    if None in folds:
+        return None
+    logs = np.full(cells.row.size, np.nan)
+    for fold in folds:
+        out = ~training(cells, fold["protocol"])
+        logs[out] = np.array(fold["logs"], float)[out]
+    return scores(cells, logs, np.ones(logs.size, bool))
+
+
+def numbers(row: dict) -> str:
+    """The fitted numbers of a record, named."""
+    parts = []
+    for key, value in zip(row["keys"], row["values"]):
+        name = key.rpartition(".")[2]
+        parts.append(f"{SHORT[name]} {value * SIZES.get(name, 1):.3g} {UNITS[name]}".strip())
+    return ", ".join(parts)
+
+
+def nulls() -> list:
+    """Rows (name, numbers of the accelerations, fitted to 143 Hz, held out, left out, all) of scores."""
+    cells, out = cells_of(TABLE), []
+    seen, every = training(cells, "143"), np.ones(cells.row.size, bool)
+    for name in NULLS:
+        logs, left = predicted(cells, name, seen)[0], np.full(cells.row.size, np.nan)
+        for protocol in EACH[1:]:
+            fold = training(cells, protocol)
+            left[~fold] = predicted(cells, name, fold)[0][~fold]
+        whole, found = predicted(cells, name, every)
+        out.append((name, found["acceleration"], scores(cells, logs, seen), scores(cells, logs, ~seen),
+                    scores(cells, left, every), scores(cells, whole, every)))
+    return out
+
+
+def main() -> list:
+    """Print the tables as markdown; returns their lines."""
+    rows = known()
+    out = ["| model | reading | numbers | at 143 Hz | 135, 150, 155 Hz | left out | all rows | seconds |",
+           "|---|---|---|---|---|---|---|---|"]
+    for name, factor, fitted, held, left, whole in nulls():
+        said = {"constant": "constant x input", "power_input": "power of input",
+                "power_input_frequency": f"input^{factor['input']:.2f} frequency^{factor['frequency']:.2f}"}[name]
+        out.append(f"| none: {said} | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |")
+    for rung, one in RUNGS.items():
+        for reading in one.readings:
+            row = rows.get((rung, reading, "143", ""))
+            if row is None:
+                out.append(f"| {rung} | {reading} | not run | | | | | |")
+                continue
+            every = rows.get((rung, reading, "all", ""))
+            out.append(f"| {rung} | {reading} | {len(row['values'])}: {numbers(row)} | {three(row['fitted'])} | "
+                       f"{three(row['others'])} | {three(left_out(rows, rung, reading))} | "
+                       f"{three(every and every['fitted'])} | {row['seconds']:.0f} |")
+    out += ["", "| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]
+    for rung, reading, protocol, placebo in variants():
+        row = rows.get((rung, reading, protocol, placebo))
+        if placebo and row is not None:
+            real = rows.get((rung, reading, protocol, ""))
+            out.append(f"| {placebo.rpartition('.')[2].replace('=', ' ')}, {rung} | {three(real and real['fitted'])}, "
+                       f"{three(real and real['others'])} | {three(row['fitted'])} | {three(row['others'])} |")
+    print("\n".join(out))
+    return out
+
+
+if __name__ == "__main__":
+    main()
