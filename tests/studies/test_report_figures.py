@@ -1,7 +1,10 @@
 """What the studies of the report's figures say, recomputed."""
 
+import json
+
 import numpy as np
 import pytest
+from command_line import cli
 from scipy.integrate import solve_ivp
 from study_module import study
 
@@ -118,6 +121,32 @@ def test_figure_15_rest_of_a_released_block():
     inside(" ".join(one.__doc__.split()), f"3.11 to {off:.3f} x0", f"swing by {swing:.3f} x0",
            f"{100 * failed:.0f} % of them do not converge")
     assert one.REPRODUCED.startswith("in part: ")
+
+
+def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
+    one = study("report/figures_30_31.py")
+    (sets, row), = one.main((2,), 4, None).values()
+    inside(one.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
+    assert one.held(sets, row) >= 7 and not any(part.reference for each in sets for part in each.parts)
+    files = [str(path) for path in one.write(one.middle(sets), tmp_path)]
+    found = json.loads(cli("compare", *files, "-o", tmp_path / "out", "--json").out)["directions"]
+    for way, part in zip("xy", one.middle(sets).parts):
+        assert found[way]["amplitude_ratio"]["value"] == pytest.approx(part.amplitude_ratio.value, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_figures_30_and_31_counts_of_all_sets(tmp_path):
+    one = study("report/figures_30_31.py")
+    six, twelve = one.main(path=tmp_path / "x.svg").values()
+    x, y, less, earlier = one.counts(six[0])
+    inside(one.ANSWER, f"reduced along x in {x}, along y in {y}, and lower along x than along y in {less};")
+    flat, (a, b, c, before) = " ".join(one.__doc__.split()), one.counts(twelve[0])
+    assert earlier == before == 0 and not any(part.reference for each in six[0] for part in each.parts)
+    inside(flat, f"the counts are {a}, {b} and {c}", f"to {twelve[1].after[0]:.2f} and {twelve[1].after[1]:.2f}, the",
+           f"in {one.held(*six)} and {one.held(*twelve)} of 40 cases")
+    new, old = (1e6 * one.heights(six[0], when) for when in (0, 1))
+    inside(flat, f"{new.min():.0f} to {new.max():.0f} um before and {old.min():.0f} to {old.max():.0f} um after")
+    inside((tmp_path / "x.svg").read_text(), "along x, 95 % of one set", "Fig. 31, after, along y: waves")
 
 
 @pytest.mark.slow

@@ -1,0 +1,169 @@
+"""Do Figs 30 and 31 show what the report reads from them: waves of 80 um, isotropic before the tests, much lower after
+them and lowest along x?
+
+In part: of 20 sets of four such traces, cut from a surface whose waves wear to 0.55 along x and 0.67 along y, `compare`
+calls the waves reduced along x in 7, along y in 6, and lower along x than along y in 3; one trace each way is too short
+to tell.
+
+The surface is made, so that its larger swings are the report's 13 to 18 um, and worn as in studies/wear/bands.py: 6 um
+off each piece at a stroke of 6.4 um, both assumed. Its traces are 1 mm long, as those of the print, before and after at
+different lines, as a stylus set down twice would run. Twice the amplitude that `profile` reads for the waves of 60 to
+110 um is 8 to 15 um before and 4 to 10 um after. At a stroke of 12.8 um, where waves wear to 0.42 and 0.62, the counts
+are 13, 7 and 4. Before the tests no set is called lower along x. The intervals, 95 %, hold the ratios of the whole
+areas in 39 and 40 of 40 cases. No set gives a worn depth: with 6 um off, valleys are worn too, and the traces have no
+common place to count from. The heights of the print could not be read.
+
+The drawn set as files: python studies/report/figures_30_31.py FOLDER; `patchfem profile` reads them, and so does
+`patchfem compare before_x.csv after_x.csv before_y.csv after_y.csv`.
+
+Run: python studies/report/figures_30_31.py
+"""
+
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "wear"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+import bands
+from drawing import drawing
+from told import told
+
+from patchfem.core import frozen_array
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from patchfem.export.surfaces.compare import write_trace
+from patchfem.surface.compare.compare import compared, directions_of
+from patchfem.surface.compare.verdict import changed, verdicts
+from patchfem.surface.profile import Profile
+from patchfem.surface.roughness.report import interval_of
+
+HERE = Path(__file__).parent
+QUESTION, ANSWER = told(__doc__)
+REPRODUCED = "in part: on made surfaces, as the print's heights could not be read; four traces cannot show all of it"
+STROKES, SETS, APART = (2, 4), 20, 160  # steps of 3.2 um; sets of four traces; lines between before and after
+UM, BITE = 1e-6, 0.03e-6
+
+
+class Set(NamedTuple):
+    """Four traces: (before, after) along x and along y; parts: their Comparison along x and y; across: x over y before
+    and after, amplitude ratio as Quantity."""
+
+    traces: tuple
+    parts: list
+    across: tuple
+
+
+def worn(stroke: int) -> tuple:
+    """(before, after) heights [m] of the lower surface at a stroke of so many steps, and the Row of its whole areas."""
+    rows, (new, after) = bands.wear((stroke,), 1, BITE)
+    return new, after[stroke], rows[-1]
+
+
+def trace(heights, name: str) -> Profile:
+    """Heights along one line as a trace."""
+    return Profile(frozen_array(bands.STEP * np.arange(heights.size)), frozen_array(heights), name)
+
+
+def cut(before, after, line: int) -> Set:
+    """The set at a line of the raster, the traces after APART lines beside those before."""
+    other = (line + APART) % bands.POINTS
+    pairs = ((trace(before[line], "before, x"), trace(after[other], "after, x")),
+             (trace(before[:, line], "before, y"), trace(after[:, other], "after, y")))
+    parts = [compared(*pair, direction) for pair, direction in zip(pairs, "xy")]
+    return Set(pairs, parts, tuple(amplitude for _, amplitude, _ in directions_of(parts)))
+
+
+def counts(sets: list) -> tuple:
+    """How many sets are called reduced along x, along y, lower along x than along y after, and before."""
+    ratios = [(*[part.amplitude_ratio for part in one.parts], one.across[1], one.across[0]) for one in sets]
+    return tuple(sum(changed(each[k]) == "reduced" for each in ratios) for k in range(4))
+
+
+def held(sets: list, row) -> int:
+    """In how many comparisons of the sets the interval holds the ratio of the whole areas."""
+    return sum(one.parts[way].amplitude_ratio.low < row.after[way] < one.parts[way].amplitude_ratio.high
+               for one in sets for way in (0, 1))
+
+
+def heights(sets: list, when: int) -> np.ndarray:
+    """Wave heights (2 sets,) [m] of all traces before (0) or after (1): twice the amplitude of the band."""
+    return np.array([2 * interval_of("band_amplitude", pair[when]).value for one in sets for pair in one.traces])
+
+
+def middle(sets: list) -> Set:
+    """The set through the middle of the surface, which is drawn and written."""
+    return sets[len(sets) // 2]
+
+
+def picture(sets: list, path: Path) -> Path:
+    """The four traces of a set as in Figs 30 and 31, and what every set says of the waves after and before."""
+    with drawing(path, (9.6, 8.2), 3, 2) as (_, axes):
+        for when, number, colour in ((0, 30, GREY), (1, 31, BLUE)):
+            for way, axis in zip((0, 1), axes[when]):
+                one = middle(sets).traces[way][when]
+                found = interval_of("band_amplitude", one)
+                axis.plot(1e3 * one.x, (one.z - one.z.mean()) / UM, color=colour, lw=1)
+                axis.set(xlabel="along the trace [mm]", ylabel="height [um]", xlim=(0, 1.02), ylim=(-24, 24),
+                         title=f"Fig. {number}, {('before', 'after')[when]}, along {'xy'[way]}: waves "
+                               f"{2 * found.value / UM:.1f} um ({2 * found.low / UM:.0f} to {2 * found.high / UM:.0f})")
+                axis.title.set_fontsize(10)
+        at = np.arange(1, len(sets) + 1)
+        along = [[one.parts[way].amplitude_ratio for one in sets] for way in (0, 1)]
+        across = [[one.across[when] for one in sets] for when in (0, 1)]
+        for axis, pair, colours, names in ((axes[2, 0], along, (BLUE, ORANGE), ("along x", "along y")),
+                                           (axes[2, 1], across, (GREY, BLUE), ("before", "after"))):
+            for several, colour, name, aside in zip(pair, colours, names, (-0.17, 0.17)):
+                values = np.array([[one.low, one.value, one.high] for one in several]).T
+                axis.vlines(at + aside, values[0], values[2], color=colour, lw=1.2)
+                axis.plot(at + aside, values[1], "o", ms=3, color=colour, label=f"{name}, 95 % of one set")
+            axis.axhline(1, color="black", lw=0.8)
+            axis.set(xlabel="set of four traces", ylim=(0.15, 4.5), yscale="log", xlim=(0, len(sets) + 1))
+            axis.set_xticks(range(0, len(sets) + 1, 5))
+            axis.set_yticks((0.25, 0.5, 1, 2))
+            axis.set_yticklabels(("0.25", "0.5", "1", "2"))
+            axis.minorticks_off()
+            axis.legend(loc="upper center", ncols=2, fontsize=8)
+        axes[2, 0].set_ylabel("waves, after over before")
+        axes[2, 1].set_ylabel("waves, x over y")
+    return path
+
+
+def write(one: Set, folder: Path) -> list:
+    """Write the four traces of a set as CSV files that `patchfem profile` and `patchfem compare` read."""
+    out = []
+    for pair, way in zip(one.traces, "xy"):
+        for each, when in zip(pair, ("before", "after")):
+            out.append(folder / f"{when}_{way}.csv")
+            write_trace(out[-1], each)
+    return out
+
+
+def main(strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures_30_31.svg") -> dict:
+    """{stroke: ([Set], Row of the whole areas)}, printed and drawn."""
+    lines = [k * bands.POINTS // count for k in range(count)]
+    found = {}
+    for stroke in strokes:
+        before, after, row = worn(stroke)
+        sets = found.setdefault(stroke, ([cut(before, after, line) for line in lines], row))[0]
+        x, y, less, earlier = counts(sets)
+        low, high = ((heights(sets, when).min() / UM, heights(sets, when).max() / UM) for when in (0, 1))
+        print(f"stroke {row.stroke / UM:.1f} um: waves of the areas {row.after[0]:.2f} along x and {row.after[1]:.2f} "
+              f"along y; wave heights of traces {low[0]:.1f} to {low[1]:.1f} um before, {high[0]:.1f} to {high[1]:.1f} "
+              f"um after; of {count} sets reduced along x {x}, along y {y}, lower along x than along y after {less}, "
+              f"before {earlier}; the interval holds the ratio of the areas in {held(sets, row)} of {2 * count}; "
+              f"with a worn depth {sum(bool(part.reference) for one in sets for part in one.parts)}")
+    sets = found[strokes[0]][0]
+    parts = middle(sets).parts
+    print("the drawn set: " + verdicts(parts, directions_of(parts))[0])
+    if path is not None:
+        picture(sets, path)
+    print(ANSWER)
+    return found
+
+
+if __name__ == "__main__":
+    result = main()
+    if len(sys.argv) > 1:
+        write(middle(result[STROKES[0]][0]), Path(sys.argv[1]))
