@@ -255,7 +255,8 @@ class Row(NamedTuple):
     """One measure that a run may have: its name, its unit, the absolute floor of its error and its meaning.
 
     of: its function of the solution, None where a run of another kind or an engine alone has it; grain: samples of a
-    cycle that its reading may be off by.
+    cycle that its reading may be off by; group: of measures that a reader looks at together, motion, friction, energy,
+    patch or wear.
     """
 
     name: str
@@ -264,6 +265,7 @@ class Row(NamedTuple):
     text: str
     of: Callable | None = None
     grain: float = 0.0
+    group: str = "motion"
 
 
 def rounded(value: float | None, error: float | None = None) -> tuple[str, str]:

@@ -39,16 +39,20 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
             raise
     answer = written.summary
     try:
-        if json_:
+        if quiet and not json_:
+            pass
+        elif json_:
             print(json.dumps(answer, ensure_ascii=False), flush=True)
         else:
-            _print_answer(answer, target, verbose, " (without report.html: --no-page)" if no_page else "")
+            _print_answer(written, target, verbose, " (without report.html: --no-page)" if no_page else "")
         if not no_page:
             _draw(written, target)
     except KeyboardInterrupt:
         say(f"interrupted while the page was drawn; the results in {target} are whole, without report.html")
         raise Ended(130) from None
     if answer["outcome"] == "not_converged":
+        if quiet:
+            say(f"{scene}: {written.result.outcome.sentence}")
         raise NotReached
 
 
@@ -64,17 +68,24 @@ def _draw(written, target: Path) -> None:
         raise Ended(4) from None
 
 
-def _print_answer(answer: dict, target: Path, verbose: bool, page: str) -> None:
+def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
+    """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
     from ..core import Outcome
+    from ..export.pages.words import headline, least_known, table_of
+    from ..export.summary import cycles_of
 
+    answer = written.summary
+    if answer["title"]:
+        print(answer["title"])
     print(f"{answer['outcome']}: {Outcome(answer['outcome']).sentence}")
-    for name, m in answer["measures"].items():
-        error = "" if m["error"] is None else f" ± {m['error']:.2g}"
-        value = f"- ({m['reason']})" if m.get("reason") else "-" if m["value"] is None else \
-            f"{m['value']:.6g}{error} {m['unit']}"
-        print(f"  {name:<42} {value}")
+    if text := headline(answer, cycles_of(written.result)):
+        print(text)
+    sys.stdout.flush()
+    if text := least_known(written.result):
+        print(text, flush=True)
     for text in answer["warnings"]:
         say(f"warning: {text}")
+    print("\n".join(table_of(answer["measures"])), flush=True)
     for text in answer["notes"]:
         say(f"note: {text}")
     if verbose:

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from time import monotonic
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -54,10 +55,11 @@ def model_of(path: Path, sets):
 
 
 class progress_bar:
-    """A bar on a terminal, nothing elsewhere; the call takes the done share."""
+    """A bar on a terminal; elsewhere a line every ten seconds; nothing where it is to be silent. The call takes the
+    done share."""
 
     def __init__(self, silent: bool):
-        self.bar = None
+        self.bar, self.silent = None, silent
         if not silent and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import Progress
@@ -66,11 +68,31 @@ class progress_bar:
             self.task = self.bar.add_task("running", total=1.0)
 
     def __enter__(self):
-        if self.bar is None:
+        if self.silent:
             return None
+        if self.bar is None:
+            return Lines()
         self.bar.start()
         return lambda share: self.bar.update(self.task, completed=share)
 
     def __exit__(self, *_):
         if self.bar is not None:
             self.bar.stop()
+
+
+class Lines:
+    """Progress as lines: the done share and what is left at the pace so far, at most one in SECONDS."""
+
+    SECONDS = 10.0
+
+    def __init__(self, clock=monotonic):
+        self.clock, self.begin = clock, clock()
+        self.next = self.begin + self.SECONDS
+
+    def __call__(self, share: float) -> None:
+        now = self.clock()
+        if now < self.next:
+            return
+        self.next = now + self.SECONDS
+        left = f", about {(now - self.begin) * (1 - share) / share:.0f} s left" if share > 0 else ""
+        say(f"{share:.0%} done{left}")

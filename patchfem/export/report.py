@@ -1,9 +1,7 @@
 """report.html: one page that stands alone, the verdict first; the browser draws its pictures, nothing is fetched."""
 
-import tomllib
 from collections.abc import Callable
 from html import escape
-from math import isfinite, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -13,14 +11,8 @@ from . import scales
 from .drawing import curves, pictures
 from .pages import charts
 from .pages.document import Section, document
+from .pages.words import G, headline, others, pair
 
-G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
-DEG = ("deg", 180 / pi)
-WORKSHOP = {  # as scales.LADDERS
-    "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)), "m3": (("in^3", INCH**-3),), "rad": (DEG,),
-    "N": (("lbf", 1 / LBF),), "N m": (("lbf in", 1 / LBF / INCH),), "J": (("in lbf", 1 / LBF / INCH),),
-    "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
-    "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
 FILES = (("summary.json", "measures, outcome, warnings, what ran"),
@@ -34,56 +26,9 @@ def matched(value, error=None) -> tuple:
     return (texts[0] if value is not None else DASH), texts[1] or DASH
 
 
-def units(name: str, value: float, unit: str) -> list:
-    """Units [(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first.
-
-    value and unit: in SI; value times scale is in the unit.
-    """
-    if name.endswith("fraction"):
-        return [("%", 100.0)]
-    if name.endswith("phase"):
-        return [DEG]
-    if unit == "m s-2":
-        return [("g", 1 / G)]
-    ladders = [table[unit] for table in (scales.LADDERS, WORKSHOP) if unit in table]
-    return [scales.step_of(ladder, value) for ladder in ladders]
-
-
-def pair(name: str, measure: dict) -> str:
-    """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`."""
-    value, error = measure["value"], measure["error"]
-    unit, scale = (units(name, value, measure["unit"]) or [("" if measure["unit"] == "1" else measure["unit"], 1.0)])[0]
-    value, error = matched(value * scale, None if error is None else error * scale)
-    return f"{value} {unit}".strip() if error.startswith("&") else f"{value} ± {error} {unit}".strip()
-
-
-def others(name: str, measure: dict) -> str:
-    """The value in its other units, to the digits its error allows; nothing for a value that is zero within it."""
-    value, error = measure["value"], measure["error"]
-    if value is None or not isfinite(value) or abs(value) <= (error or 0.0):
-        return ""
-    out = []
-    for unit, scale in units(name, value, measure["unit"]):
-        if scale == 1.0 or abs(value) * scale < 1e-3:
-            continue
-        sharp = error is None or error < 1e-4 * abs(value)
-        text = f"{value * scale:.5g}" if sharp else matched(value * scale, error * scale)[0]
-        out.append(f"{text} {unit}")
-    return " = ".join(out)
-
-
-def cycles(data: dict) -> float | None:
-    """Cycles of the drive that were run, None where the run has none."""
-    period = data.get("loop", {}).get("period")
-    if period:
-        time = data["history"]["time"]
-        return float(time[-1] - time[0]) / period
-    return tomllib.loads(data["resolved"]).get("slide", {}).get("cycles")
-
-
 def part_of_cycle(data: dict) -> bool:
     """Whether the run ended before its first cycle did."""
-    count = cycles(data)
+    count = data.get("cycles")
     return count is not None and count < 1 - 1e-6
 
 
@@ -94,30 +39,9 @@ def pressed(data: dict) -> bool:
 
 def verdict(data: dict) -> str:
     """The answer of a run in a few sentences of HTML, with the error of each number."""
-    summary, parts = data["summary"], []
-    measures, outcome = summary["measures"], summary["outcome"]
-
-    def said(name, text):
-        found = measures.get(name)
-        if found and found["value"] is not None:
-            parts.append(text.format(f"<span class=v>{escape(pair(name, found))}</span>"))
-
-    if outcome != "no_contact":
-        said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
-        said("relative_displacement_amplitude_steady", "it would settle at {}")
-        said("absolute_acceleration_peak", "peak acceleration {}")
-        if "relative_displacement_amplitude" not in measures:
-            said("friction_ratio_peak", "friction ratio peaks at {}")
-        if not part_of_cycle(data):
-            said("loop_area", "{} dissipated per cycle")
-        said("contact_fraction", "contact on {} of the length")
-        if summary["kind"] == "patch":
-            said("pressure_peak", "peak pressure {}")
-    text = "; ".join(parts)
-    if part_of_cycle(data) and text:
-        text = f"in {cycles(data):.2g} of a cycle {text}"
-    answer = f"<b>{escape(outcome)}</b>: {escape(data['sentence'])}{escape(curves.regime(data.get('steady')))}"
-    return f"{answer} {text[0].upper() + text[1:]}." if text else answer
+    answer = f"<b>{escape(data['summary']['outcome'])}</b>: {escape(data['sentence'])}"
+    text = headline(data["summary"], data.get("cycles"), lambda number: f"<span class=v>{escape(number)}</span>")
+    return f"{answer}{escape(curves.regime(data.get('steady')))} {text}".strip()
 
 
 def page(data: dict) -> str:
@@ -228,7 +152,7 @@ def _loop(data: dict) -> Picture | None:
     own = data["loop"]
     whole = "window" not in data or part_of_cycle(data)
     span = "the whole run" if whole else f"the last {(own['time'][-1] - own['time'][0]) / own['period']:.3g} cycles"
-    title = "Friction force against slide" if part_of_cycle(data) or cycles(data) is None else "Friction loop"
+    title = "Friction force against slide" if part_of_cycle(data) or data.get("cycles") is None else "Friction loop"
     return Picture(pictures.loop, (own["slide"], own["force"], title),
                    f"Resultant friction force against the slide of the interface, over {span}.")
 
@@ -244,7 +168,7 @@ def _histories(data: dict) -> Picture | None:
     late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
     window = {k: v[late] for k, v in w.items()}
     count = (window["time"][-1] - window["time"][0]) / period
-    title = f"The run's {count:.2g} cycles" if count >= cycles(data) - 1e-6 else f"Last {count:.2g} cycles"
+    title = f"The run's {count:.2g} cycles" if count >= data.get("cycles") - 1e-6 else f"Last {count:.2g} cycles"
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
     caption = "Displacement over the whole run; displacement, and acceleration of block and base, at its end."
     begin = pictures.whole_from(history["time"], period, w["time"][0])
@@ -349,8 +273,8 @@ def _measures(data: dict) -> Section:
             cells += (f"<td class=n>{error}</td><td class=v>{escape(m['unit'])}</td>"
                       f"<td>{escape(others(name, m))}</td>")
         rows.append(f"<tr>{cells}<td class=soft>{escape(means.get(name, ''))}</td></tr>")
-    note = (f"<p class=soft>The run holds {cycles(data):.2g} of a cycle: measures per cycle are not those of a whole "
-            "one.</p>") if part_of_cycle(data) else ""
+    note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle: measures per cycle are not those of a "
+            "whole one.</p>") if part_of_cycle(data) else ""
     return Section("measures", "Measures", "<div class=across><table><tr><th>measure<th class=n>value<th class=n>error "
                    f"(±)<th>unit<th>in other units<th>what it is</tr>{''.join(rows)}</table></div>{note}")
 

@@ -5,7 +5,7 @@ from ..runs.results.result import Result
 from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
 from .report import page, picture
-from .summary import summary_of, versions
+from .summary import cycles_of, summary_of, versions
 
 
 def report_data(result: Result) -> dict:
@@ -13,7 +13,8 @@ def report_data(result: Result) -> dict:
     model, r, w = result.plan.model, result.response, result.window
     source = model.source
     data = {"name": source.path.stem, "summary": summary_of(result), "scene": source.text, "resolved": source.resolved,
-            "sentence": result.outcome.sentence, "engine": result.extra.get("engine", ""), "fields": result.fields,
+            "sentence": result.outcome.sentence, "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
+            "fields": result.fields,
             "x": None if result.patch is None else result.patch.x, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}
     if "curve" in result.extra:

@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+import tomllib
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -52,6 +53,14 @@ def summary_of(result: Result) -> dict:
                      effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
                      result.seconds)
     return answer | {"numerics": chosen(result)}
+
+
+def cycles_of(result: Result) -> float | None:
+    """Cycles of the drive, or of the slide, that were run; None where the run has none."""
+    r, period = result.response, result.extra.get("period")
+    if r is not None and period and result.plan.kind != "bench":
+        return float(r.time[-1] - r.time[0]) / period
+    return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")
 
 
 def effects_of(result: Result) -> list:

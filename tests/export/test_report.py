@@ -18,7 +18,7 @@ from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
 from patchfem.export import report, scales
 from patchfem.export.drawing import pictures
-from patchfem.export.pages import charts
+from patchfem.export.pages import charts, words
 from patchfem.scene.keys.quantities import KINDS
 
 PERIOD, MIL = 1 / 143, 25.4e-6
@@ -34,7 +34,7 @@ def base(kind, outcome, effects, measures, title="a title") -> dict:
     """What every page is made of; the rest is added per kind."""
     rows = [{"effect": name, "equations": "a < b & c", "seconds": 0.1} for name in effects]
     return {"name": "scene-file", "scene": 'title = "<b>"', "resolved": "", "sentence": Outcome(outcome).sentence,
-            "engine": "", "fields": {}, "x": None, "versions": {"python": "3"},
+            "engine": "", "fields": {}, "x": None, "cycles": None, "versions": {"python": "3"},
             "summary": {"patchfem": "0", "title": title, "kind": kind, "outcome": outcome, "measures": measures,
                         "effects": rows, "not_in_scene": ["wear"], "warnings": [], "notes": [],
                         "seconds": {"total": 1.0}}}
@@ -71,7 +71,8 @@ def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "st
     rows = [SimpleNamespace(frequency=143.0, input=5 * G_N, acceleration=6 * G_N, displacement=0.23 * MIL, flag=""),
             SimpleNamespace(frequency=143.0, input=8 * G_N, acceleration=None, displacement=None, flag="U")]
     return data | {
-        "engine": "march", "history": {"time": time, "displacement": whole, "force": 30 * wave[time.size]},
+        "engine": "march", "cycles": cycles,
+        "history": {"time": time, "displacement": whole, "force": 30 * wave[time.size]},
         "window": {"time": late, "displacement": 1.4808e-5 * end, "acceleration": 50 * end, "base": 49 * end},
         "loop": {"slide": 1.4808e-5 * end, "force": 30 * np.cos(2 * np.pi * late / PERIOD), "time": late,
                  "period": PERIOD},
@@ -84,8 +85,7 @@ def bench() -> dict:
                                                                       "loop_area": measure(1e-3, "J", 1e-9)})
     time = np.linspace(0, 0.02, 401)
     slide, force = 1e-5 * np.sin(200 * np.pi * time), 30 * np.cos(200 * np.pi * time)
-    return data | {"resolved": "[slide]\ncycles = 2.0\n", "history": {"time": time, "displacement": slide,
-                                                                     "force": force},
+    return data | {"cycles": 2.0, "history": {"time": time, "displacement": slide, "force": force},
                    "loop": {"slide": slide, "force": force, "time": time}}
 
 
@@ -258,11 +258,11 @@ def test_always_rounding_hides_less_than_the_error(size, share):
     ("absolute_acceleration_peak", 5 * G_N, "m s-2", None, "5 g"),
     ("energy_balance", 1e-13, "1", 0.0, "")])
 def test_exact_units_follow_the_size(name, value, unit, error, text):
-    assert report.others(name, measure(value, unit, error)) == text
+    assert words.others(name, measure(value, unit, error)) == text
 
 
 def test_exact_units_are_those_of_the_unit_table():
-    for table in (scales.LADDERS, report.WORKSHOP):
+    for table in (scales.LADDERS, words.WORKSHOP):
         for unit, ladder in table.items():
             known = KINDS.get(KIND.get(unit), {})
             for name, scale in ladder:

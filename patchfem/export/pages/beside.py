@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ..report import pair, units
 from ..scales import LADDERS, axis_unit
 from .charts import COLOURS, mark
 from .document import Section, document
 from .sweep import NUMBER, label
+from .words import pair, units
 
 POINTS = 4000  # of one line in a picture
 CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole

@@ -17,7 +17,7 @@ from ...surface.roughness.filter import even
 from ...surface.roughness.parameters import Heights
 from ...surface.roughness.spectrum import BAND
 from ..drawing.inline import CSS, placed
-from ..report import pair
+from ..pages.words import pair
 from ..scales import LADDERS, step_of
 from . import compare_pictures as pictures
 

@@ -1,0 +1,132 @@
+"""The answer of a run in words and in the units that people read: its headline, its measures in groups."""
+
+import re
+from collections.abc import Callable
+from math import isfinite, pi
+
+from ...core import rounded
+from ...response.rows import TABLE as MOTION
+from ...runs.results.patch_rows import TABLE as STATIC
+from ...runs.results.result import Result
+from .. import scales
+
+G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
+DEG = ("deg", 180 / pi)
+WORKSHOP = {  # as scales.LADDERS
+    "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)), "m3": (("in^3", INCH**-3),), "rad": (DEG,),
+    "N": (("lbf", 1 / LBF),), "N m": (("lbf in", 1 / LBF / INCH),), "J": (("in lbf", 1 / LBF / INCH),),
+    "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
+    "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
+GROUPS = ("motion", "friction", "energy", "patch", "wear")
+
+
+def units(name: str, value: float, unit: str) -> list:
+    """Units [(unit, scale)] in which a person reads the measure `name`, by its size; the metric one first.
+
+    value and unit: in SI; value times scale is in the unit.
+    """
+    if name.endswith("fraction"):
+        return [("%", 100.0)]
+    if name.endswith("phase"):
+        return [DEG]
+    if unit == "m s-2":
+        return [("g", 1 / G)]
+    ladders = [table[unit] for table in (scales.LADDERS, WORKSHOP) if unit in table]
+    return [scales.step_of(ladder, value) for ladder in ladders]
+
+
+def pair(name: str, measure: dict) -> str:
+    """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`; a dash without a value."""
+    value, error = measure["value"], measure["error"]
+    if value is None:
+        return "-"
+    plain = "" if measure["unit"] == "1" else measure["unit"]
+    unit, scale = (units(name, value, measure["unit"]) or [(plain, 1.0)])[0]
+    value, error = rounded(value * scale, None if error is None else error * scale)
+    return (f"{value} ± {error} {unit}" if error else f"{value} {unit}").strip()
+
+
+def others(name: str, measure: dict) -> str:
+    """The value in its other units, to the digits its error allows; nothing for a value that is zero within it."""
+    value, error = measure["value"], measure["error"]
+    if value is None or not isfinite(value) or abs(value) <= (error or 0.0):
+        return ""
+    out = []
+    for unit, scale in units(name, value, measure["unit"]):
+        if scale == 1.0 or abs(value) * scale < 1e-3:
+            continue
+        sharp = error is None or error < 1e-4 * abs(value)
+        text = f"{value * scale:.5g}" if sharp else rounded(value * scale, error * scale)[0]
+        out.append(f"{text} {unit}")
+    return " = ".join(out)
+
+
+def headline(summary: dict, cycles: float | None, number: Callable[[str], str] = str) -> str:
+    """The measures that answer first, as one sentence; "" where there is none.
+
+    summary: as summary.json holds it; cycles: of the drive that were run, None where it has none; number: marks a
+    value with its error in the text.
+    """
+    measures, parts = summary["measures"], []
+    whole = cycles is None or cycles >= 1 - 1e-6
+
+    def said(name: str, text: str) -> None:
+        found = measures.get(name)
+        if found and found["value"] is not None:
+            parts.append(text.format(number(pair(name, found))))
+
+    if summary["outcome"] != "no_contact":
+        said("relative_displacement_amplitude", "the block moves {} half peak-to-peak")
+        said("relative_displacement_amplitude_steady", "it would settle at {}")
+        said("absolute_acceleration_peak", "peak acceleration {}")
+        if "relative_displacement_amplitude" not in measures:
+            said("friction_ratio_peak", "friction ratio peaks at {}")
+        if whole:
+            said("loop_area", "{} dissipated per cycle")
+        said("contact_fraction", "contact on {} of the length")
+        if summary["kind"] == "patch":
+            said("pressure_peak", "peak pressure {}")
+    text = "; ".join(parts)
+    if text and not whole:
+        text = f"in {cycles:.2g} of a cycle {text}"
+    return f"{text[0].upper() + text[1:]}." if text else ""
+
+
+def least_known(result: Result) -> str:
+    """The measure known least well for the tolerance, as one sentence; "" where one misses it, which a warning says."""
+    tolerance = result.plan.model.accuracy.tolerance
+    wide = {name: one.error / (tolerance * abs(one.value) + one.floor) for name, one in result.measures.items()
+            if one.value and one.error is not None}
+    name = max(wide, key=wide.get, default="")
+    if not name or wide[name] > 1:
+        return ""
+    one = result.measures[name]
+    found = pair(name, {"value": one.value, "error": one.error, "unit": one.unit})
+    return f"Every measure with an error meets the tolerance {tolerance:g}; least well {name}, {found}."
+
+
+def group_of(name: str, pressed: bool = True) -> str:
+    """The group, one of GROUPS, of a measure by its name; that of one of several interfaces ends in its number.
+
+    pressed: a patch was pressed, so that what it shares with a point, the load, is its own.
+    """
+    for table in (STATIC, MOTION) if pressed else (MOTION, STATIC):
+        for known in (name, re.sub(r"_\d+$", "", name)):
+            if known in table:
+                return table[known].group
+    return GROUPS[0]
+
+
+def table_of(measures: dict) -> list[str]:
+    """Lines of all measures in their groups, each with its error in people's units, or why it has no value."""
+    width = max(map(len, measures), default=0)
+    out, pressed = [], "contact_fraction" in measures
+    for group in GROUPS:
+        lines = [f"  {name:<{width}}  {_value(name, one)}" for name, one in measures.items()
+                 if group_of(name, pressed) == group]
+        out += [group, *lines] if lines else []
+    return out
+
+
+def _value(name: str, one: dict) -> str:
+    return f"- ({one['reason']})" if one.get("reason") else pair(name, one)

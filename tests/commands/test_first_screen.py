@@ -1,0 +1,90 @@
+"""What a run says: the verdict first, numbers as people read them, nothing where it is to be quiet."""
+
+import json
+import re
+
+import pytest
+from command_line import cli
+
+from patchfem.commands import shared
+from patchfem.core import Outcome
+from patchfem.export.pages.words import GROUPS, group_of, headline, pair, table_of
+from patchfem.response.rows import ROWS as MOTION
+from patchfem.runs.results.patch_rows import ROWS as STATIC
+from patchfem.scene.keys.quantities import KINDS
+from patchfem.scene.starting import text_of
+
+UNIT = {"g": 9.80665, "%": 0.01, "deg": KINDS["angle"]["deg"]}
+
+
+def run(tmp_path, kind, *words, **keys):
+    path = tmp_path / f"{kind}.toml"
+    path.write_text(text_of(kind), "utf-8")
+    sets = [word for key, value in keys.items() for word in ("--set", f"{key.replace('__', '.')}={value}")]
+    return cli("run", path, "-o", tmp_path / "out", "--no-page", *sets, *words)
+
+
+def in_si(text: str) -> float:
+    """The value of a text such as 14.80 ± 0.05 um."""
+    number, _, unit = re.fullmatch(r"(\S+)( ± \S+)?(?: (\S.*))?", text).groups()
+    known = {name: scale for units in KINDS.values() for name, scale in units.items() if name != "g"} | UNIT
+    return float(number) * known.get(unit, {"mJ": 1e-3, "uJ": 1e-6, "J": 1.0, "mN": 1e-3, None: 1.0}.get(unit, 1.0))
+
+
+def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
+    """Each within what its last digit hides; the title, the outcome and the headline stand above the groups."""
+    answer = run(tmp_path, "rig")
+    lines = answer.out.splitlines()
+    measures = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["measures"]
+    assert lines[0] == "A rubbing block on flexures, shaken at one frequency"
+    assert lines[1] == f"steady: {Outcome.STEADY.sentence}"
+    amplitude = pair("relative_displacement_amplitude", measures["relative_displacement_amplitude"])
+    assert lines[2].startswith(f"The block moves {amplitude} half peak-to-peak; peak acceleration ")
+    assert lines[3].startswith("Every measure with an error meets the tolerance 0.001; least well ")
+    shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
+    assert set(shown) == set(measures)
+    for name, text in shown.items():
+        one = measures[name]
+        assert in_si(text) == pytest.approx(one["value"], rel=1e-5, abs=(one["error"] or 0) / 10), name
+    assert [line for line in lines if line in GROUPS] == ["motion", "friction", "energy"]
+
+
+def test_always_every_measure_has_its_group():
+    assert {row.group for row in (*MOTION, *STATIC)} == set(GROUPS)
+    assert group_of("normal_load") == "patch" and group_of("normal_load", pressed=False) == "friction"
+    assert group_of("pressure_peak") == "patch" and group_of("slip_amplitude_2") == "friction"
+    assert group_of("worn_volume") == "wear" and group_of("loop_area") == "energy" and group_of("level_9") == "motion"
+    found = {"value": 1.0, "unit": "1", "error": None}
+    assert table_of({"loop_area": found | {"reason": "stuck"}, "pressure_peak": found}) == [
+        "energy", "  loop_area      - (stuck)", "patch", "  pressure_peak  1"]
+
+
+def test_always_what_misses_the_tolerance_is_said_before_the_table(tmp_path):
+    answer = run(tmp_path, "bench", accuracy__steps_per_cycle=100)
+    assert answer.err.startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
+    assert "meets the tolerance" not in answer.out
+
+
+@pytest.mark.parametrize("words, out", [(("-q",), ""), (("-q", "--json"), "{")])
+def test_exact_a_quiet_run_says_nothing(tmp_path, words, out):
+    answer = run(tmp_path, "bench", *words)
+    assert answer.code == 0 and answer.err == "" and answer.out[:1] == out
+    assert (tmp_path / "out" / "summary.json").is_file()
+
+
+def test_exact_progress_as_lines(capsys):
+    """One line in ten seconds at most, with what is left at the pace so far."""
+    times = iter([0.0, 4.0, 11.0, 15.0, 40.0])
+    lines = shared.Lines(lambda: next(times))
+    for share in (0.1, 0.25, 0.3, 1.0):
+        lines(share)
+    assert capsys.readouterr().err == "25% done, about 33 s left\n100% done, about 0 s left\n"
+
+
+@pytest.mark.parametrize("cycles, text", [
+    (None, "Friction ratio peaks at 0.3; 2.00 ± 0.10 mJ dissipated per cycle."),
+    (0.4, "In 0.4 of a cycle friction ratio peaks at 0.3.")])
+def test_exact_a_headline(cycles, text):
+    measures = {"friction_ratio_peak": {"value": 0.3, "unit": "1", "error": None},
+                "loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
+    assert headline({"kind": "bench", "outcome": "done", "measures": measures}, cycles) == text
