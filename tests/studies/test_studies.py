@@ -31,17 +31,21 @@ def test_always_the_fixture_decides_the_contact_fraction():
 
 
 def test_figure_13_curves_of_the_study(tmp_path):
-    rows = {row["order"]: row for row in study("report/figure_13.py").main(tmp_path / "figure.svg")}
+    one = study("report/figure_13.py")
+    rows = {row["order"]: row for row in one.main(tmp_path / "figure.svg")}
     assert list(rows) == [-0.5, 0.0, 1.0, 2.0]
     assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
     assert [rows[p]["top_at"] for p in (0.0, 1.0, 2.0)] == [0, 1, 2]
     assert (rows[1]["top"], rows[2]["top"]) == pytest.approx((0.3679, 0.2707), abs=5e-5)
+    assert f"to {rows[1]['top']:.4f} and {rows[2]['top']:.4f} at R = p eps" in one.ANSWER
     assert [row["nine_tenths"] for row in rows.values()] == pytest.approx([1.35, 2.30, 3.89, 5.32], abs=5e-3)
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 
 
 def test_figure_14_curve_of_the_study(tmp_path):
-    rows = study("report/figure_14.py").main(tmp_path / "figure.svg")
+    one = study("report/figure_14.py")
+    rows = one.main(tmp_path / "figure.svg")
     assert [weight for _, weight, _ in rows] == pytest.approx([0.3989, 0.2420, 0.0540, 0], abs=5e-5)
     assert [share for *_, share in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
+    assert f"{100 * rows[1][2]:.1f} and {100 * rows[2][2]:.1f} % of a bond" in one.ANSWER
     assert "<svg" in (tmp_path / "figure.svg").read_text()
