@@ -1,0 +1,89 @@
+"""A modal test of a rig: a random base acceleration, the motion marched, H1 of two accelerometers, a mode fitted.
+
+The record is straight between its rows, so the spectrum that moves the block on the base is that of the rows times
+sinc^2(f/RATE): what H1 differs from 1 is divided by it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import signal
+from scipy.optimize import least_squares
+
+import patchfem as pf
+from patchfem.dynamics.march.march import march, warm_up
+from patchfem.runs.rig.interface import model_of
+from patchfem.runs.rig.numerics import choose
+from patchfem.structure.drives import Recorded
+
+G, RATE, STEPS = 9.80665, 4000.0, 32  # rows per second; rows that count as a cycle
+BAND = (20.0, 400.0)  # of the random base [Hz]
+
+
+class Test(NamedTuple):
+    """Samples at RATE of a random test: acceleration of base and block [m s-2], the block's displacement [m] and
+    velocity [m/s] on the base."""
+
+    base: np.ndarray
+    block: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+
+
+class Estimate(NamedTuple):
+    """H1 of block over base acceleration: f (k,) [Hz], h (k,) complex, coherence (k,)."""
+
+    f: np.ndarray
+    h: np.ndarray
+    coherence: np.ndarray
+
+    def between(self, low: float, high: float) -> "Estimate":
+        """The part between two frequencies [Hz]."""
+        inside = (self.f >= low) & (self.f <= high)
+        return Estimate(self.f[inside], self.h[inside], self.coherence[inside])
+
+
+def random_base(seconds: float, rms: float, seed: int = 1) -> Recorded:
+    """A normal random record, even over BAND; rms in g."""
+    count = int(seconds * RATE)
+    f, random = np.fft.rfftfreq(count, 1 / RATE), np.random.default_rng(seed)
+    lines = (random.standard_normal(f.size) + 1j * random.standard_normal(f.size)) * ((f > BAND[0]) & (f < BAND[1]))
+    value = np.fft.irfft(lines, count)
+    value *= rms * G / value.std()
+    value[0] = 0.0
+    return Recorded(np.arange(count) / RATE, value, STEPS / RATE)
+
+
+def tested(scene, seconds: float, rms: float, seed: int = 1) -> Test:
+    """The rig of a scene (path or text, without [contact]) under `random_base` from rest."""
+    model = pf.build(scene)
+    drive, modes = random_base(seconds, rms, seed), model.rig.modes
+    contact, cycles = model_of(model, choose(model), None), int(seconds * RATE) // STEPS - 1
+    warm_up(modes, drive, contact)
+    seen = march(modes, drive, contact, cycles, STEPS, cycles).window
+    return Test(seen.base_acceleration, seen.acceleration, seen.output, seen.output_rate)
+
+
+def h1(test: Test, seconds: float) -> Estimate:
+    """H1 = S_xy/S_xx by Hann windows of so many seconds that overlap by half."""
+    how = {"fs": RATE, "nperseg": int(seconds * RATE)}
+    f, input_power = signal.welch(test.base, **how)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        h = 1 + signal.csd(test.base, test.block - test.base, **how)[1] / input_power / np.sinc(f / RATE)**2
+        return Estimate(f, h, signal.coherence(test.base, test.block, **how)[1])
+
+
+def transmitted(f, frequency: float, damping: float):
+    """Absolute over base acceleration of one mode, (f_0^2 + 2 i zeta f_0 f)/(f_0^2 - f^2 + 2 i zeta f_0 f)."""
+    damper = 2j * damping * frequency * np.asarray(f)
+    return (frequency**2 + damper) / (frequency**2 - np.asarray(f)**2 + damper)
+
+
+def fitted(seen: Estimate) -> tuple:
+    """(frequency [Hz], damping, rms of the logarithm that is left) of one mode with this `transmitted`."""
+    def missed(p):
+        left = np.log(transmitted(seen.f, *p) / seen.h)
+        return np.concatenate([left.real, left.imag])
+
+    found = least_squares(missed, [145.0, 0.3])
+    return float(found.x[0]), float(found.x[1]), float(np.sqrt(2 * np.mean(found.fun**2)))
