@@ -51,20 +51,26 @@ class Computed:
         model, found = self.asked.model(values), {}
         with placed(model.source):
             patch = self._pressed(model)
-            watcher = Watcher(model, patch, self.say)
+            whole = self.reading[0] not in ("peak", "fundamental")
+            watcher = Watcher(model, patch, self.say, whole)
             for k in conditions:
                 self.runs += 1
                 if not watcher.by:
-                    watcher = Watcher(self.asked.at(model, k), patch, self.say)
+                    watcher = Watcher(self.asked.at(model, k), patch, self.say, whole)
                 seen = watcher(self.asked.sine(k), self.near.get(k) if self.warm else None)
                 if seen is None:
                     self.near.pop(k, None)
                     found[k] = np.inf, np.inf
                     continue
                 self.near[k] = seen.near
-                shown = reading(seen.window, self.asked.sine(k), seen.acceleration, *self.reading)
-                found[k] = shown, seen.displacement
+                found[k] = self._shown(seen, self.asked.sine(k)), seen.displacement
         return found
+
+    def _shown(self, seen, drive) -> float:
+        """What the accelerometer shows [m s-2] without its gain."""
+        if self.reading[0] == "fundamental" and seen.fundamental is not None:
+            return abs(seen.fundamental)
+        return reading(seen.window, drive, seen.acceleration, *self.reading)
 
     def _pressed(self, model):
         """The pressed patch of a model, made once where no free key moves it; None under [normal]."""

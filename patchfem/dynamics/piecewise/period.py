@@ -10,6 +10,8 @@ from ...core import ModalBasis, NotConverged, PatchfemError
 from .elements import Memory, sorted_stretches, table_of, virgin
 from .plant import books_of, clock_of, place, plant_of, room_of
 
+SIGNED = "place", "way", "at", "side", "force", "slip"  # what of a memory turns over with the motion
+
 
 class Point(NamedTuple):
     """State at phase 0 of the drive: motion (2 n,) coordinates [m] and rates [m/s], and memory of the elements."""
@@ -20,8 +22,10 @@ class Point(NamedTuple):
     @property
     def turned(self) -> tuple:
         """(interfaces (d,), groups (d,)) of the turning places that the memory holds."""
-        rows = np.arange(self.memory.side.shape[1]) < self.memory.depth[:, None]
-        return np.nonzero(rows & (self.memory.side != 0))
+        found = [np.flatnonzero(row[:deep]) for row, deep in zip(self.memory.side, self.memory.depth.tolist())]
+        if len(found) == 1:
+            return np.zeros_like(found[0]), found[0]
+        return np.repeat(np.arange(len(found)), [part.size for part in found]), np.concatenate(found)
 
     @property
     def numbers(self) -> np.ndarray:
@@ -33,12 +37,6 @@ class Point(NamedTuple):
         memory, count = copied(self.memory), self.motion.size
         memory.at[self.turned] = numbers[count:]
         return Point(np.array(numbers[:count]), memory)
-
-    def turned_over(self) -> "Point":
-        """The Point with every sign changed."""
-        memory = self.memory
-        over = {name: -getattr(memory, name) for name in ("place", "way", "at", "side", "force", "slip")}
-        return Point(-self.motion, copied(memory)._replace(**over))
 
 
 def copied(memory: Memory) -> Memory:
@@ -65,17 +63,23 @@ class Map:
 
 
 class PeriodMap:
-    """The map of modes behind Elements of every interface, `groups`."""
+    """The map of modes behind Elements of every interface, `groups`.
+
+    What the compiled run works in is made once and filled for each map.
+    """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.kernels = load("dynamics.piecewise.slope_kernels")
+        self.follow = load("dynamics.piecewise.slope_kernels").follow
         self.groups, self.plant, self.table = tuple(groups), plant_of(modes), table_of(groups)
         self.faces, self.n, self.room = self.plant.faces, modes.omega.size, room_of(self.plant)
         self.spare = np.zeros((2, self.n)), np.zeros(len(self.groups)), np.zeros_like(self.room.coefs)
+        self.still, self.books = virgin(self.table, np.zeros(len(self.groups))), books_of(2, np.zeros(2))
+        self.memory, self.carried = copied(self.still), {}
+        self.drive, self.clock = None, None
 
     def rest(self) -> Point:
         """The Point at rest, no element stretched."""
-        return Point(np.zeros(2 * self.n), virgin(self.table, np.zeros(len(self.groups))))
+        return Point(np.zeros(2 * self.n), copied(self.still))
 
     def placed(self, point: Point) -> Memory:
         """The memory of a Point with its place and slip as they follow from the motion."""
@@ -86,30 +90,49 @@ class PeriodMap:
             memory.slip[f] = share @ (memory.place[f] - sorted_stretches(one, memory, f)) / max(share.sum(), 1e-300)
         return memory
 
+    def begin(self, drive, point: Point) -> np.ndarray:
+        """Put clock, books and memory to the start of a period of a sine, in a Point; its motion (2, n), a copy.
+
+        PatchfemError for a drive that does not repeat.
+        """
+        if drive is not self.drive:
+            if len(drive.segments) != 1:
+                raise PatchfemError("drive: a periodic motion needs one sine that goes on; march this one")
+            self.drive, self.clock = drive, clock_of(drive, len(self.groups))
+        motion, clock, books = point.motion.reshape(2, self.n).copy(), self.clock, self.books
+        for mine, given in zip(self.memory, point.memory):
+            mine[...] = given
+        self.memory.place[:] = self.faces @ motion[0]
+        clock.now[:], clock.rest[:], books.ledger[:], books.limits[1] = 0.0, 0.0, 0.0, 0.0
+        books.extremes[:] = np.inf, -np.inf
+        return motion
+
     def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> Map:
         """The Map of a Point over a period of a sine, or over half of one. NotConverged where events pile up,
         PatchfemError for a drive that does not repeat; without `slopes` that of the Map is empty."""
-        if len(drive.segments) != 1:
-            raise PatchfemError("drive: a periodic motion needs one sine that goes on; march this one")
-        n, memory, motion = self.n, copied(point.memory), point.motion.reshape(2, self.n).copy()
-        memory.place[:] = self.faces @ motion[0]
+        n, motion, memory, period = self.n, self.begin(drive, point), self.memory, drive.period
         face, group = point.turned
         size = 2 * n + face.size if slopes else 0
-        slope, marks = np.zeros((2, n, size)), np.zeros((*memory.at.shape, size))
+        slope, marks = self._carried(size)
         if slopes:
-            slope[0, :, :n], slope[1, :, n:2 * n] = np.eye(n), np.eye(n)
+            slope[:], marks[:, :memory.depth.max(initial=0)] = np.eye(2 * n, size).reshape(2, n, size), 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
         seen = np.array([memory.slipping, memory.depth])
-        books, period = books_of(2, np.zeros(2)), drive.period
-        pieces = self.kernels.follow(place(period / 2 if half else period, period), motion, slope, marks, self.plant,
-                                     self.table, memory, clock_of(drive, len(self.groups)), books, self.room,
-                                     self.spare, seen)
+        pieces = self.follow(place(period / 2 if half else period, period), motion, slope, marks, self.plant,
+                             self.table, memory, self.clock, self.books, self.room, self.spare, seen)
         if pieces < 0:
             raise NotConverged("dynamics: events pile up within a period")
-        end = Point(motion.ravel(), memory)
+        end = Point(motion.ravel(), copied(memory))
         rows, columns = end.turned
         kept = 2 * n + np.flatnonzero(columns < seen[1, rows])
         out = np.concatenate([slope.reshape(2 * n, size), marks[rows, columns]])
         if half:
-            end, out = end.turned_over(), -out
-        return Map(end, out, kept, *seen, books.extremes[0], int(pieces))
+            for part in (end.motion, out, *(getattr(end.memory, name) for name in SIGNED)):
+                np.negative(part, out=part)
+        return Map(end, out, kept, *seen, self.books.extremes[0].copy(), int(pieces))
+
+    def _carried(self, size: int) -> tuple:
+        """Room for the slopes of so many numbers: of the motion (2, n, size), of turning places (i, t + 1, size)."""
+        if size not in self.carried:
+            self.carried[size] = np.zeros((2, self.n, size)), np.zeros((*self.memory.at.shape, size))
+        return self.carried[size]

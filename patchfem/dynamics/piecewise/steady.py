@@ -7,8 +7,10 @@ cycle changes (multiplier 1), is no number of the state and is left out.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from ...core import ModalBasis, NotConverged, Start, frozen_array
 from .elements import Memory
@@ -52,6 +54,20 @@ class Steady:
         return "stuck" if self.slipping == 0 else "slides" if self.slipping > 1 - 1e-12 else "partial slip"
 
 
+class Lap(NamedTuple):
+    """A Point and its Map. width [m]: size of the motion; alike: the turning places are of the same kind; scale: size
+    of every number; gap: what the numbers miss over it, of the motions alone where they are not alike; miss: its
+    largest size."""
+
+    point: Point
+    found: Map
+    width: float
+    alike: bool
+    scale: np.ndarray
+    gap: np.ndarray
+    miss: float
+
+
 def steady(modes: ModalBasis, drive, groups, near: Point | None = None, tolerance: float = 1e-12) -> Steady:
     """The periodic response to a sine that turns over after half a period, from a Point `near` it or from rest.
 
@@ -59,14 +75,19 @@ def steady(modes: ModalBasis, drive, groups, near: Point | None = None, toleranc
     method and more of the run between them do not settle, PatchfemError for a drive that does not repeat.
     """
     one = PeriodMap(modes, groups)
-    return _shot(one, drive, near or _early(one, drive, one.rest(), EARLY, True), True, tolerance)
+    return _result(one, *turning(one, drive, near, tolerance), True)
 
 
 def settled(modes: ModalBasis, drive, groups, start: Start, memory: Memory, tolerance: float = 1e-12) -> Steady:
     """The periodic motion that the run from a state at phase 0 of the drive settles to, as far as its elements have
     slipped for the last time. NotConverged as in `steady`."""
-    point = Point(np.concatenate([start.z, start.v]), memory)
-    return _shot(PeriodMap(modes, groups), drive, point, False, tolerance)
+    one, point = PeriodMap(modes, groups), Point(np.concatenate([start.z, start.v]), memory)
+    return _result(one, *_shot(one, drive, point, False, tolerance), False)
+
+
+def turning(one: PeriodMap, drive, near: Point | None = None, tolerance: float = 1e-12) -> tuple:
+    """(Lap of the motion that turns over, steps of Newton's method); arguments and errors as `steady`."""
+    return _shot(one, drive, near or _early(one, drive, one.rest(), EARLY, True), True, tolerance)
 
 
 def _early(one: PeriodMap, drive, point: Point, periods: int, half: bool) -> Point:
@@ -79,7 +100,7 @@ def _early(one: PeriodMap, drive, point: Point, periods: int, half: bool) -> Poi
 def _next(found: Map, count, half: bool) -> Point:
     """The end of a Map; of a motion that turns over without the turning places that nothing slipped past, as if these
     elements, of count (i,), had never slipped."""
-    if not half:
+    if not half or not found.least.any():
         return found.end
     memory = copied(found.end.memory)
     for f, least in enumerate(found.least):
@@ -91,61 +112,52 @@ def _next(found: Map, count, half: bool) -> Point:
     return Point(found.end.motion, memory)
 
 
-def _sizes(one: PeriodMap, drive, *points) -> np.ndarray:
-    """Sizes (2,) of place [m] and rate [m/s] of the motion through Points."""
-    omega, n = drive.segments[0].omega, one.n
-    place = max(max(np.abs(p.motion[:n]).max(), np.abs(p.motion[n:]).max() / omega) for p in points)
-    return max(place, 1e-300) * np.array([1.0, omega])
-
-
-def _scale(one: PeriodMap, drive, point: Point, end: Point) -> np.ndarray:
-    """Size of every number of a Point and its end."""
-    place, rate = _sizes(one, drive, point, end)
-    rows = np.maximum(np.abs(one.faces).sum(axis=1), 1e-300)
-    return np.concatenate([np.full(one.n, place), np.full(one.n, rate), place * rows[point.turned[0]]])
+def _lap(one: PeriodMap, drive, point: Point, half: bool) -> Lap:
+    """The Lap of a Point. NotConverged where events pile up."""
+    found, n, omega = one(drive, point, half), one.n, drive.segments[0].omega
+    a, b = point.motion, found.end.motion
+    both = np.abs([a, b])
+    width = max(float(both[:, :n].max()), float(both[:, n:].max()) / omega, 1e-300)
+    scale = np.repeat([width, width * omega], n)
+    alike = _alike(point, found.end)
+    if alike:
+        rows = np.maximum(np.abs(one.faces).sum(axis=1), 1e-300)
+        scale = np.concatenate([scale, width * rows[point.turned[0]]])
+        a, b = point.numbers, found.end.numbers
+    gap = (a - b) / scale
+    return Lap(point, found, width, alike, scale, gap, float(np.abs(gap).max()))
 
 
 def _alike(point: Point, end: Point) -> bool:
     """Whether two Points have the same numbers: turning places of the same kind."""
-    return bool(np.all(point.memory.depth == end.memory.depth)) and all(
-        np.all(a[:deep] == b[:deep])
-        for a, b, deep in zip(point.memory.side, end.memory.side, point.memory.depth))
+    a, b = point.memory, end.memory
+    return np.array_equal(a.depth, b.depth) and all(
+        np.array_equal(x[:deep], y[:deep]) for x, y, deep in zip(a.side, b.side, a.depth.tolist()))
 
 
 def _same(point: Point, end: Point) -> bool:
     """Whether two Points that are alike hold the same elements in every group, and let the same ones slip."""
     a, b = point.memory, end.memory
-    return bool(np.all(a.slipping == b.slipping) and np.all(a.way == b.way)) and all(
-        np.all(x[:deep] == y[:deep]) for x, y, deep in zip(a.upto, b.upto, a.depth))
+    return np.array_equal(a.slipping, b.slipping) and np.array_equal(a.way, b.way) and all(
+        np.array_equal(x[:deep], y[:deep]) for x, y, deep in zip(a.upto, b.upto, a.depth.tolist()))
 
 
-def _miss(one: PeriodMap, drive, point: Point, end: Point) -> float:
-    """Largest difference of two Points over the size of the motion, of the motions alone where they are not alike."""
-    if _alike(point, end):
-        return float(np.abs((end.numbers - point.numbers) / _scale(one, drive, point, end)).max())
-    size = np.repeat(_sizes(one, drive, point, end), one.n)
-    return float(np.abs((end.motion - point.motion) / size).max())
-
-
-def _shot(one: PeriodMap, drive, point: Point, half: bool, tolerance: float) -> Steady:
-    """Newton's method from a Point, and more of the run where it leads away."""
-    periods, found = LATER[0], one(drive, point, half)
-    for used in range(1, MOST + 1):
-        miss = _miss(one, drive, point, found.end)
-        size = _sizes(one, drive, point, found.end)[0] / moved_by(one, drive)
+def _shot(one: PeriodMap, drive, point: Point, half: bool, tolerance: float) -> tuple:
+    """Newton's method from a Point, and more of the run where it leads away: (Lap of the motion, steps)."""
+    periods, lap, reach = LATER[0], _lap(one, drive, point, half), moved_by(one, drive)
+    for used in range(MOST):
+        size = lap.width / reach
         if size > FAR:  # nothing bounds it: it misses ever less of its size
             break
-        better = _newton(one, drive, point, found, miss, half)
-        closed = miss <= tolerance and miss * size <= GROWN
-        if closed and _alike(point, found.end) and _same(point, found.end):
+        better = _newton(one, drive, lap, half)
+        if lap.miss <= tolerance and lap.miss * size <= GROWN and lap.alike and _same(point, lap.found.end):
             # the last step squares what is left, where it keeps the turning places
-            last = better if better is not None and _alike(better[0], better[1].end) else (point, found)
-            return _result(one, drive, *last, half, used)
+            return (better if better is not None and better.alike else lap), used
         if better is None:
-            point = _early(one, drive, _next(found, one.table.count, half), periods, half)
-            periods, found = min(2 * periods, LATER[1]), one(drive, point, half)
+            point = _early(one, drive, _next(lap.found, one.table.count, half), periods, half)
+            periods, lap = min(2 * periods, LATER[1]), _lap(one, drive, point, half)
         else:
-            point, found = better
+            point, lap = better.point, better
     raise NotConverged("dynamics: no periodic motion by the map from yield to yield; march")
 
 
@@ -155,35 +167,44 @@ def moved_by(one: PeriodMap, drive) -> float:
     return max(abs(part.amplitude) / part.omega**2 * float(np.abs(one.plant.base).max()), 1e-300)
 
 
-def _newton(one: PeriodMap, drive, point: Point, found: Map, miss: float, half: bool):
-    """A better (Point, Map) along Newton's direction, None where there is none.
+def _newton(one: PeriodMap, drive, lap: Lap, half: bool) -> Lap | None:
+    """A better Lap along Newton's direction, None where there is none.
 
     The elements of every group are those at the end of the run: they follow the motion.
     """
-    if not _alike(point, found.end):
+    if not lap.alike:
         return None
-    step = _direction(one, drive, point, found)
+    step, start = _direction(lap), lap.point.numbers
     for share in (1.0, 0.5, 0.2, 0.05):
-        trial = found.end.moved(point.numbers + share * step)
         try:
-            other = one(drive, trial, half)
+            other = _lap(one, drive, lap.found.end.moved(start + share * step), half)
         except NotConverged:
             continue
-        if _miss(one, drive, trial, other.end) < (1 - 0.4 * share) * miss:
-            return trial, other
+        if other.miss < (1 - 0.4 * share) * lap.miss:
+            return other
     return None
 
 
-def _direction(one: PeriodMap, drive, point: Point, found: Map):
-    """Newton's step (numbers,) of a Point whose end is alike."""
-    size, free = _scale(one, drive, point, found.end), np.ones(len(found.slope), bool)
+def _direction(lap: Lap) -> np.ndarray:
+    """Newton's step (numbers,) of a Lap whose ends are alike."""
+    scale, found = lap.scale, lap.found
+    left, right = (found.slope - np.eye(scale.size)) * scale / scale[:, None], lap.gap
+    if not found.kept.size:
+        return solved(left, right) * scale
+    free, step = np.ones(scale.size, bool), np.zeros(scale.size)
     free[found.kept] = False  # nothing slips past them: they stay whatever the rest does
-    left = ((found.slope - np.eye(size.size)) * size / size[:, None])[np.ix_(free, free)]
-    right = ((point.numbers - found.end.numbers) / size)[free]
-    step = np.zeros(size.size)
-    # least squares: a slide without any spring may rest anywhere
-    step[free] = np.linalg.lstsq(left, right, rcond=1e-13)[0] * size[free]
+    step[free] = solved(left[np.ix_(free, free)], right[free]) * scale[free]
     return step
+
+
+def solved(left, right) -> np.ndarray:
+    """x (n,) of left x = right; least squares where the matrix is singular to round-off, of a slide without any spring,
+    which may rest anywhere."""
+    factors, _, out, info = dgesv(left, right)
+    sizes = np.abs(factors.diagonal())
+    if info == 0 and sizes.min() > 1e-13 * sizes.max():
+        return out
+    return np.linalg.lstsq(left, right, rcond=1e-13)[0]
 
 
 def multipliers_of(found: Map, half: bool) -> np.ndarray:
@@ -195,11 +216,12 @@ def multipliers_of(found: Map, half: bool) -> np.ndarray:
     return values[np.argsort(-np.abs(values))]
 
 
-def _result(one: PeriodMap, drive, point: Point, found: Map, half: bool, used: int) -> Steady:
+def _result(one: PeriodMap, lap: Lap, used: int, half: bool) -> Steady:
+    point, found = lap.point, lap.found
     low, high = found.extremes
     limit, n = one.table.limit, one.n
     share = sum(row[k] for row, k in zip(limit, found.most)) / max(limit[:, -1].sum(), 1e-300)
     start = Start(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
-    return Steady(point, start, one.placed(point), _miss(one, drive, point, found.end),
+    return Steady(point, start, one.placed(point), lap.miss,
                   frozen_array(multipliers_of(found, half), complex),
-                  float(max(high, -low) if half else (high - low) / 2), float(share), half, used - 1)
+                  float(max(high, -low) if half else (high - low) / 2), float(share), half, used)

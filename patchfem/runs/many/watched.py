@@ -18,13 +18,16 @@ SAMPLES = 400  # of a cycle without friction
 
 
 class Watched(NamedTuple):
-    """The last cycle or cycles of a rig: window with its histories, largest absolute acceleration [m s-2] and
-    displacement amplitude [m] as a run measures them; near: a start for a motion nearby, None where there is none."""
+    """The last cycle or cycles of a rig: window with its histories, None where a Watcher is not asked for it; largest
+    absolute acceleration [m s-2] and displacement amplitude [m] as a run measures them; near: a start for a motion
+    nearby, None where there is none; fundamental: first harmonic [m s-2] of the absolute acceleration, None where only
+    the window has it."""
 
-    window: Response
+    window: Response | None
     acceleration: float
     displacement: float
     near: Any = None
+    fundamental: complex | None = None
 
 
 class Watcher:
@@ -32,11 +35,11 @@ class Watcher:
 
     patch: the solved Patch, or None under [normal]. A call with a drive (core.BaseSine) and the `near` of another
     answer gives Watched, or None where no bounded motion is found; the answer is that of `runs.run.run` to round-off
-    where no start is given.
+    where no start is given. windowed: whether histories are wanted where the engine can do without them.
     """
 
-    def __init__(self, model, patch, say=None):
-        self.model, self.patch, self.say = model, patch, say
+    def __init__(self, model, patch, say=None, windowed: bool = True):
+        self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
         steady = self.numerics.engine == HARMONIC.name
         self.by = "" if not steady else "line" if model.kind == "linear" and not model.rig.bends else steady_by(model)
@@ -54,7 +57,7 @@ class Watcher:
     def _gauged(self, seen: Watched | None) -> Watched | None:
         """The displacement at the gauge, where it moves otherwise than the accelerometer."""
         gauge = self.model.rig.modes.gauge
-        if seen is None or gauge is None:
+        if seen is None or gauge is None or seen.window is None:
             return seen
         window = seen.window
         return seen._replace(displacement=half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge))
@@ -84,20 +87,19 @@ class Watcher:
         return Watched(window, float(abs(-omega**2 * modes.output @ z + shift)), float(abs(modes.output @ z)))
 
     def _yields(self, drive, near) -> Watched:
-        from ...dynamics.piecewise import histories
-        from ...dynamics.piecewise.steady import steady
+        from ...dynamics.piecewise.orbits import Orbits
         from ..rig.pieces.run import Interfaces
 
         modes = self.model.rig.modes
-        groups = self._once("yields", lambda: Interfaces(self.model, self.numerics, self.patch)).groups
+        orbits = self._once("yields", lambda: Orbits(modes, Interfaces(self.model, self.numerics, self.patch).groups))
         try:
-            one = steady(modes, drive, groups, near)
+            seen = orbits(drive, near)
         except NotConverged:
             if near is not None or len(self.model.rig.interfaces) > 1:
                 raise
             return self._balance(drive, None)._replace(near=None)  # a start for a balance is none for a map of yields
-        done = histories.simulate(modes, drive, groups, 1.0, 1, np.inf, 0, None, one.start, one.memory)
-        return Watched(done.window, done.acceleration, done.swing, one.point)
+        window = orbits.window(drive, seen.point) if self.windowed else None
+        return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
 
     def _balance(self, drive, near) -> Watched:
         from ...dynamics.harmonic.balance import periodic_response

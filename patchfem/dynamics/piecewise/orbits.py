@@ -1,0 +1,83 @@
+"""Periodic motions at one drive after another, and what instruments see of them."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled import load
+from ...core import ModalBasis, NotConverged, Response, Start
+from . import histories
+from .elements import Memory
+from .period import PeriodMap, Point
+from .plant import books_of, plant_of
+from .steady import turning
+
+ROWS = 256  # pieces of half a period for which there is room at first
+
+
+class Seen(NamedTuple):
+    """A motion that repeats: point at phase 0 of the drive; largest absolute acceleration [m s-2] at the output and its
+    first harmonic [m s-2]; displacement [m]: half the range of the gauge."""
+
+    point: Point
+    acceleration: float
+    fundamental: complex
+    displacement: float
+
+
+class Orbits:
+    """Motions of modes behind Elements of every interface, `groups`, that repeat under one sine after another and turn
+    over after half a period.
+
+    A call with a drive (core.BaseSine) and a Point near its motion, or None for rest, gives Seen; errors as
+    `steady.steady`. A Point of other elements counts as none.
+    """
+
+    def __init__(self, modes: ModalBasis, groups):
+        self.modes, self.one, self.kernels = modes, PeriodMap(modes, groups), load("dynamics.piecewise.march_kernels")
+        self.march, self.peak = self.kernels.march, load("dynamics.piecewise.dense_kernels").peak
+        self.gauge = None if modes.gauge is None else plant_of(replace(modes, output=modes.gauge))
+        self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
+        self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
+
+    def __call__(self, drive, near: Point | None = None) -> Seen:
+        one = self.one
+        point = turning(one, drive, near if self._fits(near) else None)[0].point
+        used, swing = self._half(drive, point, one.plant)
+        high = self.peak(self.rows[:used], one.plant, one.clock, float(drive.moving), one.room)
+        first = -2 * drive.omega**2 * complex(*self.books.phasors[0]) - 1j * drive.acceleration * drive.moving
+        if self.gauge is not None:
+            swing = self._half(drive, point, self.gauge)[1]
+        return Seen(point, float(high), first, swing)
+
+    def window(self, drive, point: Point) -> Response:
+        """Histories of the period from a Point on."""
+        n, memory = self.one.n, self.one.placed(point)
+        start = Start(point.motion[:n], point.motion[n:])
+        return histories.simulate(self.modes, drive, self.one.groups, 1.0, 1, np.inf, 0, None, start, memory).window
+
+    def _fits(self, near: Point | None) -> bool:
+        """Whether a Point is one of these modes and elements."""
+        still, count = self.one.still, self.one.table.count
+        return near is not None and near.motion.size == 2 * self.one.n and near.memory.at.shape == still.at.shape \
+            and np.array_equal(_all_of(near.memory), count)
+
+    def _half(self, drive, point: Point, plant) -> tuple:
+        """(pieces, largest output [m]) of half a period from a Point, the pieces in `rows`; the other half turns
+        over."""
+        one, books, stop = self.one, self.books, (0.0, drive.period / 2)
+        while True:
+            motion = one.begin(drive, point)
+            books.ledger[:], books.phasors[:], books.limits[1], books.extremes[:] = 0.0, 0.0, 0.0, (np.inf, -np.inf)
+            code, used = self.march(stop, motion, plant, one.table, one.memory, one.clock, books, one.room, self.rows)
+            if code == self.kernels.DONE:
+                return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
+            if code != self.kernels.FULL:
+                raise NotConverged("dynamics: events pile up within a period")
+            self.rows = np.zeros((2 * len(self.rows), self.wide))
+
+
+def _all_of(memory: Memory) -> np.ndarray:
+    """Elements (i,) that a memory speaks of: those of its outermost group, or all where all slip."""
+    return np.where(memory.depth > 0, memory.upto[:, 0], memory.slipping)

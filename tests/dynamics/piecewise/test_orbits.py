@@ -1,0 +1,73 @@
+"""What instruments see of a periodic motion, against the marched period; a start of other elements."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_piecewise import basis, random_rig
+
+from patchfem.core import BaseSine, NotConverged
+from patchfem.dynamics.piecewise.elements import elements_of
+from patchfem.dynamics.piecewise.histories import simulate
+from patchfem.dynamics.piecewise.orbits import Orbits
+from patchfem.dynamics.piecewise.steady import solved, steady
+
+MODES = basis([1.0, 2.3], [0.01, 0.02], [1.0, 0.4], [1.0, 0.5], [1.0, 0.2])
+GROUP = [elements_of([2.0, 1.0], [0.1, 0.3])]
+
+
+def first_harmonic(window, omega):
+    """2/T int y exp(-i omega t) of the displacement by Simpson's rule on its cubics, from samples alone."""
+    t, y, v = window.time, window.output, window.output_rate
+    h = np.diff(t)
+    middle = (y[1:] + y[:-1]) / 2 - h / 8 * np.diff(v)
+    ends, half = y * np.exp(-1j * omega * t), middle * np.exp(-1j * omega * (t[:-1] + h / 2))
+    return 2 / (t[-1] - t[0]) * np.sum(h / 6 * (ends[:-1] + 4 * half + ends[1:]))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_exact_readings_are_those_of_a_marched_period(seed):
+    modes, drive, k, y = random_rig(seed, 12)
+    modes, group = replace(modes, gauge=modes.output[::-1].copy()), [elements_of(k, y)]
+    seen, one = Orbits(modes, group)(drive), steady(modes, drive, group)
+    done = simulate(modes, drive, group, 1.0, 1, start=one.start, memory=one.memory)
+    gauged = simulate(replace(modes, output=modes.gauge), drive, group, 1.0, 1, start=one.start, memory=one.memory)
+    assert np.array_equal(seen.point.motion, one.point.motion)
+    assert seen.acceleration == pytest.approx(done.acceleration, rel=1e-10)
+    assert seen.displacement == pytest.approx(gauged.swing, rel=1e-10)
+    moved = -drive.omega**2 * first_harmonic(done.window, drive.omega) - 1j * drive.acceleration
+    assert abs(seen.fundamental - moved) < 1e-7 * abs(moved)  # Simpson's rule on 400 samples
+
+
+def test_exact_a_motion_from_one_nearby_is_that_from_rest():
+    orbits = Orbits(MODES, GROUP)
+    near = orbits(BaseSine(1.0, 1.0)).point
+    drive = BaseSine(1.02, 1.01)
+    assert orbits(drive, near)[1:] == pytest.approx(orbits(drive)[1:], rel=1e-11)
+
+
+def test_exact_a_start_of_other_elements_counts_as_none():
+    """A memory speaks of so many elements: one of four is no start for two, nor one of two for four."""
+    drive, four = BaseSine(1.0, 1.0), [elements_of([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
+    for mine, other in ((GROUP, four), (four, GROUP)):
+        assert Orbits(MODES, mine)(drive, Orbits(MODES, other)(drive).point)[1:] == Orbits(MODES, mine)(drive)[1:]
+
+
+def test_exact_one_place_for_readings_serves_many_drives():
+    """Fresh room for every drive gives the same digits as one room for all, larger motions before or after."""
+    orbits = Orbits(MODES, GROUP)
+    for level in (1.0, 3.0, 0.2, 1.0):
+        drive = BaseSine(level, 1.05)
+        assert orbits(drive)[1:] == Orbits(MODES, GROUP)(drive)[1:]
+
+
+def test_refuses_a_motion_that_nothing_bounds():
+    with pytest.raises(NotConverged):
+        Orbits(basis([1.0], [0.0], [1.0], [1.0], [1.0]), [elements_of([1.0], [0.01])])(BaseSine(1.0, 1.0))
+
+
+def test_exact_a_step_that_is_not_determined_is_the_shortest():
+    """x + y = 2 twice: the shortest answer is (1, 1); a matrix of full rank has its only one."""
+    assert solved(np.ones((2, 2)), np.array([2.0, 2.0])) == pytest.approx([1.0, 1.0])
+    left = np.array([[4.0, 1.0], [2.0, 3.0]])
+    assert left @ solved(left, np.array([1.0, 2.0])) == pytest.approx([1.0, 2.0], rel=1e-14)
