@@ -51,8 +51,8 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
         say(f"interrupted while the page was drawn; the results in {target} are whole, without report.html")
         raise Ended(130) from None
     if answer["outcome"] == "not_converged":
-        if quiet:
-            say(f"{scene}: {written.result.outcome.sentence}")
+        for text in answer["warnings"] if quiet else ():  # the faults that a quiet run says
+            say(f"warning: {text}")
         raise NotReached
 
 
