@@ -1,10 +1,10 @@
 """The contact of a law with memory along the flanks of grooves, for marches and for slides that are given."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import Outcome, Response
 from ...friction.grooves import Grooves
 from ..contacts.arrays import Climbing, sheared
 from ..march.march import Run
@@ -92,6 +92,17 @@ class ClimbingRun(Run):
         c.memory[:] *= normal / c.before  # it was built at the slide 0
         c.before[:] = c.now[:] = normal
         self.ledger[0] += self.strained()
+
+    def response(self, rows, number) -> Response:
+        """Histories; with a lifted mass `extra` has normal_load [N], the vertical force N + m (t q'' + t' q'^2)."""
+        out, g, modes = super().response(rows, number), self.model.grooves, self.modes
+        if not g.lifted_mass:
+            return out
+        push, springs = np.outer(self.drive.values(out.time), modes.base), out.modal * modes.omega**2
+        pull = np.outer(out.force, modes.slide) / modes.mass
+        along = -(push + out.modal_rate @ modes.dampers.T + springs + pull) @ modes.slide
+        lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
+        return replace(out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift})
 
     def _judge(self, status: int) -> None:
         super()._judge(status)

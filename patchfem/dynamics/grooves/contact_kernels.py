@@ -43,25 +43,33 @@ def over(flank, q, dq):
 
 
 @njit(error_model="numpy", **LEAN)
+def drag(ds, flat, end, dt, c):
+    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.now becomes the normal force
+    flat + f end at the end, on a slope `end`, where f is the force there."""
+    kind, pulled, gain = int(c.flank[KIND]), 0.0, 0.0
+    for _ in range(60):
+        before = c.now[0]
+        press_all(kind, c)
+        pulled, gain = rub_force(ds, kind, c, 0.5 * (c.before[0] + before), dt)
+        bound = c.force[0] * before
+        after = min(max(2 * pulled - c.now_at[PLACE], -bound), bound)
+        c.now[0] = max(flat + after * end, 0.0)
+        if abs(c.now[0] - before) <= 1e-14 * c.flank[LOAD]:
+            break
+    return pulled, gain
+
+
+@njit(error_model="numpy", **LEAN)
 def pull(dq, q, dt, c):
     """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at; c.now is the normal
     force at its end. c.before is that at its start, and the force of the law there stands in c.now_at[PLACE]."""
-    flank, at, kind = c.flank, c.now_at, int(c.flank[KIND])
+    flank, at = c.flank, c.now_at
     slope, path = over(flank, q, dq)
     vertical = flank[LOAD]
     if flank[LIFTED] > 0.0:
         vertical += flank[LIFTED] * 2 * (slope * dq / dt - at[RISE]) / dt
     end = steep(flank, q + dq)
-    flat, pulled, gain = max(vertical, 0.0) * sqrt(1 + end * end), 0.0, 0.0
-    for _ in range(60):
-        before = c.now[0]
-        press_all(kind, c)
-        pulled, gain = rub_force(path * dq, kind, c, 0.5 * (c.before[0] + before), dt)
-        bound = c.force[0] * before
-        after = min(max(2 * pulled - at[PLACE], -bound), bound)
-        c.now[0] = max(flat + after * end, 0.0)
-        if abs(c.now[0] - before) <= 1e-14 * flank[LOAD]:
-            break
+    pulled, gain = drag(path * dq, max(vertical, 0.0) * sqrt(1 + end * end), end, dt, c)
     at[PULL], at[ALONG], at[MEAN_SLOPE], at[PATH], at[HELD] = vertical * slope + pulled * path, pulled, slope, path, \
         vertical
     bend = 0.5 * flank[AMPLITUDE] * flank[WAVE] * flank[WAVE] * cos(flank[WAVE] * (q + 0.5 * dq) - flank[PHASE])

@@ -61,7 +61,8 @@ def cycle_energy(periodic: Periodic, modes) -> dict:
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
     """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, force and slip of row 0.
 
-    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics.
+    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics; `extra` has
+    normal_load [N] where a law's load changes on the way.
     """
     omega, group = periodic.omega, periodic.group
     inner = samples * max(1, -(-2 * periodic.samples // samples))
@@ -83,6 +84,8 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     stretch = sum(s.stretch for s in found if s.stretch is not None)
     slip = track.q - stretch / limit if limit > 0 else np.zeros(inner)
     floor = base if drive.moving else 0 * base
+    loads = [cycle(s.load) for s in found if s.load is not None]
     return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
                     cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
-                    cycle(modes.output @ accel + floor), cycle(base), cycle(forces[0]), cycle(slip))
+                    cycle(modes.output @ accel + floor), cycle(base), cycle(forces[0]), cycle(slip),
+                    {"normal_load": loads[0]} if loads else {})

@@ -42,10 +42,11 @@ class Fading:
     limit: float | np.ndarray
 
 
-def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()) -> np.ndarray:
+def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=(), by_bend=None) -> np.ndarray:
     """Map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
 
-    rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row.
+    rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row;
+    by_bend (i, N): of the mass that rises with it [kg], None of none.
     """
     n, cells = modes.omega.size, slope.shape[1]
     size = 2 * n + len(marks) + len(fading)
@@ -60,6 +61,9 @@ def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), f
         a[:, n:2 * n, k] = -np.multiply.outer(np.broadcast_to(one.limit, cells), grip[:, one.row])
         a[:, k, n:2 * n] = one.gain[:, None] * rows[one.row]
         a[:, k, k] = -one.loss
+    if by_bend is not None:
+        risen = np.eye(n) + np.einsum("ia,in,ib->nab", rows, by_bend, rows) / modes.mass
+        a[:, n:2 * n] = np.linalg.solve(risen, a[:, n:2 * n])
     steps = exponentials(a * (2 * np.pi / cells))
     for k, mark in enumerate(marks, 2 * n):
         across = np.zeros(size)

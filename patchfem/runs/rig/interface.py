@@ -62,9 +62,11 @@ def _climbing(model: Model, patch):
 def flank_of(model: Model, patch):
     """The law along the flanks of grooves of a harmonic balance."""
     from ...dynamics.grooves.periodic import ElasticFlank, PacedFlank
+    from ...dynamics.grooves.run import refuse_heavy
 
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     if has(f.law, "memoryless"):
+        refuse_heavy(model.grooves, f.static, model.rig.modes)
         return PacedFlank(model.grooves, load, f.static, f.reference_speed)
     return ElasticFlank(_climbing(model, patch))
 

@@ -6,21 +6,25 @@ from time import perf_counter
 import numpy as np
 
 from ...compiled import load
-from ...core import BaseSine, Outcome
+from ...core import BaseSine, NotConverged, Outcome
 from ...dynamics.harmonic import branch as branches
 from ...dynamics.harmonic.balance import cycle_energy, periodic_response, regime
 from ...dynamics.harmonic.forces import Group
-from ...dynamics.harmonic.laws import Interlock, Spring
+from ...dynamics.harmonic.harmonic import pack
+from ...dynamics.harmonic.laws import Interlock, Spring, analysis
+from ...dynamics.harmonic.point import balance_of
 from ...dynamics.harmonic.point import point as periodic_point
 from ...dynamics.harmonic.stability import with_stability
+from ...dynamics.march.march import march
 from ...dynamics.second_book import gap, sampled_work
 from ...response.rows import measures_of
-from .interface import contact_model, flank_of
+from .interface import contact_model, flank_of, model_of
 from .solution import Solution, sampled_loop, seen
 from .strips import other_measures
 
 ADRIFT = ("the steady motion that the balance found over the grooves does not last: another one is reached from rest; "
           'use accuracy.method = "march"')
+CYCLES, STEPS, FEW = 30, 256, 31  # of the march that a balance over grooves starts from, and its harmonics
 SAMPLES = 1024  # of the cycle that measures are read off
 
 
@@ -40,19 +44,34 @@ class Balance:
             parts.append((rig.modes.output, Spring(0.0, rig.cubic)))
         self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
         self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
+        self.climbing = model_of(model, numerics, patch) if model.grooves is not None else None
+
+    def _from_rest(self, drive) -> np.ndarray:
+        """Unknowns of a start: the last cycle of a short march from rest, as over grooves there are several motions."""
+        done = march(self.modes, drive, self.climbing, CYCLES, STEPS, 1, whole=False)
+        if done.outcome is not None:
+            raise NotConverged(done.message)
+        slides = analysis(done.window.slide[None, -STEPS - 1:-1], FEW)
+        balance = balance_of(self.modes, self.group, 0)
+        held = sum(1 if k == 0 else 2 for k, *_ in balance.plant(drive.omega, FEW).free)
+        return np.concatenate([pack(balance.lift.T @ slides), np.zeros(held)])
 
     def point(self, drive, near=None) -> tuple:
         """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle;
-        errors from half the harmonics and the balance's own."""
+        errors from half the harmonics, twice as many over grooves, and the balance's own."""
         begin = perf_counter()
+        near = near if near is not None or self.climbing is None else self._from_rest(drive)
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
-        fewer = periodic_point(self.modes, drive, self.group, max(1, found.harmonics // 2), self.tolerance,
-                               start=near and found)
+        others = 2 * found.harmonics if self.climbing is not None else max(1, found.harmonics // 2)
+        other = periodic_point(self.modes, drive, self.group, others, self.tolerance,
+                               start=found if near is not None else None)
         stable = with_stability(found, self.modes)
         values, response, book = self._measured(found, drive)
-        rough = self._measured(fewer, drive)[0]
-        # the higher harmonics follow those of `found`, not those of `fewer`: measured, 20 times less is left out
-        errors = {name: abs(v - rough.get(name, v)) / 10 + abs(v) * min(found.error, 1.0) for name, v in values.items()}
+        rough = self._measured(other, drive)[0]
+        # the higher harmonics follow those of `found`, not those of half as many: measured, 20 times less is left out
+        share = 1.0 if self.climbing is not None else 0.1
+        errors = {name: share * abs(v - rough.get(name, v)) + abs(v) * min(found.error, 1.0)
+                  for name, v in values.items()}
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = min(errors["slip_start_phase"], np.pi / 2) + 2 * np.pi / SAMPLES
             errors["stick_fraction"] = errors.get("stick_fraction", 0.0) + 4 / SAMPLES
@@ -62,8 +81,13 @@ class Balance:
                  "residual": found.residual, "harmonics": found.harmonics}
         amplitude = np.array([values["relative_displacement_amplitude"]])
         outcome, message = Outcome.STUCK if held else Outcome.STEADY, ""
-        if self.model.grooves is not None and not stable.stable:
+        grooves, load = self.model.grooves, response.extra.get("normal_load")
+        if grooves is not None and not stable.stable:
             outcome, message = Outcome.NOT_CONVERGED, ADRIFT
+        if load is not None and load.min() <= 0:
+            from ...dynamics.grooves.run import lifts
+
+            outcome, message = Outcome.NOT_CONVERGED, lifts(grooves, response.time[int(np.argmin(load))])
         raw = Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
                        message=message)
         return raw, errors, extra

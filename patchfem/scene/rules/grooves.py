@@ -75,8 +75,6 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
              if one.on == "lower"]
     if lower:
         draft.say(lower[0], unbuilt(f"'lower' {beside}", "shapes"))
-    if draft.tables.accuracy.method == "harmonic" and grooves.lifted_mass:
-        draft.say(f"{at}.lifted_mass", unbuilt("beside accuracy.method = 'harmonic'", "march"))
     if structure is None:
         return
     if structure.stiffening is not None:
