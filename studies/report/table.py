@@ -1,0 +1,118 @@
+"""What do all studies ask and answer, what do they cost, and which figures of the report do they reproduce?
+
+See README.md in this folder, which this script writes from the studies themselves.
+
+A study that has QUESTION, ANSWER and REPRODUCED is asked for them, without running it; of the others question and
+answer stand in the gallery of studies/README.md. Seconds are CPU seconds of `python STUDY`, start and compiled code
+loaded included, as `--measure` saw them one after the other and keeps them in seconds.json; a study that has none yet,
+or that wants another program, has a dash.
+
+Run: python studies/report/table.py [--measure [STUDY ...]]
+"""
+
+import ast
+import json
+import re
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+from told import told
+
+HERE = Path(__file__).parent
+STUDIES, KEPT = HERE.parent, HERE / "seconds.json"
+QUESTION, ANSWER = told(__doc__)
+REPRODUCED = ""
+LONGEST = 300  # CPU seconds after which a measurement ends
+
+
+class Study(NamedTuple):
+    """One study: its path below studies/, question, answer, and whether a figure of the report is reproduced ("" where
+    it is none)."""
+
+    path: str
+    question: str
+    answer: str
+    reproduced: str
+
+
+def constant(tree: ast.Module, name: str) -> str | None:
+    """The text that a module gives a name, as it is written there; None without one."""
+    for line in tree.body:
+        if isinstance(line, ast.Assign) and any(isinstance(t, ast.Name) and t.id == name for t in line.targets):
+            return ast.literal_eval(line.value)
+    return None
+
+
+def studies() -> list:
+    """Every script of the gallery of studies/README.md, in its order."""
+    found, seen = [], set()
+    for line in (STUDIES / "README.md").read_text("utf-8").splitlines():
+        named = re.match(r"\| \[([\w/]+\.py)\]", line)
+        if named is None or named[1] in seen:
+            continue
+        seen.add(named[1])
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        tree = ast.parse((STUDIES / named[1]).read_text("utf-8"))
+        reproduced = constant(tree, "REPRODUCED")
+        said = cells[1:3] if reproduced is None else told(ast.get_docstring(tree))
+        found.append(Study(named[1], *(re.sub(r",? see \[below\]\([^)]*\)|See \[below\]\([^)]*\)\.", "", text)
+                                       for text in said), reproduced or ""))
+    return found
+
+
+def measured(path: str) -> float | None:
+    """CPU seconds of one study in a process of its own; None where it did not run to its end."""
+    def bounded():
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
+
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([sys.executable, str(STUDIES / path)], preexec_fn=bounded, stdout=subprocess.DEVNULL,
+                          stderr=subprocess.PIPE, text=True, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    if done.returncode:
+        print(f"{path}: exit {done.returncode} after {spent:.1f} s: {done.stderr.strip()[-200:]}", file=sys.stderr)
+    return None if done.returncode else round(spent, 1)
+
+
+def table(found: list, seconds: dict) -> str:
+    """The page in Markdown."""
+    rows = [f"| [{one.path}](../{one.path}) | {one.question} | {one.answer} | {shown(seconds.get(one.path))} | "
+            f"{one.reproduced} |" for one in found]
+    figures = [one for one in found if one.reproduced]
+    yes = sum(one.reproduced == "yes" for one in figures)
+    known = [seconds[one.path] for one in found if seconds.get(one.path) is not None]
+    return "\n".join([
+        "# All studies in one table", "Written by `table.py` from the studies; seconds are CPU seconds of one core. "
+        f"The {len(known)} of {len(found)} studies that run here by themselves take {sum(known):.0f} s together.", "",
+        f"Of {len(figures)} studies of figures of the report {yes} reproduce theirs, the others in part or not. "
+        "[The ten conclusions of the report](conclusions.md) have a table of their own.", "",
+        "| study | question | answer | seconds | figure reproduced |", "|---|---|---|---|---|", *rows, ""])
+
+
+def shown(seconds: float | None) -> str:
+    """CPU seconds as a cell."""
+    return "-" if seconds is None else f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}"
+
+
+def main(measure: list | None = None, path: Path | None = HERE / "README.md") -> list:
+    """[Study], written as a page; measure: paths to be measured, [] for all, None for none."""
+    found = studies()
+    seconds = json.loads(KEPT.read_text("utf-8")) if KEPT.exists() else {}
+    if measure is not None:
+        for one in found:
+            if one.path != "report/table.py" and (not measure or one.path in measure):
+                seconds[one.path] = measured(one.path)
+                print(f"{one.path}: {shown(seconds[one.path])} s", flush=True)
+                KEPT.write_text(json.dumps(dict(sorted(seconds.items())), indent=1) + "\n", "utf-8")
+    if path is not None:
+        path.write_text(table(found, seconds), "utf-8")
+    return found
+
+
+if __name__ == "__main__":
+    main(sys.argv[2:] if sys.argv[1:2] == ["--measure"] else None)
