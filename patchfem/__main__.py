@@ -36,7 +36,8 @@ VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, 
 NOT_BUILT = ("import",)
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
-          help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem run SCENE.")
+          help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem demo; "
+               "for a scene of your own: patchfem new.")
 for verb in VERBS:
     app.command(verb)
 app.register_install_completion_command(help="Complete commands and options in this shell (bash, zsh, fish).")

@@ -6,17 +6,19 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Out, Quiet, Refused, Sets, model_of, say, scene_of
+from .shared import Json, Out, Quiet, Refused, Sets, Units, model_of, say, scene_of, word
 
 
-def compare(before: Path, after: Path, /, *other: Path, direction: str = "", units: str = "",
-            scene: Annotated[Path | None, Parameter(name="--scene")] = None, set_: Sets = (), out: Out = None,
-            json_: Json = False, quiet: Quiet = False):
-    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page in -o DIR.
+def compare(before: Path, after: Path, /, *other: Path,
+            direction: word("x or y, along which the traces run; an areal scan has both") = "",
+            units: Units = "",
+            scene: Annotated[Path | None, Parameter(name="--scene", help="press the patch of this scene with each "
+                                                    "surface, such as rig.toml")] = None,
+            set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
+    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict, a page; two more
+    files are the pair of the other direction.
 
-    --direction x or y says along what the traces run; two more files are the pair of the other direction, and an areal
-    scan has both. --scene SCENE presses the patch of a scene with each surface. --units "mm,um" names the units of x
-    and z where the files name none.
+    Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: x or y is wanted")

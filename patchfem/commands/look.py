@@ -5,28 +5,40 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Out, Refused, say
+from .shared import Refused, out_in, say
+
+Frame = Annotated[int | None, Parameter(help="number of the frame, from 0; the last one unless given")]
 
 
-def export(folder: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], frame: int | None = None):
-    """Write the fields of a results folder as .pvd (series, for any ParaView), .vtu or .csv (last or --frame), or
-    .vtkhdf."""
+def export(folder: Path, /, *, out: Annotated[Path, Parameter(
+        name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf")],
+           frame: Frame = None):
+    """Write the fields of a results folder in another format.
+
+    Example: patchfem export out/rig -o fields.pvd
+    """
     from ..export.fields.vtu import export as write
 
     print(write(folder, out, frame))
 
 
-def view(folder: Path, /, *, out: Out = None,
-         frame: int | None = None, magnify: float | None = None):
-    """Show the pressed pieces of a results folder in a window, or draw them into -o PICTURE.png."""
+def view(folder: Path, /, *, out: out_in("picture.png in place of a window") = None, frame: Frame = None,
+         magnify: Annotated[float | None, Parameter(help="what displacements are magnified by, such as 1000")] = None):
+    """Show the pressed pieces of a results folder in a window, or draw them into a picture.
+
+    Example: patchfem view out/rig -o pieces.png
+    """
     from ..export.drawing.view import view as show
 
     show(folder, out, frame, magnify, say)
 
 
-def report(*folders: Path, out: Out = None):
+def report(*folders: Path, out: out_in("page.html, by default report.html here") = None):
     """Lay the results folders of several runs, or of several sweeps over the same keys, side by side on one page for a
-    browser (-o PAGE.html, by default report.html here); of one sweep its own page is made again."""
+    browser; of one sweep its own page is made again.
+
+    Example: patchfem report out/rig out/six -o both.html
+    """
     from ..export.reports import report_of
 
     if not folders:

@@ -2,23 +2,20 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from .shared import Json, Out, Refused, say
-
-Length = Annotated[str, Parameter(allow_leading_hyphen=True)]
+from .shared import Json, Refused, Units, flag, out_in, say, word
 
 
-def profile(file: Path, /, *more: Path, cutoff: Length = "", window: Length = "", tip: Length = "", units: str = "",
-            out: Out = None, json_: Json = False,
-            verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
-    """Print roughness parameters of each FILE with the intervals that one trace allows; a page goes to -o DIR.
+def profile(file: Path, /, *more: Path,
+            cutoff: word('wavelength that splits roughness from waviness, such as "0.25 mm"') = "",
+            window: word('the part between two cursors, such as "468 um,733 um"') = "",
+            tip: word('radius of the stylus, against which the valleys are checked, such as "12.5 um"') = "",
+            units: Units = "",
+            out: out_in("folder for a page and its numbers, such as out/trace") = None, json_: Json = False,
+            verbose: flag("the definition of each parameter", "-v", "--verbose") = False):
+    """Print roughness parameters of each FILE with the intervals that one trace allows.
 
-    --cutoff "0.25 mm" splits off the roughness profile; --window "468 um,733 um" takes the part between two cursors;
-    --tip "12.5 um" checks the valleys against the stylus; --units "mm,um" names the units of x and z where the file
-    names none; -v prints the definitions.
+    Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """
     asked = {"cutoff": _length("cutoff", cutoff) if cutoff else None, "window": _window(window) if window else None,
              "tip": _length("tip", tip) if tip else None}

@@ -4,22 +4,19 @@ import json
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from .shared import Ended, Json, NotReached, Out, Quiet, Refused, Sets, progress_bar, say, scene_of
+from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, progress_bar, say, scene_of
 
 
-def run(scene: Path, /, *, out: Out = None, set_: Sets = (),
-        json_: Json = False,
-        resume: Annotated[bool, Parameter(negative=())] = False,
-        fresh: Annotated[bool, Parameter(negative=())] = False,
-        no_page: Annotated[bool, Parameter(negative=())] = False,
-        quiet: Quiet = False,
-        verbose: Annotated[bool, Parameter(name=["-v", "--verbose"], negative=())] = False):
-    """Run SCENE and write its results folder, by default out/<scene name>; --resume goes on with an interrupted run
-    that has [wear]; --fresh ignores kept operators; --no-page leaves out report.html."""
+def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
+        resume: flag("go on with an interrupted run that has [wear]") = False,
+        fresh: flag("condense the pieces anew, whatever is kept of them") = False,
+        no_page: NoPage = False, quiet: Quiet = False,
+        verbose: flag("where the seconds go, beside the answer", "-v", "--verbose") = False):
+    """Run SCENE and write its results folder, by default out/<scene name>.
+
+    Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
+    """
     from ..export.folder import run_into
     from ..runs.plan import plan as make
 

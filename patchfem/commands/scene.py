@@ -6,13 +6,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Refused, Sets, model_of, say, scene_of
+from .shared import Json, Refused, Sets, flag, model_of, say, scene_of
 from .sweep import Over
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
     """Name every mistake in SCENE and in the files that it names; compute nothing. A table [sweep] whose cases are all
-    refused is one."""
+    refused is one.
+
+    Example: patchfem check rig.toml
+    """
     found = scene_of(scene, set_, _faults)
     cases = len(_swept(scene, set_, Over())[1]) if found.sweep else None
     for remark in found.remarks:
@@ -43,9 +46,12 @@ def _faults(tables, folder: Path, whole: bool) -> list:
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
-         probe: Annotated[bool, Parameter(negative=())] = False):
-    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; --probe solves the static patch.
-    With --over, or a table [sweep], of the whole sweep."""
+         probe: flag("solve the static patch for its stiffness") = False):
+    """Say what SCENE would run and not, its size, cost, stiffness chain and groups; with --over, or a table [sweep],
+    of the whole sweep.
+
+    Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
+    """
     from ..runs.plan import plan as make
 
     over = what if what is not None and what.given() else None
@@ -98,8 +104,12 @@ def _print_plan(answer: dict, probe: bool) -> None:
         print(f"verdict  {sentence}")
 
 
-def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"])], set_: Sets = ()):
-    """Write the tagged mesh of SCENE as .msh or .vtu."""
+def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],
+         set_: Sets = ()):
+    """Write the tagged mesh of SCENE.
+
+    Example: patchfem mesh rig.toml -o pieces.vtu
+    """
     found = model_of(scene, set_)
     if found.patch is None:
         raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh")

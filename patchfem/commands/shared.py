@@ -7,10 +7,33 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-Sets = Annotated[tuple[str, ...], Parameter(name="--set", negative=(), help="table.key=value, may be repeated")]
-Json = Annotated[bool, Parameter(name="--json", negative=())]
-Out = Annotated[Path | None, Parameter(name=["-o", "--out"])]
-Quiet = Annotated[bool, Parameter(name=["-q", "--quiet"], negative=())]
+
+def flag(text: str, *names: str) -> type:
+    """The type of an option that is named or not, with what it does in words."""
+    return Annotated[bool, Parameter(name=names or None, negative=(), help=text, show_default=False)]
+
+
+def texts(text: str, name: str | None = None) -> type:
+    """The type of an option that may be repeated, each time with a text."""
+    return Annotated[tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)]
+
+
+def word(text: str, name: str | None = None) -> type:
+    """The type of an option that is a text, empty unless given; it may begin with a hyphen, as a place below zero."""
+    return Annotated[str, Parameter(name=name, allow_leading_hyphen=True, help=text, show_default=False)]
+
+
+def out_in(text: str) -> type:
+    """The type of the option -o of a verb, with what is written there."""
+    return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
+
+
+Sets = texts('a key of the scene with another value, such as "contact.load=30 lbf"; may be repeated', "--set")
+Json = flag("the answer as one JSON object on stdout", "--json")
+Out = out_in("folder of the results, such as out/mine")
+Quiet = flag("nothing but faults", "-q", "--quiet")
+Units = word('units of x and z where the files name none, such as "mm,um"')
+NoPage = flag("leave out report.html", "--no-page")
 
 
 class Ended(Exception):

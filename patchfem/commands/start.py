@@ -2,16 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from .run import run
-from .shared import Json, Out, Refused, say
+from .shared import Json, NoPage, Out, Refused, out_in, say
 
 
-def new(kind: str = "", /, *, out: Out = None):
-    """Print a scene of this KIND to start from, or write it to -o FILE.toml; without KIND the kinds are named."""
+def new(kind: str = "", /, *, out: out_in("mine.toml in place of the screen") = None):
+    """Print a scene of this KIND to start from; without KIND the kinds are named.
+
+    Example: patchfem new joint -o mine.toml
+    """
     from ..scene.starting import KINDS, text_of
 
     if not kind:
@@ -30,9 +30,11 @@ def new(kind: str = "", /, *, out: Out = None):
     print(f"{out}: {KINDS[kind]}\nnext: patchfem {'sweep' if '[sweep]' in text else 'run'} {out}")
 
 
-def demo(*, out: Out = None, no_page: Annotated[bool, Parameter(negative=())] = False):
-    """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g, into out/demo or -o
-    DIR."""
+def demo(*, out: Out = None, no_page: NoPage = False):
+    """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g, into out/demo.
+
+    Example: patchfem demo
+    """
     from ..scene.starting import shipped
 
     scene = shipped()
@@ -40,9 +42,12 @@ def demo(*, out: Out = None, no_page: Annotated[bool, Parameter(negative=())] = 
     run(scene, out=out if out is not None else Path("out") / "demo", no_page=no_page)
 
 
-def schema(*, out: Out = None):
-    """Print the JSON schema of a scene, or write it to -o FILE.json, for editors that complete keys and check units:
-    in VS Code with Even Better TOML a scene begins with the line #:schema FILE.json."""
+def schema(*, out: out_in("scene.json in place of the screen") = None):
+    """Print the JSON schema of a scene, for editors that complete keys and check units: in VS Code with Even Better
+    TOML a scene begins with the line #:schema scene.json.
+
+    Example: patchfem schema -o scene.json
+    """
     from ..scene.schema import schema as make
 
     text = json.dumps(make(), indent=1, ensure_ascii=False) + "\n"
@@ -55,7 +60,10 @@ def schema(*, out: Out = None):
 
 def doctor(*, json_: Json = False):
     """Say what this installation has: versions, kept compiled code, pictures, threads, optional packages and the line
-    that installs each."""
+    that installs each.
+
+    Example: patchfem doctor
+    """
     from .examine import examined
 
     found = examined()
@@ -68,7 +76,10 @@ def doctor(*, json_: Json = False):
 
 
 def cite(scene: Path | None = None, /):
-    """Print BibTeX of the report and of this program; with SCENE also of the papers that its effects stand on."""
+    """Print BibTeX of the report and of this program; with SCENE also of the papers that its effects stand on.
+
+    Example: patchfem cite rig.toml
+    """
     from ..scene.scene import load
     from .sources import bibtex
 

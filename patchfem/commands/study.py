@@ -8,18 +8,33 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from ..effects import unbuilt
-from .shared import Json, NotReached, Out, Quiet, Refused, Sets, model_of, progress_bar, say, scene_of
+from .shared import (
+    Json,
+    NotReached,
+    Out,
+    Quiet,
+    Refused,
+    Sets,
+    flag,
+    model_of,
+    progress_bar,
+    say,
+    scene_of,
+    texts,
+    word,
+)
 
 MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area",
         "friction_force_peak", "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness",
         "tangential_stiffness")
 
 
-def cost(scene: Path, /, *, over: str = "", out: Out = None,
-         set_: Sets = (), json_: Json = False,
-         quiet: Quiet = False):
-    """Error against time of SCENE for a knob, or for all it has (--over element_size, steps_per_cycle, shear_modes,
-    jumps)."""
+def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle, shear_modes or jumps") = "",
+         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
+    """Error against time of SCENE for a knob, or for all it has.
+
+    Example: patchfem cost rig.toml --over steps_per_cycle
+    """
     from ..campaigns import cost as campaign
 
     found = model_of(scene, set_)
@@ -53,34 +68,31 @@ def cost(scene: Path, /, *, over: str = "", out: Out = None,
 class Rows:
     """Options of a fit of a rig to rows."""
 
-    leave_out: str = ""
-    """frequency, input or run: a fit without each value of it, scored on what it did not see"""
-    starts: int = 8
-    """random starts inside the ranges; the best training score is taken"""
-    seed: int = 0
-    """of the random starts"""
-    unstable: Literal["bound", "out", "read"] = "bound"
-    """what rows flagged U count as in the fit: lower bounds, nothing, or as read"""
-    placebo: Annotated[tuple[str, ...], Parameter(negative=())] = ()
-    """table.key=value,...: a whole fit with each value, to see whether the rows prefer the scene's own"""
-    resume: Annotated[bool, Parameter(negative=())] = False
-    """go on from the starts that an interrupted fit has finished"""
+    leave_out: word("frequency, input or run: a fit without each value of it, scored on what it did not see") = ""
+    starts: Annotated[int, Parameter(help="random starts inside the ranges; the best training score is taken")] = 8
+    seed: Annotated[int, Parameter(help="of the random starts, such as 1")] = 0
+    unstable: Annotated[Literal["bound", "out", "read"], Parameter(
+        help="what rows flagged U count as in the fit: lower bounds, nothing, or as read")] = "bound"
+    placebo: texts("table.key=value,...: a whole fit with each value, to see whether the rows prefer the scene's "
+                   "own") = ()
+    resume: flag("go on from the starts that an interrupted fit has finished") = False
 
 
-def fit(scene: Path, /, *, to: str, free: Annotated[tuple[str, ...], Parameter(negative=())],
-        hold: Annotated[tuple[str, ...], Parameter(negative=())] = (),
-        offset: Annotated[tuple[str, ...], Parameter(negative=())] = (),
-        warm_up: Annotated[bool, Parameter(negative=())] = False,
+def fit(scene: Path, /, *, to: Annotated[str, Parameter(
+            help='what was measured: loop.csv of a bench, rows.csv of a rig, compare.json or "worn_depth_max=2.5 '
+                 'um..3.5 um" of a scene with [wear]')],
+        free: texts('a key to find and its range, such as "friction.static=0.1..0.6"; may be repeated'),
+        hold: texts('rows that are only predicted, such as "frequency=135 Hz,150 Hz"') = (),
+        offset: texts("of a loop, free besides: force (what the record adds to it), displacement (how far its first "
+                      "row lies from the unstressed place)") = (),
+        warm_up: flag("of a loop: its whole cycles are driven once before it, unscored") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
-        out: Out = None, set_: Sets = (),
-        json_: Json = False,
-        quiet: Quiet = False):
-    """Fit keys of SCENE (--free table.key=low..high,...) to what was measured, --to FILE; rows that --hold names
-    (column=value,...) are only predicted. A bench is fitted to a loop. --offset force,displacement: free besides, what
-    the record adds to the force and how far its first row lies from the unstressed place; --warm-up: its whole cycles
-    are driven once before it, unscored. A rig is fitted to rows of frequency, input, acceleration and displacement,
-    from --starts places drawn by --seed. With [wear]: its coefficient, to a worn depth (--to compare.json, or --to
-    "worn_depth_max=2.5 um..3.5 um")."""
+        out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
+    """Find values of keys of SCENE from what was measured: a bench from a friction loop, a rig from rows of frequency,
+    input, acceleration and displacement, the coefficient of [wear] from a worn depth.
+
+    Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
+    """
     found = scene_of(scene, set_)
     if found.kind in ("rig", "linear") and found.wear is None:
         if offset or warm_up:

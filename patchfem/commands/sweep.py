@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from .shared import Ended, Json, NotReached, Out, Quiet, Refused, Sets, say
+from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
 
@@ -20,13 +20,14 @@ FIRST = 5  # messages of failed cases that are printed
 class Over:
     """Which cases."""
 
-    over: Annotated[tuple[str, ...], Parameter(name="--over", negative=(), help="table.key=v1,v2,... or "
-                                               "table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated")] = ()
+    over: texts("table.key=v1,v2,... or table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated", "--over") = ()
     cases: Annotated[Path | None, Parameter(name="--cases", help="file.csv with a column `table.key [unit]` per key, a "
                                             "case per row")] = None
-    random: Annotated[int, Parameter(name="--random", help="draw so many cases; a range is then 1 mm..9 mm")] = 0
-    sobol: Annotated[int, Parameter(name="--sobol", help="the same by Sobol's sequence, best in powers of 2")] = 0
-    seed: Annotated[int, Parameter(name="--seed", help="of the draws")] = 0
+    random: Annotated[int, Parameter(name="--random", show_default=False, help="draw so many cases, such as "
+                                            "200; a range is then 1 mm..9 mm")] = 0
+    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="the same by Sobol's sequence, "
+                                           "best in powers of 2, such as 256")] = 0
+    seed: Annotated[int, Parameter(name="--seed", help="of the draws, such as 1")] = 0
 
     def given(self) -> bool:
         """Whether any case is asked for."""
@@ -50,12 +51,10 @@ class Over:
 class By:
     """Who works, and on which part."""
 
-    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine")] = 1
-    executor: Annotated[str, Parameter(name="--executor", help="dask (a cluster on this machine) or dask:ADDRESS")] = ""
-    shard: Annotated[str, Parameter(name="--shard", help="i/n: the i-th of n parts only, into a folder that all "
-                                    "parts share")] = ""
-    collect: Annotated[bool, Parameter(name="--collect", negative=(), help="only write the tables of a sweep whose "
-                                       "shards are done")] = False
+    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes of this machine, such as 4")] = 1
+    executor: word("dask (a cluster on this machine) or dask:ADDRESS", "--executor") = ""
+    shard: word("such as 3/40: the third of 40 parts only, into a folder that all parts share", "--shard") = ""
+    collect: flag("only write the tables of a sweep whose shards are done", "--collect") = False
 
     def part(self) -> tuple | None:
         """(i, n) of a shard, None without one."""
@@ -68,12 +67,15 @@ class By:
 
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
-          resume: Annotated[bool, Parameter(negative=(), help="go on with what the folder holds")] = False,
+          resume: flag("go on with what the folder holds") = False,
           keep: Annotated[Literal["summaries", "results", "pages"], Parameter(
               help="of each case its summary.json, its results folder, or that with its report.html")] = "summaries",
-          no_page: Annotated[bool, Parameter(negative=())] = False, json_: Json = False, quiet: Quiet = False):
+          no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values of --over, or of its table [sweep]: a folder per case, sweep.csv,
-    sweep.nc and report.html of them all, by default in out/<scene name>-sweep; --no-page leaves out report.html."""
+    sweep.nc and report.html of them all, by default in out/<scene name>-sweep.
+
+    Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
+    """
     from ..campaigns.sweeps import executors
     from ..campaigns.sweeps.ask import asked_of
     from ..export.sweeps.run import Place, collect, sweep_into
@@ -86,7 +88,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     asked, cases = asked_of(scene, set_, (what or Over()).request())
     target = out if out is not None else Path("out") / f"{scene.stem}-sweep"
     if by.collect:
-        _answer(collect(asked, cases, target, not no_page), target, json_, perf_counter() - begin)
+        _answer(collect(asked, cases, target, not no_page), target, not no_page, json_, perf_counter() - begin)
         return
     line = Progress(quiet)
     try:
@@ -102,7 +104,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
         print(json.dumps({"cases": line.done, "folder": str(target)}) if json_ else
               f"shard {by.shard}: {line.done} cases in {target}; when all shards are done: the same with --collect")
         return
-    _answer(found, target, json_, perf_counter() - begin)
+    _answer(found, target, not no_page, json_, perf_counter() - begin)
 
 
 class Progress:
@@ -129,7 +131,7 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _answer(found, target: Path, json_: bool, seconds: float) -> None:
+def _answer(found, target: Path, page: bool, json_: bool, seconds: float) -> None:
     from collections import Counter
 
     from ..export.pages.sweep import span
@@ -145,7 +147,9 @@ def _answer(found, target: Path, json_: bool, seconds: float) -> None:
                     found.outcome)
         if said:
             print(said)
-        print(f"page: {target / 'report.html'}\nresults: {target / 'sweep.csv'} {target / 'sweep.nc'}")
+        if page:
+            print(f"page: {target / 'report.html'}")
+        print(f"results: {target / 'sweep.csv'} {target / 'sweep.nc'}")
     sys.stdout.flush()
     alike = {}
     for number in failed:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 
@@ -9,7 +10,7 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
-from patchfem.__main__ import app
+from patchfem.__main__ import VERBS, app
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
@@ -95,3 +96,13 @@ def test_always_help_imports_nothing_of_them():
     assert "patchfem.commands.start" in done.stdout
     for name in ("examine", "sources", "starting", "schema"):
         assert name not in done.stdout
+
+
+@pytest.mark.parametrize("verb", [verb.__name__ for verb in VERBS])
+def test_always_help_says_what_each_option_does_by_an_example(verb):
+    about = app[verb].help.partition("Example: ")
+    assert about[0].strip() and all(one.parameter.help for one in app[verb].assemble_argument_collection()
+                                    if one.parameter.name and any(name.startswith("-") for name in one.names))
+    words = shlex.split(" ".join(about[2].split()))
+    assert words[:2] == ["patchfem", verb]
+    assert app.parse_args(words[1:], exit_on_error=False, print_error=False)[0].__name__ == verb
