@@ -86,6 +86,15 @@ def test_exact_the_words_of_an_array_are_those_of_its_interface(values):
         assert machine.Words().of(values) == (kind, np.array(words, "q").tobytes())
 
 
+def test_always_tuples_of_numbers_push_no_arrays_out():
+    """A run calls with the same arrays and another time at every call: the arrays are remembered all along."""
+    words, held = machine.Words(), (np.zeros(3), 1.0)
+    words.of(held)
+    for k in range(2 * machine.PARTS):
+        assert words.of((float(k), 0.5)) == ("tuple(d,d)", np.array([k, 0.5]).tobytes())
+    assert [one[0] for one in words.known.values()] == [held]
+
+
 @pytest.fixture(scope="module")
 def weighing(tmp_path_factory):
     path, given = tmp_path_factory.mktemp("code") / "weighed.code", some_arguments()

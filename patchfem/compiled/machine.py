@@ -36,7 +36,10 @@ class Words:
         self.known, self.lock = {}, threading.Lock()
 
     def of(self, value) -> tuple:
-        """(kind, bytes) of an argument: its type in short, its words. Unfit where it has none."""
+        """(kind, bytes) of an argument: its type in short, its words. Unfit where it has none.
+
+        A tuple of numbers alone is not remembered.
+        """
         kind = NUMBERS.get(type(value))
         if kind is not None:
             return kind, struct.pack(kind, value)
@@ -48,6 +51,8 @@ class Words:
         if held is None:
             kinds, words = zip(*(self.of(one) for one in value)) if value else ((), ())
             held = value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words)
+            if all(map(NUMBERS.__contains__, map(type, value))):  # made for one call: it would push others out
+                return held[1:]
             with self.lock:
                 self.known[id(value)] = held
                 while len(self.known) > PARTS:

@@ -98,6 +98,12 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
                       frozen_array(force), frozen_array(drop), reluctant)
 
 
+def scaled(group: JenkinsSet, factor: float) -> JenkinsSet:
+    """The elements of points that yield at `factor` > 0 times the force: the same springs, each that much further."""
+    return JenkinsSet(group.stiffness, frozen_array(factor * group.yield_slide), group.points,
+                      frozen_array(factor * group.limit), group.share, group.reluctant, group.error)
+
+
 def merged(group: JenkinsSet, tolerance: float, nested: bool = True) -> JenkinsSet:
     """The fewest elements whose resultant stays within `tolerance` (relative to the friction limit) of `group`.
 

@@ -18,6 +18,7 @@ from patchfem.slip.shear_modes import (
     jenkins_set,
     merged,
     normal_stiffness,
+    scaled,
     shear_modes,
     tangential_stiffness,
 )
@@ -29,6 +30,18 @@ def friction_limit(cells, angle):
     """(m,) yield force of every node [N]."""
     pair = coated_pair(cells)
     return MU * press(pair, tilt(pair.interface.x, angle), LOAD).sigma_n * pair.interface.weight
+
+
+@pytest.mark.parametrize("factor", (0.37, 1.0, 2.6))
+def test_exact_another_coefficient_is_the_same_springs(factor):
+    """Points that yield at another multiple of their load: computed anew, and from those of the first."""
+    pair, limit = coated_pair(20), friction_limit(20, 1e-4)
+    mine, anew = scaled(jenkins_set(pair.tangential, limit), factor), jenkins_set(pair.tangential, factor * limit)
+    assert np.array_equal(mine.points, anew.points) and mine.reluctant == anew.reluctant
+    for name in ("yield_slide", "limit"):
+        assert getattr(mine, name) == pytest.approx(getattr(anew, name), rel=1e-11)
+    for name in ("stiffness", "share"):
+        assert np.abs(getattr(mine, name) - getattr(anew, name)).max() < 1e-11 * np.abs(anew.stiffness).max()
 
 
 def box_problem(c, limit, pull, force):

@@ -18,14 +18,12 @@ class Point(NamedTuple):
 
     motion: np.ndarray
     memory: Memory
+    known: tuple | None = None  # `turned` of a Point that another one was moved to
 
     @property
     def turned(self) -> tuple:
         """(interfaces (d,), groups (d,)) of the turning places that the memory holds."""
-        found = [np.flatnonzero(row[:deep]) for row, deep in zip(self.memory.side, self.memory.depth.tolist())]
-        if len(found) == 1:
-            return np.zeros_like(found[0]), found[0]
-        return np.repeat(np.arange(len(found)), [part.size for part in found]), np.concatenate(found)
+        return self.known or turned_of(self.memory)
 
     @property
     def numbers(self) -> np.ndarray:
@@ -34,9 +32,17 @@ class Point(NamedTuple):
 
     def moved(self, numbers) -> "Point":
         """The Point of other numbers in a row, the same elements in every group."""
-        memory, count = copied(self.memory), self.motion.size
-        memory.at[self.turned] = numbers[count:]
-        return Point(np.array(numbers[:count]), memory)
+        memory, count, turned = copied(self.memory), self.motion.size, self.turned
+        memory.at[turned] = numbers[count:]
+        return Point(np.array(numbers[:count]), memory, turned)
+
+
+def turned_of(memory: Memory) -> tuple:
+    """(interfaces (d,), groups (d,)) of the turning places that a memory holds."""
+    found = [row[:deep].nonzero()[0] for row, deep in zip(memory.side, memory.depth.tolist())]
+    if len(found) == 1:
+        return np.zeros_like(found[0]), found[0]
+    return np.repeat(np.arange(len(found)), [part.size for part in found]), np.concatenate(found)
 
 
 def copied(memory: Memory) -> Memory:
@@ -113,17 +119,17 @@ class PeriodMap:
         n, motion, memory, period = self.n, self.begin(drive, point), self.memory, drive.period
         face, group = point.turned
         size = 2 * n + face.size if slopes else 0
-        slope, marks = self._carried(size)
+        slope, marks, unit = self._carried(size)
         if slopes:
-            slope[:], marks[:, :memory.depth.max(initial=0)] = np.eye(2 * n, size).reshape(2, n, size), 0.0
+            slope[:], marks[:, :memory.depth.max(initial=0)] = unit, 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
         seen = np.array([memory.slipping, memory.depth])
         pieces = self.follow(place(period / 2 if half else period, period), motion, slope, marks, self.plant,
                              self.table, memory, self.clock, self.books, self.room, self.spare, seen)
         if pieces < 0:
             raise NotConverged("dynamics: events pile up within a period")
-        end = Point(motion.ravel(), copied(memory))
-        rows, columns = end.turned
+        rows, columns = turned = turned_of(memory)
+        end = Point(motion.ravel(), copied(memory), turned)
         kept = 2 * n + np.flatnonzero(columns < seen[1, rows])
         out = np.concatenate([slope.reshape(2 * n, size), marks[rows, columns]])
         if half:
@@ -132,7 +138,9 @@ class PeriodMap:
         return Map(end, out, kept, *seen, self.books.extremes[0].copy(), int(pieces))
 
     def _carried(self, size: int) -> tuple:
-        """Room for the slopes of so many numbers: of the motion (2, n, size), of turning places (i, t + 1, size)."""
+        """Room for the slopes of so many numbers, of the motion (2, n, size) and of turning places (i, t + 1, size),
+        and the former at the start."""
         if size not in self.carried:
-            self.carried[size] = np.zeros((2, self.n, size)), np.zeros((*self.memory.at.shape, size))
+            self.carried[size] = (np.zeros((2, self.n, size)), np.zeros((*self.memory.at.shape, size)),
+                                  np.eye(2 * self.n, size).reshape(2, self.n, size))
         return self.carried[size]

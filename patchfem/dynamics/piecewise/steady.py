@@ -21,6 +21,8 @@ LATER = 10, 160  # periods more where it leads away: at first, and at most
 GROWN = 1e-6  # of what the drive moves a free mass: the most that a motion misses when it closes
 FAR = 1e9  # its largest size: that of a mode with a damping of 5e-10
 MOST = 40  # steps of Newton's method
+SHARES = 1.0, 0.5, 0.2, 0.05  # of a step that are tried
+ROUND = 1e-14  # a miss that a step more would not make smaller
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -131,15 +133,15 @@ def _lap(one: PeriodMap, drive, point: Point, half: bool) -> Lap:
 def _alike(point: Point, end: Point) -> bool:
     """Whether two Points have the same numbers: turning places of the same kind."""
     a, b = point.memory, end.memory
-    return np.array_equal(a.depth, b.depth) and all(
-        np.array_equal(x[:deep], y[:deep]) for x, y, deep in zip(a.side, b.side, a.depth.tolist()))
+    deep = a.depth.tolist()
+    return deep == b.depth.tolist() and all(x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.side, b.side, deep))
 
 
 def _same(point: Point, end: Point) -> bool:
     """Whether two Points that are alike hold the same elements in every group, and let the same ones slip."""
     a, b = point.memory, end.memory
-    return np.array_equal(a.slipping, b.slipping) and np.array_equal(a.way, b.way) and all(
-        np.array_equal(x[:deep], y[:deep]) for x, y, deep in zip(a.upto, b.upto, a.depth.tolist()))
+    return a.slipping.tolist() == b.slipping.tolist() and a.way.tolist() == b.way.tolist() and all(
+        x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.upto, b.upto, a.depth.tolist()))
 
 
 def _shot(one: PeriodMap, drive, point: Point, half: bool, tolerance: float) -> tuple:
@@ -149,9 +151,11 @@ def _shot(one: PeriodMap, drive, point: Point, half: bool, tolerance: float) -> 
         size = lap.width / reach
         if size > FAR:  # nothing bounds it: it misses ever less of its size
             break
-        better = _newton(one, drive, lap, half)
-        if lap.miss <= tolerance and lap.miss * size <= GROWN and lap.alike and _same(point, lap.found.end):
-            # the last step squares what is left, where it keeps the turning places
+        closed = lap.miss <= tolerance and lap.miss * size <= GROWN and lap.alike and _same(point, lap.found.end)
+        if closed and lap.miss <= ROUND:
+            return lap, used
+        better = _newton(one, drive, lap, half, SHARES[:1] if closed else SHARES)
+        if closed:  # the last step squares what is left, where it keeps the turning places
             return (better if better is not None and better.alike else lap), used
         if better is None:
             point = _early(one, drive, _next(lap.found, one.table.count, half), periods, half)
@@ -167,15 +171,15 @@ def moved_by(one: PeriodMap, drive) -> float:
     return max(abs(part.amplitude) / part.omega**2 * float(np.abs(one.plant.base).max()), 1e-300)
 
 
-def _newton(one: PeriodMap, drive, lap: Lap, half: bool) -> Lap | None:
-    """A better Lap along Newton's direction, None where there is none.
+def _newton(one: PeriodMap, drive, lap: Lap, half: bool, shares) -> Lap | None:
+    """A better Lap by the first of some shares of Newton's step that leads to one, None where none does.
 
     The elements of every group are those at the end of the run: they follow the motion.
     """
     if not lap.alike:
         return None
     step, start = _direction(lap), lap.point.numbers
-    for share in (1.0, 0.5, 0.2, 0.05):
+    for share in shares:
         try:
             other = _lap(one, drive, lap.found.end.moved(start + share * step), half)
         except NotConverged:

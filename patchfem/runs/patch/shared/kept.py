@@ -6,7 +6,7 @@ The last patches are kept, so that it lasts for runs that follow each other.
 from dataclasses import fields
 from functools import lru_cache
 
-from ....slip.shear_modes import JenkinsSet, jenkins_set
+from ....slip.shear_modes import JenkinsSet, jenkins_set, scaled
 from ..measures import measures, plane_band
 from ..press import Patch
 
@@ -59,5 +59,13 @@ def _band(kept: Kept, patch: Patch) -> list:
 @lru_cache(maxsize=2 * KEPT)
 def elements(patch: Patch, static: float, length: float) -> JenkinsSet:
     """The parallel elements of a patch whose points yield at `static` times their load; length [m]: of bonds in series,
-    0 of Coulomb's law."""
-    return jenkins_set(patch.giving, static * patch.pressure.sigma_n * patch.pieces.interface.weight, length)
+    0 of Coulomb's law, whose elements of another coefficient are the same springs."""
+    load = patch.pressure.sigma_n * patch.pieces.interface.weight
+    if length or not static > 0:
+        return jenkins_set(patch.giving, static * load, length)
+    return scaled(_unit(patch), static)
+
+
+@lru_cache(maxsize=2 * KEPT)
+def _unit(patch: Patch) -> JenkinsSet:
+    return jenkins_set(patch.giving, patch.pressure.sigma_n * patch.pieces.interface.weight)
