@@ -20,6 +20,7 @@ from cyclopts import App, CycloptsError  # noqa: E402
 
 from . import __version__  # noqa: E402
 from .commands.compare import compare  # noqa: E402
+from .commands.lab import import_  # noqa: E402
 from .commands.look import export, report, view  # noqa: E402
 from .commands.profile import profile  # noqa: E402
 from .commands.run import run  # noqa: E402
@@ -31,15 +32,14 @@ from .commands.sweep import sweep  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, export, view, report, schema, doctor,
-         cite)
-NOT_BUILT = ("import",)
+VERBS = (new, demo, check, plan, run, sweep, profile, compare, cost, fit, mesh, import_, export, view, report, schema,
+         doctor, cite)
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="Contact patches, nonlocal friction and the motion of the joint that rubs. Start: patchfem demo; "
                "for a scene of your own: patchfem new.")
 for verb in VERBS:
-    app.command(verb)
+    app.command(verb, name=verb.__name__.rstrip("_"))
 app.register_install_completion_command(help="Complete commands and options in this shell (bash, zsh, fish).")
 
 
@@ -68,9 +68,6 @@ def _leave(code: int) -> None:
 
 def _guarded(words: list) -> int:
     try:
-        if words and words[0] in NOT_BUILT:
-            raise Refused(f"patchfem {words[0]}: not yet built; built are "
-                          + ", ".join(each.__name__ for each in VERBS))
         app(words, exit_on_error=False, print_error=False)
         sys.stdout.flush()
         return 0

@@ -5,18 +5,33 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Refused, out_in, say
+from .shared import Refused, flag, out_in, say
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, from 0; the last one unless given")]
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(
-        name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf")],
-           frame: Frame = None):
-    """Write the fields of a results folder in another format.
+        name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf; histories.uff, "
+                                   ".mat or .csv")],
+           frame: Frame = None,
+           histories: flag("the histories and loops as .csv, not the interface") = False):
+    """Write the fields of a results folder in another format, or its histories and loops; of a fit the measured loop
+    beside the fitted one.
 
-    Example: patchfem export out/rig -o fields.pvd
+    Example: patchfem export out/rig -o histories.uff
     """
+    from ..export.lab import ENDINGS, FIELDS
+
+    fields = (folder / FIELDS).is_file() or not folder.is_dir()
+    if out.suffix.lower() in ENDINGS and (out.suffix != ".csv" or histories or not fields):
+        if frame is not None:
+            raise Refused("--frame: belongs to fields (.vtu, .csv); histories have all their times in one file")
+        from ..export.lab.write import export as write_histories
+
+        print(write_histories(folder, out))
+        return
+    if histories:
+        raise Refused(f"--histories: they are written as {', '.join(ENDINGS)}, not as {out.suffix or out}")
     from ..export.fields.vtu import export as write
 
     print(write(folder, out, frame))

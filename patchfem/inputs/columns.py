@@ -10,7 +10,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 
 LARGEST = 64 * 2**20  # bytes of text
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEAD = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
 _WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
@@ -38,7 +38,7 @@ def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, re
     line, Missing where there is no file.
     """
     path = Path(path)
-    lines = _text(path, what, remedy).split("\n")
+    lines = text_of(path, what, remedy).split("\n")
     names, factors = _header(path, lines[0], units, wanted, header, labels)
     last = max((n for n, line in enumerate(lines) if line.strip()), default=0)
     numbers, texts = [], []
@@ -54,7 +54,8 @@ def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, re
                    {name: tuple(row[k] for row in texts) for k, name in enumerate(free)}, len(numbers))
 
 
-def _text(path: Path, what: str, remedy: str) -> str:
+def text_of(path: Path, what: str, remedy: str = "") -> str:
+    """The text of a file with plain ends of lines; Missing where there is none, PatchfemError where it is too large."""
     try:
         with open(path, "rb") as file:
             data = file.read(LARGEST + 1)
@@ -103,6 +104,6 @@ def _cells(path, number: int, line: str, names) -> dict:
 
 
 def _number(path, number: int, name: str, cell: str) -> float:
-    if not _NUMBER.fullmatch(cell) or not np.isfinite(float(cell)):
+    if not NUMBER.fullmatch(cell) or not np.isfinite(float(cell)):
         raise PatchfemError(f"{path}:{number}: {name}: '{cell[:80]}' is not a finite number")
     return float(cell)

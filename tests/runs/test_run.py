@@ -19,7 +19,6 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from patchfem import closed_forms
-from patchfem.__main__ import NOT_BUILT
 from patchfem.closed_forms.dynamics import two_stop_amplitude
 from patchfem.core import G_N, Outcome
 from patchfem.effects import EFFECTS
@@ -404,12 +403,6 @@ def test_refuses_mistakes_with_one_line_each(written, tmp_path):
 def test_refuses_bad_requests(words):
     answer = cli(*words)
     assert answer.code == 2 and answer.err and "Traceback" not in answer.err
-
-
-@pytest.mark.parametrize("verb", NOT_BUILT)
-def test_refuses_verbs_not_yet_built(verb):
-    answer = cli(verb, "scene.toml")
-    assert answer.code == 2 and "not yet built" in answer.err
 
 
 @pytest.mark.parametrize("sets", [

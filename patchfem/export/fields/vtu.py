@@ -23,7 +23,6 @@ from .series import Frame, Series
 BLOCK = 1 << 20  # bytes of a compressed block
 TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
-LATER = {".uff": "UFF58", ".uf": "UFF58", ".unv": "UFF58", ".58": "UFF58", ".mat": ".mat"}
 
 
 def export(folder: Path, out: Path, frame: int | None = None) -> str:
@@ -33,10 +32,9 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
     and a frame that is not there, Missing where there are no fields or `out` cannot be written.
     """
     out = Path(out)
-    if out.suffix in LATER:
-        raise PatchfemError(f"{out}: export of {LATER[out.suffix]} is not yet built; built are {', '.join(ENDINGS)}")
     if out.suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}")
+        raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}; histories and loops as .uff, .mat, "
+                            ".csv --histories")
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
         raise PatchfemError(f"--frame: {out.suffix} holds the whole series; name a .vtu or .csv for one frame")
     with Series(folder) as series:
@@ -50,7 +48,7 @@ def _export(series: Series, out: Path, number: int) -> str:
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
             raise PatchfemError(f"{out}: is the file that is exported; name another -o")
-        _whole(out, lambda partial: shutil.copyfile(series.path, partial))
+        whole(out, lambda partial: shutil.copyfile(series.path, partial))
         return f"{out}: {len(series)} frames"
     if out.suffix == ".pvd":
         return f"{out}: {write_pvd(out, series)} frames in {frames_beside(out).name}"
@@ -62,7 +60,7 @@ def _export(series: Series, out: Path, number: int) -> str:
     return f"{out}: frame {one.number} of {len(series)}, {one.time:.6g} s"
 
 
-def _whole(path: Path, write) -> None:
+def whole(path: Path, write) -> None:
     """Write beside `path` and rename, so that an older file is replaced only by a whole one."""
     partial = path.with_name(path.name + ".partial")
     try:
@@ -119,7 +117,7 @@ def _listing(path: Path, kind: str, version: str, lines: list) -> None:
     text = "\n".join(['<?xml version="1.0"?>',
                       f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">', f"  <{kind}>",
                       *("    " + line for line in lines), f"  </{kind}>", "</VTKFile>", ""])
-    _whole(path, lambda partial: partial.write_text(text, "utf-8"))
+    whole(path, lambda partial: partial.write_text(text, "utf-8"))
 
 
 def _ours(name: str) -> bool:
@@ -142,7 +140,7 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
              _array("connectivity", frame.connectivity.astype(np.int64)),
              _array("offsets", frame.offsets[1:].astype(np.int64)), _array("types", frame.types.astype(np.uint8)),
              "</Cells>", "</Piece>", "</UnstructuredGrid>", "</VTKFile>", ""]
-    _whole(path, lambda partial: partial.write_text("\n".join(text), "ascii"))
+    whole(path, lambda partial: partial.write_text("\n".join(text), "ascii"))
 
 
 def _meanings(names: tuple, units: dict) -> list:
@@ -182,4 +180,4 @@ def write_csv(path: Path, frame: Frame) -> None:
             head.append(f"{label} [{frame.units.get(name, '1')}]")
             columns.append([str(value) for value in part])
     text = "\n".join([",".join(head), *map(",".join, zip(*columns)), ""])
-    _whole(path, lambda partial: partial.write_text(text, "utf-8"))
+    whole(path, lambda partial: partial.write_text(text, "utf-8"))

@@ -1,0 +1,110 @@
+"""What a results folder holds over time, as columns: the histories of a run, or a measured loop beside its fit."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import __version__
+from ...core import Missing, PatchfemError
+from ...inputs.columns import read_columns
+from ...inputs.paths import BESIDE, UNITS
+
+LOOPS = (("relative_displacement", "friction_force"), ("displacement", "force"), ("displacement", "friction_ratio"),
+         ("displacement", "fitted"))  # slide, resistance
+
+
+class Column(NamedTuple):
+    """One history. name; unit as netCDF writes it ("m s-2"); values (k,); number: of the interface or mode from 1, 0
+    where there is only one."""
+
+    name: str
+    unit: str
+    values: np.ndarray
+    number: int
+
+    @property
+    def label(self) -> str:
+        """Name with the number behind it."""
+        return f"{self.name}_{self.number}" if self.number else self.name
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Histories:
+    """Columns that share rows.
+
+    title: one line; time: (k,) [s] or None; columns: of `Column`; arrays: name -> (values, unit) of everything else in
+    the folder, for formats that hold arrays of any shape.
+    """
+
+    title: str
+    time: np.ndarray | None
+    columns: list
+    arrays: dict
+
+    def loops(self) -> list:
+        """(slide, resistance) columns of the friction loops, one per interface."""
+        by = {(one.name, one.number): one for one in self.columns}
+        return [(by[slide, number], by[force, number]) for slide, force in LOOPS
+                for number in sorted({number for name, number in by if name == slide}) if (force, number) in by]
+
+
+def histories_of(folder: Path) -> Histories:
+    """The histories of a results folder of a run (result.nc) or of a fit to a loop (fit.csv).
+
+    Missing where the folder or both files are not there, PatchfemError where a file is none of patchfem's or has no
+    history.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise Missing(f"{folder}: no such results folder")
+    if (folder / "result.nc").is_file():
+        return _of_run(folder / "result.nc")
+    if (folder / "fit.csv").is_file():
+        return _of_fit(folder / "fit.csv")
+    raise Missing(f"{folder}: it has neither result.nc of a run nor fit.csv of a fit")
+
+
+def _of_run(path: Path) -> Histories:
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(path, "r") as file:
+            title = str(file.attrs.get("title", ""))
+            found = {name: (one.dimensions, np.asarray(one[...]), str(one.attrs.get("units", "1")))
+                     for name, one in file.variables.items()}
+    except (OSError, KeyError, ValueError) as fault:
+        raise PatchfemError(f"{path}: cannot be read as netCDF: {fault}") from None
+    arrays = {name: (values, unit) for name, (_, values, unit) in found.items() if values.dtype.kind in "iuf"}
+    columns = []
+    for name, (dims, values, unit) in found.items():
+        if "time" not in dims or name == "time" or values.dtype.kind not in "iuf":
+            continue
+        if len(dims) == 1:
+            columns.append(Column(name, unit, values.astype(float), 0))
+        elif len(dims) == 2:
+            rows = values if dims[1] == "time" else values.T
+            columns += [Column(name, unit, row.astype(float), k) for k, row in enumerate(rows, 1)]
+    if not columns:
+        raise PatchfemError(f"{path}: a static patch has no history; its fields are exported as .pvd, .vtu, .vtkhdf, "
+                            "or .csv of the interface")
+    return Histories(title, found["time"][1].astype(float), columns, arrays)
+
+
+def _of_fit(path: Path) -> Histories:
+    units = {**BESIDE, **UNITS, "fitted": {"": 1.0}}
+    table = read_columns(path, units, ("displacement", "fitted"), "displacement [m],force [N],fitted", "a fitted loop",
+                         labels=True).values
+    names = {"displacement": "m", "force": "N", "friction_ratio": "1"}
+    names["fitted"] = "N" if "force" in table else "1"
+    columns = [Column(name, unit, table[name], 0) for name, unit in names.items() if name in table]
+    return Histories("measured and fitted loop", table.get("time"), columns,
+                     {name: (values, "s" if name == "time" else names[name]) for name, values in table.items()})
+
+
+def program() -> str:
+    """The program and its version, as formats with a line for it hold them."""
+    return f"patchfem {__version__}"
+
+

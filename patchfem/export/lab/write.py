@@ -1,0 +1,43 @@
+"""Histories of a results folder as a file of a laboratory, by its ending."""
+
+from pathlib import Path
+
+from ...core import Missing, PatchfemError
+from ..fields.vtu import whole
+from . import ENDINGS, matlab, table, universal
+from .series import histories_of
+
+
+def export(folder: Path, out: Path) -> str:
+    """Write the histories and loops of a results folder; one line on what was written.
+
+    PatchfemError for another ending and a folder without histories, Missing where it is not there or `out` cannot be
+    written.
+    """
+    out = Path(out)
+    if out.suffix.lower() not in ENDINGS:
+        raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
+    found = histories_of(folder)
+    rows = found.columns[0].values.size
+    told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + \
+        (f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else "")
+    try:
+        if out.suffix.lower() == ".mat":
+            whole(out, lambda partial: matlab.write(partial, found))
+        elif out.suffix.lower() == ".csv":
+            whole(out, lambda partial: table.write(partial, found.time, found.columns))
+        else:
+            whole(out, lambda partial: universal.write(partial, found))
+            told += f"; {len(found.loops())} loops"
+    except OSError as error:
+        raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+    return told
+
+
+def write_table(out: Path, values: dict, units: dict) -> None:
+    """Write arrays of one length by name as CSV with their units; Missing where `out` cannot be written."""
+    columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
+    try:
+        whole(Path(out), lambda partial: table.write(partial, None, columns))
+    except OSError as error:
+        raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
