@@ -8,6 +8,7 @@ where the residual is not linear over them, and at a bound, they come from the p
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -65,19 +66,51 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, ba
     begins = _starts(model, None if start is None else box.unit(start), starts)
     if model.rows < n:
         raise ValueError(f"{model.rows} rows cannot determine {n} values")
-    everything = list(range(n))
+    return answered(model, descents(model, begins, every=False), bars)
+
+
+class Descent(NamedTuple):
+    """Where a descent ended: point u (n,) of the unit cube, sum of squares (inf where its start failed), whether it
+    settled, rows of the residual."""
+
+    u: np.ndarray
+    cost: float
+    done: bool
+    rows: int
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual; NaN where the start failed."""
+        return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
+
+
+def descents(model: Counted, begins, every: bool = True, kept: Callable = lambda *given: None, before=None,
+             tell=None) -> list:
+    """The Descent from each of some points of the unit cube, (s, n).
+
+    every: without it an answer to round-off ends the search. kept(k) -> the Descent from point k of an earlier search,
+    or None; kept(k, descent) keeps it. before: called before each descent; tell: called with 1 after it.
+    """
     found = []
-    for begin in begins:
-        found.append(descend(model, begin, everything))
-        if found[-1][1] <= (EXACT * model.largest)**2 * model.rows:
+    for k, begin in enumerate(begins):
+        known = kept(k)
+        if known is None:
+            if before is not None:
+                before()
+            known = Descent(*descend(model, begin, range(len(begin))), model.rows)
+            kept(k, known)
+        found.append(known)
+        if tell is not None:
+            tell(1)
+        if not every and known.cost <= (EXACT * model.largest)**2 * model.rows:
             break
-    return answered(model, found, bars)
+    return found
 
 
 def answered(model: Counted, found: list, bars: str = "rows") -> Fit:
-    """The Fit of the best of some descents, `found` as `descend` gives them; bars as in `fit`."""
-    u, cost, done = min(found, key=lambda one: one[1])
-    agreed = sum(abs(other[1] - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
+    """The Fit of the best of some Descents; bars as in `fit`."""
+    u, cost, done, _ = min(found, key=lambda one: one.cost)
+    agreed = sum(abs(other.cost - cost) <= 1e-6 * cost + 1e-20 * model.largest**2 * model.rows for other in found)
     if bars:
         u, cost = _onto_bounds(model, u, cost)
         answer = intervals(model, u, cost, descend, bars == "series")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import NotConverged
-from ...identify.least_squares import Fit, answered, descend
+from ...identify.least_squares import Descent, Fit, answered, descents
 from ...identify.space import Counted, space
 from .cells import Cells
 from .computed import Computed
@@ -66,23 +66,22 @@ def searched(cells: Cells, computed: Computed, training, how: Search, bars: str 
     residual, n = residual_of(cells, computed, training, how.unstable), len(wanted)
     quick = Counted(residual, box, quick=True)
     begins = np.random.default_rng(how.seed).random((how.starts, n))
-    ends = []
-    for k, begin in enumerate(begins):
+
+    def kept(k, *one):
+        """Keep a Descent as a list that a file can hold, or give it back."""
+        if one:
+            u, cost, done, rows = one[0]
+            how.kept(f"{name}/{k}", [*u.tolist(), cost if np.isfinite(cost) else None, rows, bool(done)])
+            return None
         known = how.kept(f"{name}/{k}")
-        if known is None:
-            computed.forget()
-            u, cost, done = descend(quick, begin, range(n))
-            known = [*u.tolist(), cost if np.isfinite(cost) else None, quick.rows, bool(done)]
-            how.kept(f"{name}/{k}", known)
-        ends.append((np.array(known[:n]), np.inf if known[n] is None else known[n], known[n + 1]))
-        if tell is not None:
-            tell(1)
-    rms = np.array([np.sqrt(cost / rows) if np.isfinite(cost) else np.nan for _, cost, rows in ends])
+        return known and Descent(np.array(known[:n]), np.inf if known[n] is None else known[n], known[n + 2],
+                                 known[n + 1])
+
+    ends = descents(quick, begins, True, kept, computed.forget, tell)
+    rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
         raise NotConverged(f"fit: every one of {how.starts} starts failed, the first: {quick.reason}")
-    computed.forget()
-    best = descend(Counted(residual, box), ends[int(np.nanargmin(rms))][0], range(n))
-    found = answered(quick, [best], bars)
-    good = np.isfinite(rms)
-    values = np.array([box.values(u) if ok else np.full(n, np.nan) for (u, *_), ok in zip(ends, good)])
+    best = descents(Counted(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget)
+    found = answered(quick, best, bars)
+    values = np.array([box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends])
     return Found(found, np.array([box.values(u) for u in begins]), values, rms)
