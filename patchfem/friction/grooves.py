@@ -12,7 +12,7 @@ mu R, so F lies between V (t - mu)/(1 + mu t) and V (t + mu)/(1 - mu t) at rest 
 with mu t >= 1 locks: no force moves the load over it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
@@ -41,6 +41,18 @@ class Grooves:
     def steepest(self) -> float:
         """Largest slope A k of a flank [1]."""
         return self.amplitude * self.wave
+
+    def worn(self, depth: float, upper_share: float) -> "Grooves | None":
+        """The grooves after a mean worn depth [m] of both pieces together, of which the upper one lost `upper_share`;
+        None once they are flat.
+
+        Assumed: both pieces carry the grooves; what is worn off a piece comes from above its valleys in proportion to
+        the height there, so it keeps a cosine of the same valleys. Above them a piece has the volume A per area, so one
+        that lost the mean depth h has the amplitude A - h; the climb is that of the shallower piece, whose crests are
+        all that stands in the way.
+        """
+        left = self.amplitude - max(upper_share, 1 - upper_share) * depth
+        return replace(self, amplitude=left) if left > 0 else None
 
     def height(self, q):
         """Height z = A (1 - cos(k q - phase)) [m] at slides q [m], 0 at the bottom of a groove."""

@@ -64,22 +64,26 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         result = Result(what, Outcome.NO_CONTACT, {"normal_load": Measure(0.0, "N", 0.0)}, None, None, None, {},
                         seconds, warnings, {})
     else:
-        evolved = None
+        evolved, here = None, what
         if model.wear is not None and patch is not None:
             from .wear.keep import evolved_with
 
             evolved = evolved_with(kept, model, patch, coarse[:2], progress)
             patch, coarse = evolved.patch, evolved.coarse
+            if model.grooves is not None and evolved.state is not None:
+                from .wear.evolve import lowered
+
+                here = replace(what, model=lowered(model, patch, evolved.state.depth))
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
-        result = solve(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
+        result = solve(here, patch, coarse, seconds, warnings, say, progress, per_point, estimate)
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
             result = replace(result, measures=of_patch.measured(model, patch, coarse) | found)
         if model.wear is not None:
             from .wear.measures import worn
 
-            result = worn(result, evolved, estimate)
+            result = replace(worn(result, evolved, estimate), plan=what)
     seconds["total"] = perf_counter() - begin
     apart = "strip" if model.patch is not None else "interface"
     return replace(result, measures=worded(result.measures, apart), warnings=result.warnings + loose(result),

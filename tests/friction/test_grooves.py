@@ -44,3 +44,15 @@ def test_exact_slope_stiffness_and_capacity():
     for one in (g, Grooves(80e-6, 1e-6)):  # the flanks of the second are less steep than the worst
         t = one.slope(q)
         assert one.least_mass(mu) == pytest.approx((t * (t - mu) / (1 + mu * t)).min(), rel=1e-5)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.2])
+def test_exact_what_is_worn_off_is_what_the_flanks_lose(share):
+    """Per area: the volume between the cosines of both pieces and their valleys, before and after a mean depth."""
+    q, depth, g = np.linspace(0, 80e-6, 1000, endpoint=False), 3e-6, Grooves(80e-6, 7.5e-6)
+    pieces = [g.worn(depth, share) if larger else g.worn(depth * part / (1 - part), share)
+              for larger, part in ((True, max(share, 1 - share)), (False, min(share, 1 - share)))]
+    left = sum(float(one.height(q).mean()) for one in pieces)
+    assert 2 * g.height(q).mean() - left == pytest.approx(depth, rel=1e-12)
+    assert g.worn(depth, share).amplitude == min(one.amplitude for one in pieces)
+    assert g.worn(7.6e-6 / max(share, 1 - share), share) is None

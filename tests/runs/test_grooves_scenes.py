@@ -227,7 +227,8 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
     (RIG, ["normal.amplitude=10 N", "normal.frequency=50 Hz"], "normal.amplitude", "beside [normal.grooves]"),
     (RIG, ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"], "structure.bonded.wavelength",
      "beside [normal.grooves]"),
-    (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"], "wear", "beside [normal.grooves]"),
+    (BENCH, ["wear.coefficient=1e-14 m^2/N", "wear.cycles=1000"], "wear",
+     "beside [normal.grooves]: a point has no area"),
     (BENCH, ["normal.grooves.amplitude=-1 um"], "normal.grooves.amplitude", ""),
 ])
 def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):

@@ -1,6 +1,6 @@
 """The patch over many cycles of wear: contact, motion and worn depth advance together, jump by jump."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from time import perf_counter
 
@@ -61,16 +61,25 @@ class _Motion:
     def __init__(self, model, patch):
         self.model, self.pair = model, patch.pair
         self.frames = frames_for(model.accuracy.tolerance)
-        self.same = even(model, model.rig is not None and choose(model).per_point)
+        self.same = model.grooves is None and even(model, model.rig is not None and choose(model).per_point)
         self.last: Rubbed | None = None
 
     def __call__(self, worn) -> np.ndarray:
         if self.last is None or not self.same:
-            found = rubbed(self.model, pressed(self.model.patch, self.pair, worn), self.frames)
+            patch = pressed(self.model.patch, self.pair, worn)
+            found = rubbed(lowered(self.model, patch, worn), patch, self.frames)
             if found.outcome is not None:
                 raise _Unbounded(found.outcome.sentence)
             self.last = found
         return self.last.path
+
+
+def lowered(model, patch, depth):
+    """The model whose grooves are lowered by the mean of a worn depth (m,) [m] on its patch; itself without grooves."""
+    if model.grooves is None:
+        return model
+    area = patch.pieces.interface.weight
+    return replace(model, grooves=model.grooves.worn(float(depth @ area / area.sum()), model.wear.upper_share))
 
 
 def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep=None) -> Evolved:
@@ -120,6 +129,9 @@ def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
 def _moment(patch, state: Worn, motion: _Motion) -> Moment:
     area = patch.pieces.interface.weight
     worn = {"worn_volume": float(state.depth @ area), "worn_depth_max": float(state.depth.max(initial=0.0))}
+    if motion.model.grooves is not None:
+        left = lowered(motion.model, patch, state.depth).grooves
+        worn["groove_amplitude"] = 0.0 if left is None else left.amplitude
     moved = {} if motion.last is None else motion.last.values
     return Moment(state.cycle, state.depth, state.used, patch.pressure.sigma_n, patch.pressure.gap,
                   values(patch) | moved | worn)

@@ -95,6 +95,10 @@ def of_patch(found, motion: dict, estimate: bool = True) -> dict:
             meshes = limit([*(one[name] for one in reversed(others)), value])
             error = jumps[name] + share * value + meshes.error + 1e-12 * value
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
+    left = found.moments[-1].values.get("groove_amplitude")
+    if left is not None:
+        lost, row = out["worn_volume"].error, TABLE["groove_amplitude"]
+        out[row.name] = Measure(left, row.unit, None if lost is None else lost / float(area.sum()), row.floor)
     return out
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import settle
 from ..bench import bench
+from ..bench.engine import steps_of
 from ..results.travel import ended
 from ..rig.engines import ENGINES
 from ..rig.numerics import choose
@@ -20,9 +21,9 @@ LEAST_FRAMES, MOST_FRAMES = 64, 800
 class Rubbed(NamedTuple):
     """What one cycle of a motion does to the interface.
 
-    path (m,) [m]: slip path of each node, or with form 'energy' its friction work per area over its pressure; miss: its
-    relative error by the frames it is read from; values: measures of the motion; outcome: why no cycle repeats, else
-    None.
+    path (m,) [m]: slip path of each node, or with form 'energy' its friction work per area over its pressure, along the
+    flanks of grooves where there are any; miss: its relative error by the frames it is read from; values: measures of
+    the motion; outcome: why no cycle repeats, else None.
     """
 
     path: np.ndarray
@@ -40,7 +41,7 @@ def frames_for(tolerance: float) -> int:
 
 
 def even(model, per_point: bool = False) -> bool:
-    """Whether every point of the patch slides alike, so that wear does not change the motion."""
+    """Whether every point of the patch slides alike."""
     return not model.soft and not per_point and model.side == "upper"
 
 
@@ -51,7 +52,7 @@ def rubbed(model, patch, frames: int) -> Rubbed:
 
 def _bench(model, patch, frames: int) -> Rubbed:
     cycles = max(1, round(model.slide.cycles or 1))
-    steps = model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length)
+    steps = steps_of(model)
     shaped = not even(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
     outcome = ended(None, model.patch, patch, found.slide)
@@ -61,13 +62,13 @@ def _bench(model, patch, frames: int) -> Rubbed:
         if found.first == 0:
             local, tau = (np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau))
         return _read(model, patch, local, tau, False, found.values, outcome)
-    return _alike(model, patch, found.slip[found.first:], found.force[found.first:], found.load[found.first:],
-                  found.values, outcome)
+    last = [part[found.first:] for part in (found.slide, found.slip, found.force, found.load)]
+    return _alike(model, patch, last, last[-1][0], found.values, outcome)
 
 
 def _rig(model, patch, frames: int) -> Rubbed:
     numerics = choose(model)
-    shaped = not even(model, numerics.per_point)
+    shaped = not even(model, numerics.per_point and model.grooves is None)
     found = ENGINES[numerics.engine].run(model, numerics, patch, frames if shaped else 0, None, None)
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
@@ -76,7 +77,8 @@ def _rig(model, patch, frames: int) -> Rubbed:
     if shaped:
         fields = rig_fields(model, numerics, patch, found)
         return _read(model, patch, fields["slip"][1:], fields["shear_stress"][1:], True, found.values, outcome)
-    return _alike(model, patch, *_last_cycle(model, found.window, patch.pressure.load), found.values, outcome)
+    load = patch.pressure.load
+    return _alike(model, patch, _last_cycle(model, found.window, load), load, found.values, outcome)
 
 
 def of_point(model, window) -> float:
@@ -85,23 +87,45 @@ def of_point(model, window) -> float:
     It is weighted with the load where that changes. window: histories of a bench or a rig.
     """
     if model.rig is not None:
-        slip, force, load = _last_cycle(model, window, model.point.load)
+        last = _last_cycle(model, window, model.point.load)
     else:
-        slip, force, load = (part[window.first:] for part in (window.slip, window.force, window.load))
-    return float(_alike(model, None, slip, force, load, {}, None).path[0])
+        last = [part[window.first:] for part in (window.slide, window.slip, window.force, window.load)]
+    return float(_alike(model, None, last, last[-1][0], {}, None).path[0])
 
 
-def _last_cycle(model, window, load: float) -> tuple:
-    """Slip [m], force [N] and load [N] (k,) of the last cycle of a rig."""
+def _last_cycle(model, window, load: float) -> list:
+    """Slide [m], slip [m], force [N] and load [N] (k,) of the last cycle of a rig; over grooves the vertical force."""
     last = window.time >= window.time[-1] - model.rig.drive.period * (1 + 1e-9)
-    return window.slip[last], window.force[last], np.full(int(last.sum()), load)
+    loads = window.extra.get("normal_load", np.full(window.time.size, load))
+    return [part[last] for part in (window.slide, window.slip, window.force, loads)]
 
 
-def _alike(model, patch, slip, force, load, values: dict, outcome) -> Rubbed:
-    """The path of a slide that is the same at every point, from its samples (k,)."""
+def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rubbed:
+    """The path of a slide that is the same at every point: its length under `scale` [N], from slide, slip, force and
+    load (k,) of the last cycle."""
+    slide, slip, force, load = last
     weight = np.abs(force) if model.wear.energy else load  # friction opposes the slip, also where a step reverses it
-    path = float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2)) / load[0] if load[0] > 0 else 0.0
-    return Rubbed(np.full(1 if patch is None else patch.x.size, path), 0.0, values, outcome)
+    miss = 0.0
+    if model.grooves is not None:
+        weight = along_flanks(model, slide, force, load)
+    path = _summed(slip, weight) / scale if scale > 0 else 0.0
+    if model.grooves is not None and path > 0:
+        miss = abs(path - _summed(slip[::2], weight[::2]) / scale) / path
+    return Rubbed(np.full(1 if patch is None else patch.x.size, path), miss, values, outcome)
+
+
+def _summed(slip, weight) -> float:
+    return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
+
+
+def along_flanks(model, slide, force, load) -> np.ndarray:
+    """What wears per slide on the flanks of grooves (k,) [N]: R ds/dq = V + F t of the normal force R, with form
+    'energy' |f| ds/dq = |F - V t| of the friction f along them.
+
+    slide [m], force F against the slide [N] and vertical force V [N] (k,).
+    """
+    t = model.grooves.slope(slide)
+    return np.abs(force - load * t) if model.wear.energy else np.maximum(load + force * t, 0.0)
 
 
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:

@@ -27,8 +27,9 @@ def check_wear(draft: Draft, kind: str) -> None:
 def _beside(tables, kind: str):
     """Tables and values that wear does not go with, each with what to do."""
     contact, structure, drive, method = tables.contact, tables.structure, tables.drive, tables.accuracy.method
-    if grooves := grooves_of(tables):
-        yield f"[{grooves[0]}]", LATER.format("the grooves")
+    grooves = grooves_of(tables)
+    if grooves is not None and tables.normal is not None and grooves[1].amplitude:
+        yield f"[{grooves[0]}]", "a point has no area from which the wear lowers the grooves: use [contact]"
     if contact is not None and contact.strips is not None:
         yield "contact.strips", LATER.format("the strips")
     if tables.normal is not None and tables.normal.amplitude and kind == "rig":
