@@ -78,9 +78,12 @@ def _between(result: Result) -> dict:
 
 
 def _levels(levels) -> dict:
-    """Columns of a run in levels: the drive, whether it held, every measure and its error."""
+    """Columns of a run in levels: the drive, whether it held, its outcome where each was judged, every measure and its
+    error."""
     out = {"level_drive": (levels[0].unit, np.array([one.drive for one in levels])),
            "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8))}
+    if any(one.outcome for one in levels):
+        out["level_outcome"] = ("", np.array([one.outcome for one in levels]))
     for name in KEPT:
         if any(name in one.values for one in levels):
             out[f"level_{name}"] = (TABLE[name].unit, np.array([one.values.get(name, np.nan) for one in levels]))

@@ -103,8 +103,10 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
         data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
     for name, (unit, values) in (levels or {}).items():
         drive = "force" if unit == "N" else "acceleration of the base"
-        text = {"level_drive": drive, "level_stuck": "whether the interface held"}
-        data[name] = ("level", values, {"units": unit, "long_name": text.get(name, name.replace("_", " "))})
+        text = {"level_drive": drive, "level_stuck": "whether the interface held",
+                "level_outcome": "outcome of the level"}
+        about = {"units": unit} if unit else {}
+        data[name] = ("level", values, about | {"long_name": text.get(name, name.replace("_", " "))})
     return Contents(data, coords)
 
 
@@ -126,20 +128,30 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
         "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event"})})
 
 
+READ = {"amplitude": ("m", "half peak-to-peak at the output"),
+        "acceleration_peak": ("m s-2", "largest absolute acceleration"),
+        "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
+        "acceleration_distortion": ("1", "third over first harmonic of the absolute acceleration")}  # off a curve
+
+
 def with_curve(data: Contents, curve: dict) -> Contents:
-    """The contents with a curve of steady motions (c,): frequency [Hz], level, amplitude [m], regime, multiplier, and
-    its folds."""
+    """The contents with a curve of steady motions (c,): frequency [Hz], level, amplitude [m], regime, multiplier, its
+    folds, and where it has them the columns of READ and the errors of all that is read."""
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
     out = {"curve_frequency": (point, curve["frequency"], {"units": "Hz", "long_name": "drive frequency"}),
            "curve_level": (point, curve["level"], {"units": "m s-2", "long_name": "drive: acceleration of the base, or "
                                                                                   "force over the modal mass"}),
-           "curve_amplitude": (point, curve["amplitude"], {"units": "m", "long_name": "half peak-to-peak at the output "
-                                                                                      "of the steady motion"}),
            "curve_regime": (point, number.astype(np.int8), {"flag_values": np.arange(len(names), dtype=np.int8),
                                                             "flag_meanings": " ".join(meanings),
                                                             "long_name": "regime of the steady motion"}),
            "curve_multiplier": (point, curve["multiplier"], {"units": "1", "long_name": "largest Floquet multiplier"})}
+    for name, (unit, text) in READ.items():
+        if name in curve:
+            out[f"curve_{name}"] = (point, curve[name], {"units": unit, "long_name": f"{text} of the steady motion"})
+        if f"{name}_error" in curve:
+            out[f"curve_{name}_error"] = (point, curve[f"{name}_error"],
+                                          {"units": unit, "long_name": f"estimated half-width of the {text}"})
     if len(curve.get("folds", ())):
         over, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
         out["curve_fold"] = ("fold", np.asarray(curve["folds"], float),

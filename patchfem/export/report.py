@@ -238,22 +238,29 @@ def _table_one(data: dict) -> list:
     return [Section("measured", "Against the measurement", text)]
 
 
+OF_LEVELS = (("relative_displacement_amplitude", "m"), ("absolute_acceleration_peak", "m s-2"),
+             ("absolute_acceleration_fundamental", "m s-2"), ("acceleration_distortion", "1"))
+
+
 def _table_of_levels(levels: list) -> Section:
-    """Drive, amplitude, acceleration and whether it held, of every level."""
-    rows = []
+    """Drive, amplitude, acceleration, its distortion, the outcome where it is known, and whether it held, of every
+    level."""
+    rows, judged = [], any(one.get("outcome") for one in levels)
     for number, one in enumerate(levels, 1):
         cells = []
-        for name in ("relative_displacement_amplitude", "absolute_acceleration_peak"):
+        for name, unit in OF_LEVELS:
             value, error = one["values"].get(name), one["errors"].get(name)
-            unit = "m" if name.startswith("rel") else "m s-2"
-            cells.append("&ndash;" if value is None else pair(name, measure(value, unit, error)))
+            there = value is not None and np.isfinite(value)
+            cells.append(pair(name, measure(value, unit, error)) if there else DASH)
         drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
         rows.append(f"<tr><td class=n>{number}</td><td class=n>{drive}</td>"
                     + "".join(f"<td class=n>{cell}</td>" for cell in cells)
+                    + (f"<td>{escape(one['outcome'])}</td>" if judged else "")
                     + f"<td>{'stuck' if one['stuck'] else 'slips'}</td></tr>")
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
     return Section("levels", "Levels", f"<table><tr><th class=n>level<th class=n>{sized}<th class=n>half peak-to-peak"
-            f"<th class=n>peak acceleration<th>interface</tr>{''.join(rows)}</table>")
+            "<th class=n>peak acceleration<th class=n>its first harmonic<th class=n>third over first"
+            f"{'<th>outcome' if judged else ''}<th>interface</tr>{''.join(rows)}</table>")
 
 
 def measure(value: float, unit: str, error: float | None) -> dict:

@@ -27,7 +27,7 @@ def report_data(result: Result) -> dict:
         data["fields"]["time"] = data["fields"]["time"] - data["fields"]["time"][0]
     if "levels" in result.extra:
         data["levels"] = [{"drive": one.drive, "stuck": one.stuck, "values": one.values, "errors": one.errors,
-                           "unit": one.unit}
+                           "unit": one.unit, "outcome": one.outcome}
                           for one in result.extra["levels"]]
     if "regime" in result.extra:
         data["steady"] = {"regime": result.extra["regime"], "multiplier": largest_multiplier(result.extra)}

@@ -6,7 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "acceleration_distortion", "slip_amplitude",
+from ..core import Outcome
+
+KEPT = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
+        "acceleration_distortion", "slip_amplitude",
         "stick_fraction", "friction_force_peak", "loop_area", "equivalent_stiffness", "secant_stiffness",
         "equivalent_damping")
 AMPLITUDE = KEPT[0]
@@ -19,7 +22,8 @@ class Level:
     """The end of one level of the drive.
 
     drive: acceleration [m s-2], of a force drive the force over the modal mass, or the force [N] where `unit` says so;
-    stuck: nothing slipped; values: measures by name; errors: theirs, as far as they are known.
+    stuck: nothing slipped; values: measures by name; errors: theirs, as far as they are known; outcome:
+    how the motion under this level ended, "" where only the last one was asked.
     """
 
     drive: float
@@ -27,19 +31,18 @@ class Level:
     values: dict
     errors: dict
     unit: str = "m s-2"
+    outcome: str = ""
 
 
 def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool]:
     """What tells whether a level lies beyond the onset, by the kind of onset that the scene asks for.
 
     "slip": some irreversible motion; "distortion": H3/H1 of the acceleration above DISTORTED; "gauge": half
-    peak-to-peak at the output above `length` [m].
+    peak-to-peak at the output above `length` [m]. A motion that nothing bounds lies beyond every onset.
     """
-    if kind == "slip":
-        return lambda level: not level.stuck
-    if kind == "gauge":
-        return lambda level: level.values[AMPLITUDE] > length
-    return lambda level: level.values.get("acceleration_distortion", 0.0) > DISTORTED
+    beyond = {"slip": lambda level: not level.stuck, "gauge": lambda level: level.values[AMPLITUDE] > length}.get(
+        kind, lambda level: level.values.get("acceleration_distortion", 0.0) > DISTORTED)
+    return lambda level: level.outcome == Outcome.GROWS or beyond(level)
 
 
 def no_onset(kind: str, length: float | None = None) -> str:
@@ -70,7 +73,8 @@ def jump(levels, name: str = AMPLITUDE) -> tuple | None:
     """
     found = []
     for a, b in pairwise(levels):
-        if min(a.drive, b.drive, a.values[name], b.values[name]) > 0 and not (a.stuck or b.stuck):
+        sizes = a.drive, b.drive, a.values[name], b.values[name]
+        if all(0 < size < np.inf for size in sizes) and not (a.stuck or b.stuck):
             factor = (b.values[name] / a.values[name]) / (b.drive / a.drive)
             found.append((abs(np.log(factor)), b.drive, factor, abs(b.drive - a.drive)))
     return max(found)[1:] if found and max(found)[0] >= np.log(JUMP) else None
@@ -88,4 +92,4 @@ def hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
     if not pairs:
         return None
     gaps = [(abs(a.values[name] - b.values[name]), a.errors.get(name, 0.0) + b.errors.get(name, 0.0)) for a, b in pairs]
-    return max(gaps)
+    return max((one for one in gaps if np.isfinite(one[0])), default=None)

@@ -4,7 +4,8 @@ from ..core import Measure
 from ..structure.drive_sizes import sinusoidal, whole
 from .rows import TABLE
 
-CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", "acceleration_distortion")
+ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
+CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the interface holds throughout the last cycles"
 
 
@@ -15,7 +16,7 @@ def without_value(values, window, drive, rubs: bool) -> dict:
     interface bears a load.
     """
     lacking = {name: _of_cycles(name, values, window, drive) for name in CYCLIC
-               if rubs or name == "acceleration_distortion"}
+               if rubs or name in ACCELERATIONS}
     if rubs:
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
@@ -36,7 +37,7 @@ def _of_cycles(name: str, values, window, drive) -> str:
         return "only a drive that ends as a sine has it"
     if not whole(window.time[-1] - window.time[0], drive):
         return "the run holds no whole cycle of the drive"
-    if name == "acceleration_distortion":
+    if name in ACCELERATIONS:
         return "the output has no acceleration"
     if "equivalent_stiffness" not in values:
         return f"{HOLDS}, so its loop has no width"

@@ -14,7 +14,7 @@ from ..core import Response, Row
 from ..structure.drive_sizes import whole
 from .loops import drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import acceleration_peak, energy_balance, ledger_measures, slip_measures
-from .spectrum import distortion
+from .spectrum import odd_harmonics, wave_measures
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +67,14 @@ class Seen:
         found = interface_loop(half_range(self.turns) if moves else 0.0, *self.loop[1:], self.stiffness)
         return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
 
-    @property
-    def distortion(self) -> float | None:
-        """acceleration_distortion [1], None without a sine or without a whole cycle."""
+    @cached_property
+    def waves(self) -> dict:
+        """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, as far as the run has
+        them: a drive that ends as a sine, whole cycles, and of the latter an acceleration."""
         time = self.window.time
-        return distortion(self.window, self.drive) if self.sine and whole(time[-1] - time[0], self.drive) else None
+        if not (self.sine and whole(time[-1] - time[0], self.drive)):
+            return {}
+        return wave_measures(*odd_harmonics(self.window, self.drive))
 
     @cached_property
     def energies(self) -> dict:
@@ -97,9 +100,12 @@ ROWS = (
     Row("energy_balance", "1", 1e-8,
         "work in that is neither stored nor dissipated over the run, over the power that passed and the peak stored",
         lambda s: energy_balance(s.book), group="energy"),
+    Row("absolute_acceleration_fundamental", "m s-2", 1e-4,
+        "first harmonic of the acceleration at the output, base motion included",
+        lambda s: s.waves.get("absolute_acceleration_fundamental")),
     Row("acceleration_distortion", "1", 1e-6,
         "third over first harmonic of the acceleration at the output, base motion included",
-        lambda s: s.distortion),
+        lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
         "time mean of the slide in the last cycle less that in the first of the last cycles, per cycle between them",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period)),

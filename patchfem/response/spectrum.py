@@ -36,8 +36,8 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     return complex(2 / span * border - omega**2 * motion_harmonic(time, value, rate, omega))
 
 
-def distortion(window, drive) -> float | None:
-    """Third over first harmonic of the absolute acceleration at the output [1]; None for no acceleration at all.
+def odd_harmonics(window, drive) -> tuple:
+    """Sizes [m s-2] of the first and the third harmonic of the absolute acceleration at the output.
 
     window: Response over whole cycles of a drive that ends as a sine.
     """
@@ -46,7 +46,15 @@ def distortion(window, drive) -> float | None:
                     for n in (1, 3))
     if drive.moving:  # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
-    return float(abs(third) / abs(first)) if abs(first) > 0 else None
+    return float(abs(first)), float(abs(third))
+
+
+def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
+    """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, from the sizes of the first
+    and the third harmonic; the latter None where the first is round-off beside the drive's `size` [m s-2]."""
+    ratio = distorted(first, third, size)
+    return {"absolute_acceleration_fundamental": float(first),
+            "acceleration_distortion": None if np.isnan(ratio) else float(ratio)}
 
 
 def distorted(first, third, size):

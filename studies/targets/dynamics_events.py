@@ -86,8 +86,8 @@ def steady_point() -> tuple:
     kernels = load("dynamics.one_mode.steady_kernels")
     row = [1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0]
     count = 200
-    table, found, phases = np.tile(row, (count, 1)), np.zeros((count, 12)), np.zeros((count, 16))
-    room, answer = np.empty(orbit_kernels.OUT), np.zeros(12)
+    table, found, phases = np.tile(row, (count, 1)), np.zeros((count, orbit_kernels.FOUND)), np.zeros((count, 16))
+    room, answer = np.empty(orbit_kernels.OUT), np.zeros(orbit_kernels.FOUND)
     seconds = least(lambda: kernels.points(table, 4000, room, found, phases)) / count
     plain = least(lambda: orbit_kernels.point(*row, 4000, room, phases[0], answer), 3, 5)
     return seconds, float(max(found[0, 9], abs(found[0, 2] / PEAK - 1))), plain

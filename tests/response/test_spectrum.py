@@ -53,8 +53,11 @@ def test_exact_distortion_with_and_without_a_moving_base(moving):
     v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
     zero = np.zeros(t.size)
     window = Response(t, zero[:, None], zero[:, None], zero, zero, y, v, zero, zero, zero, zero)
-    found = spectrum.distortion(window, BaseSine(2.0, OMEGA, moving))
-    assert found == pytest.approx(0.5 / (5 if moving else 3), rel=1e-7)
+    first, third = spectrum.odd_harmonics(window, BaseSine(2.0, OMEGA, moving))
+    assert first == pytest.approx(5 if moving else 3, rel=1e-7) and third == pytest.approx(0.5, rel=1e-7)
+    found = spectrum.wave_measures(first, third)
+    assert found == {"absolute_acceleration_fundamental": first, "acceleration_distortion": third / first}
+    assert spectrum.wave_measures(1e-16, 1e-17, 1.0)["acceleration_distortion"] is None
 
 
 SCENE = """\

@@ -14,7 +14,7 @@ from patchfem.dynamics.harmonic.starts import one_harmonic
 from patchfem.model.model import build
 from patchfem.runs.many.many import taken
 from patchfem.runs.rig.numerics import choose
-from patchfem.runs.rig.steady_balance import Balance
+from patchfem.runs.rig.steady.balance import Balance
 from patchfem.scene.scene import SceneError, loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
@@ -190,13 +190,13 @@ def test_always_a_balanced_motion_that_does_not_last_is_said():
         "drive.acceleration=58.8 m/s^2", "normal.load=115.65 N", "structure.moving_mass=1.194 kg"])
     model = build(scene)
     finder = Balance(model, choose(model), None, None)
-    found, _, _ = finder.point(model.rig.drive)
+    found, _ = finder.point(model.rig.drive)
     assert found.outcome is Outcome.STEADY
     assert found.values["relative_displacement_amplitude"] == pytest.approx(9e-6, rel=0.1)
     drive = model.rig.drive
     starts = one_harmonic(balance_of(finder.modes, finder.group, 512), drive.omega, drive.acceleration)
     other = periodic_point(finder.modes, drive, finder.group, 15, start=starts[2])
-    found, _, _ = finder.point(model.rig.drive, other)
+    found, _ = finder.point(model.rig.drive, other)
     assert found.outcome is Outcome.NOT_CONVERGED and "does not last" in found.message
     assert found.values["relative_displacement_amplitude"] > 20e-6
 

@@ -210,7 +210,8 @@ def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
     def part(values, order=1):
         return 2 * np.sum(w.w * values * np.exp(-1j * order * omega * w.t)) / (w.end - w.begin)
 
-    out = {"acceleration_distortion": float(abs(part(w.a, 3)) / abs(part(w.a)))}
+    first, third = (abs(part(w.a, order)) for order in (1, 3))
+    out = {"absolute_acceleration_fundamental": float(first), "acceleration_distortion": float(third / first)}
     first = part(q)
     if np.ptp(q) == 0:
         return out

@@ -12,6 +12,7 @@ from .slip_kernels import REACH, motion, oscillator, series, step_answer, stop
 OUT = 24  # of `flow`: z, v, direction, tangent (6), stuck angle, stops, slips, highest z (4), lowest z (4), releases
 STUCK, STOPS, SLIDING, UNBOUNDED, UNSETTLED = 0, 1, 2, 3, 4
 PHASES = 16  # releases kept per period
+FOUND = 14  # numbers of a motion, as `point` has them
 
 
 def impulse(u, o):
@@ -190,9 +191,10 @@ def recurrence(theta, z, v, b, static, kinetic, o, out, phases):
 def point(w, decay, static, kinetic, b, om, z, v, patience, out, phases, found):
     """Steady motion under the force b sin(om t) over the mass, from the state (z, v) at phase 0.
 
-    found (12): regime, sticks per period, half peak to peak, its derivative by static (kinetic/static held), share of
+    found (14): regime, sticks per period, half peak to peak, its derivative by static (kinetic/static held), share of
     time stuck, two multipliers over its period (real and imaginary part of the larger, real and imaginary of the
-    smaller), periods it takes to repeat, 1 if not symmetric, residual. patience: most cycles of marching.
+    smaller), periods it takes to repeat, 1 if not symmetric, residual, z and v at phase 0. patience: most cycles of
+    marching.
     """
     o = oscillator(w, decay, om)
     for k in range(found.shape[0]):
@@ -211,6 +213,7 @@ def point(w, decay, static, kinetic, b, om, z, v, patience, out, phases, found):
         if ok:
             z1, v1, miss = newton(theta, z1, v1, pi, -1.0, b, static, kinetic, o, out, phases, 6)
             if miss <= 1e-12 and out[10] == 0.0 and report(1, -1.0, out, phases, found, miss):
+                at_phase_0(theta, z1, v1, b, static, kinetic, o, out, phases, found)
                 return
     theta, done, halves = 0.0, 0, 1 if kinetic == static else 40
     while done < patience:
@@ -223,10 +226,17 @@ def point(w, decay, static, kinetic, b, om, z, v, patience, out, phases, found):
         z1, v1, miss = newton(theta, z, v, angle, sign, b, static, kinetic, o, out, phases, 10)
         near = kinetic == static or max(abs(z1 - z), abs(v1 - v) / om) <= 0.02 * max(out[12], -out[16])
         if near and miss <= 1e-12 and report(max(periods, 1), sign, out, phases, found, miss):
+            at_phase_0(theta, z1, v1, b, static, kinetic, o, out, phases, found)
             return
         halves = 2 * max(4, done)
     found[2] = nan
     found[0] = UNSETTLED
+
+
+def at_phase_0(theta, z, v, b, static, kinetic, o, out, phases, found):
+    """State of the motion through (z, v) at phase theta when the phase is 0 next, to the end of `found`."""
+    flow(theta, z, v, TURN - theta % TURN, b, static, kinetic, o, out, phases[:0])
+    found[12], found[13] = out[0], out[1]
 
 
 def report(periods, sign, out, phases, found, miss):

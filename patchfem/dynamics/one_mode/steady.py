@@ -53,7 +53,8 @@ class Curve:
     """Steady motions under many sines, arrays of one shape with the meanings of Steady.
 
     omega [rad/s] of the drive; regime: of Regime; stops; amplitude [m]; stick_fraction; multiplier: the larger one;
-    condition; residual.
+    condition; residual; place [m] and rate [m/s] of the coordinate at phase 0 of the drive; periods of the drive after
+    which the motion repeats.
     """
 
     omega: np.ndarray
@@ -64,6 +65,9 @@ class Curve:
     multiplier: np.ndarray
     condition: np.ndarray
     residual: np.ndarray
+    place: np.ndarray
+    rate: np.ndarray
+    periods: np.ndarray
 
 
 REGIMES = tuple(Regime)  # in the order of the codes of `orbit_kernels`
@@ -94,7 +98,7 @@ def point(modes: ModalBasis, drive, static: float, kinetic: float, start: Start 
     cycles are marched in search of it.
     """
     row, output = _row(modes, drive, static, kinetic, start)
-    found, phases = np.zeros(12), np.full(orbit_kernels.PHASES, np.nan)
+    found, phases = np.zeros(orbit_kernels.FOUND), np.full(orbit_kernels.PHASES, np.nan)
     if compiled:
         load("dynamics.one_mode.steady_kernels").points(np.array([row], float), patience, np.empty(orbit_kernels.OUT),
                                                            found[None], phases[None])
@@ -133,13 +137,15 @@ def motions(modes: ModalBasis, level, omega, static, kinetic=None, patience: int
     if not (np.all(level >= 0) and np.all(omega > 0) and np.all(kinetic >= 0) and np.all(kinetic <= static)):
         raise PatchfemError("friction.kinetic: a map of steady motions wants levels >= 0, frequencies > 0 and "
                             "0 <= kinetic <= static friction")
-    table, found, phases = np.zeros((size, 8)), np.zeros((size, 12)), np.full((1, orbit_kernels.PHASES), np.nan)
+    table, found = np.zeros((size, 8)), np.zeros((size, orbit_kernels.FOUND))
     w, decay, output = float(modes.omega[0]), float(modes.dampers[0, 0]) / 2, abs(float(modes.output[0]))
     for place, column in enumerate((w, decay, static * share, kinetic * share, -float(modes.base[0]) * level, omega)):
         table[:, place] = np.ravel(column)
+    phases = np.full((1, orbit_kernels.PHASES), np.nan)
     load("dynamics.one_mode.steady_kernels").points(table, patience, np.empty(orbit_kernels.OUT), found, phases)
     columns = (found[:, 1], found[:, 2] * output, found[:, 4], found[:, 5] + 1j * found[:, 6],
-               found[:, 3] * output * (w**2 if w > 0 else table[:, 5]**2), found[:, 9])
+               found[:, 3] * output * (w**2 if w > 0 else table[:, 5]**2), found[:, 9], found[:, 12], found[:, 13],
+               found[:, 7].astype(int))
     regime = np.array(REGIMES)[found[:, 0].astype(int)]
     return Curve(omega.copy(), regime.reshape(omega.shape), *(one.reshape(omega.shape) for one in columns))
 

@@ -53,18 +53,20 @@ def caption(found: dict) -> str:
 def curve(found: dict):
     """Draw the amplitude of the steady motion over frequency or level.
 
-    The regime is shown by colour and line: stable motions whole, unstable ones broken; folds are marked.
+    The regime is shown by colour and line: stable motions whole, unstable ones broken; folds are marked. Where the
+    curve has accelerations the largest one and its first harmonic stand beside it.
     """
     along, what, unit = axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
     value = np.asarray(found["amplitude"]) * scale
-    figure, (axis,) = drawing(1, 3.8)
+    figure, (axis, *beside) = drawing(2 if "acceleration_peak" in found else 1, 3.8)
     parts = spans(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     for regime, first, last in parts:
         stop = min(last + 1, along.size)  # on to the next part, so that the line is whole
         seen = regime not in axis.get_legend_handles_labels()[1]
-        axis.plot(along[first:stop], value[first:stop], STYLES.get(regime, "-"), color=colours[regime],
+        style = "--" if "unstable" in regime else STYLES.get(regime, "-")
+        axis.plot(along[first:stop], value[first:stop], style, color=colours[regime],
                   marker="o" if along.size <= MARKED else None, ms=3, label=regime if seen else None)
     _gaps(axis, along, value)
     for k, at in enumerate(found.get("folds", ())):
@@ -73,6 +75,13 @@ def curve(found: dict):
     axis.set(xlabel=f"{what} [{unit}]", ylabel=f"half peak-to-peak [{name}]", title="Steady motion at the output")
     axis.set_ylim(bottom=0)
     axis.legend()
+    for other in beside:
+        lines = ("peak", "-", BLUE, "largest"), ("fundamental", "--", ORANGE, "first harmonic")
+        for key, style, colour, text in lines:
+            other.plot(along, np.asarray(found[f"acceleration_{key}"]) / G, style, color=colour, label=text)
+        other.set(xlabel=f"{what} [{unit}]", ylabel="acceleration [g]", title="Its absolute acceleration")
+        other.set_ylim(bottom=0)
+        other.legend()
     return figure
 
 

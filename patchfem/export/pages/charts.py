@@ -150,7 +150,8 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
 
 
 def curve(found: dict) -> list:
-    """Amplitude of the steady motion over frequency or level, the regime by colour and line, folds marked."""
+    """Amplitude of the steady motion over frequency or level, the regime by colour and line, folds marked; its largest
+    acceleration and the first harmonic of that."""
     along, what, unit = curves.axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
     value, parts = np.asarray(found["amplitude"]) * scale, curves.spans(found)
@@ -161,9 +162,15 @@ def curve(found: dict) -> list:
     for regime, first, last in parts:
         stop = min(last + 1, along.size)  # on to the next part, so that the line is whole
         marks.append(line(along[first:stop], value[first:stop], colours[regime], regime,
-                          dash=REGIMES.get(regime, "solid")))
+                          dash="dashed" if "unstable" in regime else REGIMES.get(regime, "solid")))
     marks += [mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N) for at in found.get("folds", ())]
-    return [chart("Steady motion at the output", axis(what, unit), axis("half peak-to-peak", name), marks)]
+    out = [chart("Steady motion at the output", axis(what, unit), axis("half peak-to-peak", name), marks)]
+    if "acceleration_peak" in found:
+        lines = [line(along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash)
+                 for key, colour, text, dash in (("peak", "accent", "largest", "solid"),
+                                                 ("fundamental", "warm", "first harmonic", "dashed"))]
+        out.append(chart("Its absolute acceleration", axis(what, unit), axis("acceleration", "g"), lines))
+    return out
 
 
 def levels(rows: list) -> list:

@@ -105,7 +105,7 @@ class Watcher:
         from ...dynamics.harmonic.balance import periodic_response
         from ...dynamics.harmonic.point import point
         from ...response.measures import acceleration_peak
-        from ..rig.steady_balance import SAMPLES, Balance
+        from ..rig.steady.balance import SAMPLES, Balance
 
         one = self._once("balance", lambda: Balance(self.model, self.numerics, self.patch, self.say))
         found = point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
@@ -115,7 +115,7 @@ class Watcher:
         return Watched(window, acceleration_peak(window), found.amplitude(one.modes.output), found)
 
     def _events(self, drive, near) -> Watched | None:
-        from ..rig.steady_events import Events
+        from ..rig.steady.events import Events
 
         raw = self._once("events", lambda: Events(self.model, self.numerics, self.patch, self.say)).point(drive)[0]
         return _seen(raw)

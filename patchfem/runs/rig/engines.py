@@ -239,7 +239,7 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
 EXACT = Engine("exact", _not_exact, "exact run_exact", _no_rungs, _exact_in_space)
 PIECES = Engine("piecewise", dearer_pieces, "pieces.run run_piecewise", _no_rungs, _pieces_in_space)
 MARCH = Engine("march", _nothing, "march run_march", _march_in_time, _march_in_space)
-HARMONIC = Engine("harmonic", _nothing, "steady run_steady", _no_rungs, _steady_in_space, 0.0, None)
+HARMONIC = Engine("harmonic", _nothing, "steady.steady run_steady", _no_rungs, _steady_in_space, 0.0, None)
 COMPARED = ("duhamel", "newmark", "euler")
 SMOOTH = Engine("smooth", not_smooth, "smooth.solve run_smooth", _smooth_in_time, _own_errors, 5e-9, None)
 ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(

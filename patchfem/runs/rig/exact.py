@@ -15,7 +15,7 @@ from ...response.levels import Level
 from ...response.measures import circular_mean, harmonic, swing, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of
-from ...response.spectrum import distorted
+from ...response.spectrum import wave_measures
 from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
 from ..bench.averaged import limit_share
 from . import levels as rig_levels
@@ -102,8 +102,7 @@ def _values(model, numerics, patch, drive, done) -> tuple:
     if abs(done.cycles_done - round(done.cycles_done)) > 1e-9:  # the cycles are counted from the start
         known["relative_displacement_amplitude"] = swing(window)
     if done.waves is not None and sinusoidal(drive) and whole(span, drive):
-        found = distorted(*np.abs(done.waves), largest(drive))
-        known["acceleration_distortion"] = None if np.isnan(found) else float(found)
+        known |= wave_measures(*np.abs(done.waves), largest(drive))
     cycles, holds = span / drive.period, done.stick >= span * (1 - 1e-12)
     if done.means is not None and not apart and cycles >= 1.5:
         known["drift_per_cycle"] = (done.means[1] - done.means[0]) / (cycles - 1)

@@ -4,14 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...core import BaseSine, Measure, Outcome, Response
-from ...dynamics.curve_points import adapted
+from ...core import Measure, Outcome, Response
 from ...response.measures import half_swing, harmonic
 from ...response.rows import Seen, measures_of
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
-
-POINTS = 121  # of a curve over frequency, before its bends ask for more
-SHARE = 0.01  # by which straight lines between points of a curve may miss it
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -107,47 +103,6 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     return window.slide, slide, pull, work
 
 
-def traced(modes, drive, find) -> tuple:
-    """Curve as arrays by name, the sine of its largest amplitude and the Point there.
-
-    find(sine, near) -> ((frequency, level, amplitude, regime, multiplier), Point) of the steady motion under a sine;
-    near: the Point before it, or None. Levels are taken as they are. Over a sweep, POINTS frequencies and those of the
-    modes are where the curve begins; straight lines between its points miss it by SHARE at most.
-    """
-    def found(frequency, near):
-        sine = BaseSine(drive.acceleration, 2 * np.pi * frequency, drive.moving)
-        row, point = find(sine, near and near[3])
-        return row[2], row, sine, point
-
-    if hasattr(drive, "low"):
-        rows = adapted(found, starts_of(modes, drive), SHARE)[1]
-    else:
-        rows, near = [], None
-        for one in drive.segments:
-            sine = BaseSine(one.amplitude, one.omega, drive.moving)
-            row, near = find(sine, near)
-            rows.append((row[2], row, sine, near))
-    names = ("frequency", "level", "amplitude", "regime", "multiplier")
-    curve = {name: np.array(column) for name, column in zip(names, zip(*(one[1] for one in rows)))}
-    return curve, *rows[largest_of(curve["amplitude"])][2:]
-
-
-def starts_of(modes, drive, count: int = POINTS) -> np.ndarray:
-    """Frequencies [Hz] from end to end of a sweep with which its curve begins: `count` of them, and those of the modes
-    between, where a peak may be narrower than their spacing."""
-    space = np.geomspace if drive.logarithmic else np.linspace
-    ends, own = sorted((drive.low, drive.high)), modes.omega / (2 * np.pi)
-    places = np.union1d(space(*ends, count), own[(own > ends[0]) & (own < ends[1])])
-    places = places[np.append(True, np.diff(places) > 1e-9 * places[1:])]
-    return places if drive.low < drive.high else places[::-1]
-
-
-def largest_of(amplitude) -> int:
-    """Number of the largest of amplitudes (k,) [m] that are finite."""
-    amplitude = np.asarray(amplitude, float)
-    return int(np.argmax(np.where(np.isfinite(amplitude), amplitude, -1.0)))
-
-
 def curve_measures(extra: dict) -> dict:
     """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude, to the points beside it.
 
@@ -156,9 +111,10 @@ def curve_measures(extra: dict) -> dict:
     curve = extra.get("curve")
     if curve is None:
         return {}
-    k, places = largest_of(curve["amplitude"]), curve["frequency"]
+    at, places = float(extra["at"].omega / (2 * np.pi)), curve["frequency"]
+    k = int(np.argmin(np.abs(places - at)))
     spacing = float(np.abs(np.diff(places[max(k - 1, 0):k + 2])).max(initial=0.0))
-    return {"peak_frequency": Measure(float(places[k]), "Hz", spacing, spacing)}
+    return {"peak_frequency": Measure(at, "Hz", spacing, spacing)}
 
 
-__all__ = ["Solution", "borne", "curve_measures", "largest_of", "measures_of", "sampled_loop", "seen", "traced"]
+__all__ = ["Solution", "borne", "curve_measures", "measures_of", "sampled_loop", "seen"]

@@ -71,8 +71,9 @@ def _instruments(draft: Draft, modes: tuple) -> None:
         return
     beside = next((key for key in ("structure.travel", "structure.stiffening") if draft.given(key)), "")
     if drive is not None and not beside:
+        steady = draft.tables.accuracy is not None and draft.tables.accuracy.method == "harmonic"
         beside = "drive.kind = 'free'" if drive.kind == "free" else \
-            f"drive.waveform = '{drive.waveform}'" if drive.waveform in ("sweep", "levels") else ""
+            f"drive.waveform = '{drive.waveform}'" if drive.waveform in ("sweep", "levels") and not steady else ""
     if beside:
         draft.say(written[0], unbuilt(f"beside {beside}", "output alone"))
 

@@ -299,7 +299,7 @@ def test_exact_drives_in_segments_against_dop853(drive, zeta, static, kinetic, c
 
 @pytest.mark.parametrize("cycles", [100_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
 def test_exact_a_million_cycles_without_drift(cycles):
-    found = np.zeros(12)
+    found = np.zeros(orbit_kernels.FOUND)
     orbit_kernels.point(1.0, 0.003, 0.8, 0.8, -1.0, 1.0, 0.0, 0.0, 100, np.empty(24), np.empty(16), found)
     _, _, extremes, book, state = march(events(), 0.8, cycles=cycles, rows=0)
     assert found[2] == pytest.approx(PEAK, rel=1e-13)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
-from patchfem.dynamics.one_mode import orbit_kernels, sdof_kernels, slip_kernels
+from patchfem.dynamics.one_mode import orbit_kernels, sdof, sdof_kernels, slip_kernels
 from patchfem.dynamics.one_mode.steady import Regime, jenkins_point, motions, point, response
 from patchfem.structure.drives import levels
 
@@ -51,7 +51,7 @@ def table_of(zeta, ratios, frictions):
 
 def points(table):
     rows = np.column_stack([table, np.zeros((len(table), 2))])
-    found, phases = np.zeros((len(table), 12)), np.full((len(table), orbit_kernels.PHASES), np.nan)
+    found, phases = np.zeros((len(table), orbit_kernels.FOUND)), np.full((len(table), orbit_kernels.PHASES), np.nan)
     kernels().points(rows, 4000, np.empty(orbit_kernels.OUT), found, phases)
     return found, phases
 
@@ -315,3 +315,18 @@ def test_refuses_a_map_of_more_kinetic_than_static_friction():
         motions(modes_of(), 1.0, 1.0, 0.2, 0.3)
     with pytest.raises(PatchfemError, match="structure"):
         motions(modes_of(slide=0.0), 1.0, 1.0, 0.2)
+
+
+@pytest.mark.parametrize("friction, kinetic, omega", [
+    (0.3, 0.3, 0.7), (0.8, 0.8, 1.0), (0.8, 0.8, 0.3), (0.7, 0.5, 0.9)])
+def test_exact_the_state_at_phase_0_repeats(friction, kinetic, omega):
+    """A run of as many periods from the state that a map gives ends in it and sweeps the map's amplitude."""
+    modes = modes_of()
+    found = motions(modes, 1.0, omega, friction, kinetic)
+    start = Start([float(found.place)], [float(found.rate)])
+    drive, periods = BaseSine(1.0, omega), int(found.periods)
+    run = sdof.simulate(modes, drive, friction, kinetic, periods, periods, start=start)
+    size = float(found.amplitude)
+    assert run.response.modal[-1] == pytest.approx(start.z, abs=1e-10 * size)
+    assert run.response.modal_rate[-1] == pytest.approx(start.v, abs=1e-10 * size)
+    assert np.ptp(run.amplitudes) / 2 == pytest.approx(size, rel=1e-10)

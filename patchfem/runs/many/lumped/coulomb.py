@@ -95,7 +95,7 @@ def _values(table, x, book: dict, window: int, stuck) -> dict:
     out = {
         "absolute_acceleration_peak": np.abs(output) * x[read.ACCELERATION],
         "friction_force_peak": x[read.FORCE] * mass / np.abs(slide),
-        "acceleration_distortion": distorted(first, third, level),
+        "absolute_acceleration_fundamental": first, "acceleration_distortion": distorted(first, third, level),
         "drift_per_cycle": slide * (x[read.LAST] - x[read.FIRST]) / (window - 1),
         "slip_amplitude": np.abs(slide) * (x[read.HIGH] - x[read.LOW]) / 2,
         "stick_fraction": np.where(stuck, 1.0, x[read.STUCK] / (window * period)),

@@ -17,6 +17,7 @@ from ....response.errors import cells_error
 from ....response.loops import interface_loops
 from ....response.measures import ROUND, energy_balance
 from ....response.ringing import FAINT
+from ....response.spectrum import distorted
 from ...rig.engines import PIECES, engine_of
 from ...rig.pieces.costs import pairs_of, pieces
 from ...rig.pieces.run import group_of, settled_of, stuck_share
@@ -145,7 +146,7 @@ def _values(found: _Found, x, book: dict, others, period, window: int) -> dict:
     rings = (rung > FAINT * x[read.ACCELERATION]) & (found.counts == 1)
     out = {
         "absolute_acceleration_peak": x[read.ACCELERATION], "friction_force_peak": x[read.FORCE],
-        "acceleration_distortion": np.where(first > 0, third / np.where(first > 0, first, 1.0), np.nan),
+        "absolute_acceleration_fundamental": first, "acceleration_distortion": distorted(first, third, 0.0),
         "drift_per_cycle": (x[read.LAST] - x[read.FIRST]) / period / (window - 1),
         "slip_amplitude": (x[read.SLIP_HIGH] - x[read.SLIP_LOW]) / 2,
         "stick_fraction": stuck_share(x[read.STUCK], span),

@@ -143,6 +143,7 @@ def _values(models, done, x, book: dict) -> tuple:
     energy = book["power"] + book["peak_stored"]
     out = {"relative_displacement_amplitude": fine["swing"], "absolute_acceleration_peak": fine["acceleration"],
            "friction_force_peak": fine["force"], "energy_balance": energy_balance(book),
+           "absolute_acceleration_fundamental": np.abs(fine["first"] + base),
            "acceleration_distortion": distorted(np.abs(fine["first"] + base), np.abs(fine["third"]), level),
            "drift_per_cycle": fine["drift"], "slip_amplitude": fine["slip"],
            "stick_fraction": np.minimum(fine["held"] / span, 1.0), "slip_start_phase": fine["start"],

@@ -1,5 +1,4 @@
 """Rigs behind elastic-plastic elements, exactly from yield to yield.
 
-In: a Model, its Numerics and its solved patch. Out: the Solution of `run`; `costs` has where the march is cheaper,
-`steady` the motion that repeats, found directly.
+In: a Model, its Numerics and its solved patch. Out: the Solution of `run`; `costs` has where the march is cheaper.
 """

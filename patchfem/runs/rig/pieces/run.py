@@ -16,6 +16,7 @@ from ....response.measures import circular_mean, window_amplitudes, window_ends
 from ....response.outcome import steady_of
 from ....response.ringing import held_ring
 from ....response.rows import measures_of
+from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import omega_of, sinusoidal, whole
 from .. import levels as rig_levels
 from ..exact import joined_runs, whole_cycles
@@ -137,8 +138,8 @@ def values_of(model, numerics, patch, drive, done) -> dict:
              "drift_per_cycle": done.drift}
     for k, one in enumerate(done.loops):
         known |= {f"{name}{f'_{k + 1}' * (k > 0)}": value for name, value in _of_interface(one, span).items()}
-    if sinusoidal(drive) and whole(span, drive) and done.waves[0] != 0:
-        known["acceleration_distortion"] = abs(done.waves[1]) / abs(done.waves[0])
+    if sinusoidal(drive) and whole(span, drive):
+        known |= wave_measures(*np.abs(done.waves))
     known["work_check"] = _second_book(done)
     known["slip_start_phase"] = circular_mean(done.starts) if done.starts.size and sinusoidal(drive) else None
     extremes, loop = done.amplitudes[-min(numerics.window, len(done.amplitudes)):], None

@@ -10,7 +10,7 @@ from ....dynamics.smooth import run as hub
 from ....response.errors import change
 from ....response.measures import slip_measures, slip_noise
 from ....response.rows import measures_of
-from ....response.spectrum import distorted
+from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import sinusoidal, whole
 from ..interface import model_of
 from ..march import Read
@@ -69,20 +69,19 @@ class _Smooth(Read):
         if fine.drift is not None:
             known |= {"drift_per_cycle": fine.drift}
         if whole(span, drive):
-            known |= {"acceleration_distortion": self._distorted(fine)}
+            known |= self._waves(fine)
             loop = turned.slide, fine.slide, fine.pull, fine.work * drive.period / span
         return measures_of(seen(self.model, self.patch, turned, extremes, book, self.numerics.steps, loop=loop,
                                 ledger=ledger, known=known))
 
-    def _distorted(self, fine) -> float | None:
-        """Third over first harmonic of the absolute acceleration at the output [1]; None for none at all."""
+    def _waves(self, fine) -> dict:
+        """What the first and the third harmonic of the absolute acceleration at the output tell, `wave_measures`."""
         drive = self.model.rig.drive
         if not sinusoidal(drive):
-            return None
+            return {}
         last = drive.segments[-1]
         base = -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start)) if drive.moving else 0.0
-        found = distorted(abs(fine.first + base), abs(fine.third), abs(last.amplitude))
-        return None if np.isnan(found) else float(found)
+        return wave_measures(abs(fine.first + base), abs(fine.third), abs(last.amplitude))
 
     @staticmethod
     def _clear(part, even) -> bool:

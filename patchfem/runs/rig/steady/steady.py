@@ -1,15 +1,16 @@
 """The engine `harmonic`: the steady motion of a scene found directly, and its curve over frequency or level.
 
-Coulomb interfaces by shooting on the map of their events (`steady_events`), elastic-plastic elements on that of their
-yields (`pieces.steady`), other laws by harmonic balance (`steady_balance`). What is found is a motion that repeats with
-the drive; its regime, multipliers and stability are named.
+Coulomb interfaces by shooting on the map of their events (`events`), elastic-plastic elements on that of their yields
+(`yields`), other laws by harmonic balance (`balance`). What is found is a motion that repeats with the drive; its
+regime, multipliers and stability are named.
 """
 
 from dataclasses import replace
 
-from ...core import BaseSine, NotConverged
-from .engines import steady_by
-from .solution import Solution
+from ....core import BaseSine, NotConverged
+from ..engines import steady_by
+from ..solution import Solution
+from .curves import columns, largest_of, levels_of
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -19,18 +20,18 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     """
     by = steady_by(model)
     if by == "events":
-        from .steady_events import Events
+        from .events import Events
 
         return _found(Events(model, numerics, patch, say), model)
     if by == "yields":
-        from .pieces.steady import Yields
+        from .yields import Yields
 
         try:
             return _found(Yields(model, numerics, patch, frames, say), model)
         except NotConverged:
             if len(model.rig.interfaces) > 1:
                 raise
-    from .steady_balance import Balance
+    from .balance import Balance
 
     return _found(Balance(model, numerics, patch, say), model)
 
@@ -39,8 +40,10 @@ def _found(finder, model) -> Solution:
     """What a finder finds under the drive of a model."""
     drive = model.rig.drive
     if isinstance(drive, BaseSine):
-        raw, errors, extra = finder.point(drive)
-        return replace(raw, errors=errors, extra=extra)
-    curve, best, near = finder.curve(drive)
-    raw, errors, extra = finder.point(best, near)
-    return replace(raw, errors=errors, extra=extra | {"curve": curve, "at": best})
+        return finder.point(drive)[0]
+    if model.rig.levels:
+        return levels_of(finder, drive)
+    points, folds = finder.curve(drive)
+    best = points[largest_of(points)]
+    raw, _ = finder.point(best.drive, best.near)
+    return replace(raw, extra=raw.extra | {"curve": columns(points, folds), "at": best.drive})

@@ -1,0 +1,116 @@
+"""The steady motion of Coulomb interfaces, or of none at all, by the event map; its curve over frequency or level."""
+
+from dataclasses import replace
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+
+from ....compiled import load
+from ....core import Outcome, PatchfemError, Start
+from ....dynamics.events.histories import simulate
+from ....dynamics.events.steady_events import steady
+from ....dynamics.one_mode import sdof
+from ....dynamics.one_mode.steady import response
+from ....response.measures import half_swing
+from ....response.spectrum import wave_measures
+from ....structure.drive_sizes import largest
+from ....structure.response import receptance
+from ..exact import forces_of, run_exact
+from .curves import SHOWN, Shown, exact_errors, traced
+
+OUTCOMES = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}
+
+
+class Events:
+    """Coulomb interfaces, or none at all, by the event map."""
+
+    tries_another = False
+
+    def __init__(self, model, numerics, patch, say):
+        self.model, self.numerics, self.modes, self.patch, self.say = model, numerics, model.rig.modes, patch, say
+        self.forces = forces_of(model, patch)
+        self.alone = self.modes.omega.size == 1 and len(self.modes.interfaces) == 1
+        self.falls = bool(np.any(self.forces[0] > self.forces[1]))
+
+    def _found(self, drive, near):
+        """Steady motion by shooting: where friction falls with the first slip there are several, and one starts from
+        the state `near`."""
+        return steady(self.modes, drive, *self.forces, start=near if self.falls else None)
+
+    def point(self, drive, near=None) -> tuple:
+        """The steady motion as a run of the exact engine that begins in it, and its start."""
+        begin = perf_counter()
+        found = self._found(drive, near)
+        few = replace(self.numerics, cycles=2.0, window=1)
+        here = replace(self.model.rig, drive=drive, start=found.start, levels=())
+        raw = run_exact(replace(self.model, rig=here), few, self.patch)
+        extra = {"regime": found.regime, "multipliers": found.multipliers, "residual": found.residual,
+                 "map": "events"}
+        return replace(raw, outcome=OUTCOMES.get(found.regime, Outcome.STEADY), extra=extra,
+                       errors=exact_errors(raw.values, found.residual), book=raw.book | {"iterations": 0.0},
+                       seconds=perf_counter() - begin), found.start
+
+    def shown(self, drive, near=None) -> Shown:
+        """A point of a curve."""
+        found = self._found(drive, near)
+        size = float(np.abs(found.multipliers).max(initial=0.0))
+        return self._shown(drive, found.regime, size, found.start, 1, found.residual)
+
+    def curve(self, drive) -> tuple:
+        """(points of the curve over the frequency, no folds)."""
+        find = self.shown
+        if not any(limit.any() for limit in self.forces):
+            find = self._linear
+        elif self.alone:
+            load("dynamics.one_mode.steady_kernels", self.say)
+            find = self._single
+        return traced(self.modes, drive, find), ()
+
+    def _linear(self, drive, near=None) -> Shown:
+        """A point of a curve without friction, in closed form; on a resonance that nothing damps as `shown`."""
+        modes, gauge = self.modes, self.modes.output if self.modes.gauge is None else self.modes.gauge
+        try:
+            seen, felt = receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0] * modes.mass
+        except PatchfemError:
+            return self.shown(drive)
+        size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
+        values = {SHOWN["amplitude"]: drive.acceleration * float(abs(seen)), SHOWN["acceleration_peak"]: size,
+                  **wave_measures(size, 0.0)}
+        values = {name: value for name, value in values.items() if value is not None}
+        return Shown(drive, values, exact_errors(values, 0.0), "sliding", float(np.exp(self.decay * drive.period)),
+                     True, Outcome.STEADY)
+
+    @cached_property
+    def decay(self) -> float:
+        """Rate [1/s] at which the slowest free motion of the modes alone dies out, <= 0."""
+        n = self.modes.omega.size
+        state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.modes.omega**2), -self.modes.dampers]])
+        return float(np.linalg.eigvals(state).real.max())
+
+    def _single(self, drive, near=None) -> Shown:
+        """A point of the curve of one mode by its own map, compiled."""
+        found = response(self.modes, [drive], float(self.forces[0][0]), float(self.forces[1][0]))
+        regime = str(found.regime[0])
+        return self._shown(drive, f"{found.stops[0]:g} stops" if regime == "stops" else regime,
+                           float(abs(found.multiplier[0])), Start(found.place, found.rate), int(found.periods[0]),
+                           float(found.residual[0]))
+
+    def _shown(self, drive, regime: str, multiplier: float, start, periods: int, residual: float) -> Shown:
+        """What a run of the periods after which a motion repeats shows of it; nothing where it is not bounded."""
+        outcome = OUTCOMES.get(regime, Outcome.STEADY)
+        if regime in ("unbounded", "unsettled"):
+            return Shown(drive, {}, {}, regime, multiplier, False, outcome)
+        if self.alone:
+            forces = (float(one[0]) for one in self.forces)
+            done = sdof.simulate(self.modes, drive, *forces, periods, periods, start=start)
+        else:
+            done = simulate(self.modes, drive, *self.forces, periods, periods, start=start)
+        window, gauge = done.window, self.modes.gauge
+        extremes = done.amplitudes
+        amplitude = float(extremes[:, 1].max() - extremes[:, 0].min()) / 2 if gauge is None else \
+            half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
+        values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: done.acceleration,
+                  **wave_measures(*np.abs(done.waves), largest(drive))}
+        values = {name: value for name, value in values.items() if value is not None}
+        return Shown(drive, values, exact_errors(values, residual), regime, multiplier, True, outcome, start)

@@ -1,0 +1,152 @@
+"""Curves of steady motions and levels of a drive by the engine `harmonic`: what they show at every point, with bars."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+from scene_texts import COULOMB, MODE, NONLOCAL, PLASTIC, POINT, SECOND, SWEEP
+
+import patchfem as pf
+from patchfem.response.levels import KEPT
+from patchfem.runs.rig.steady import curves
+from patchfem.runs.rig.steady.curves import SHOWN
+
+STEADY = {"accuracy.method": "harmonic"}
+HARD = SWEEP.replace('"3 g"', '"6 g"').replace('"120 Hz"', '"138 Hz"')
+LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = [{}]\ncycles = {}\n'
+G, LIMIT = 9.80665, 0.3 * 26 * 4.4482216152605
+GIVES = PLASTIC.replace("1 um", "20 um")
+
+
+def curve_of(text, **keys):
+    return pf.run(text, **STEADY, **keys).extra["curve"]
+
+
+def linear(frequency, rows=(1.0,), own=(143.0,), zeta=(0.003,), base=(1.0,), level=3 * G):
+    """Amplitude [m] and absolute acceleration [m s-2] of the sum `rows` of the motions of modes without friction."""
+    w, own = 2 * np.pi * np.asarray(frequency)[:, None], 2 * np.pi * np.array(own)
+    z = -level * np.array(base) / (own**2 - w**2 + 2j * np.array(zeta) * own * w)
+    return np.abs(z @ rows), np.abs(level - w[:, 0]**2 * (z @ rows))
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Curves of 13 points, but where they bend."""
+    monkeypatch.setattr(curves, "POINTS", 13)
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize("more", ["", SECOND.replace("slide = 0.1", "slide = 0.1\nbase = 0.1")])
+def test_exact_a_curve_without_friction_in_closed_form(more):
+    base = {"structure.mode.axial.base": "0.9"} if more else {}
+    found = curve_of(MODE + more + SWEEP.replace('to = "150 Hz"', 'to = "126 Hz"'), **base)
+    given = {"rows": (1.0, 0.0), "own": (143.0, 990.0), "zeta": (0.003, 0.01), "base": (0.9, 0.1)} if more else {}
+    size, felt = linear(found["frequency"], **given)
+    assert found["amplitude"] == pytest.approx(size, rel=1e-8)
+    assert found["acceleration_peak"] == pytest.approx(felt, rel=1e-8)
+    assert found["acceleration_fundamental"] == pytest.approx(felt, rel=1e-8)
+    assert np.all(found["acceleration_distortion"] <= found["acceleration_distortion_error"])
+
+
+@pytest.mark.usefixtures("few")
+def test_exact_a_curve_of_two_instruments_shows_each_at_its_own_place():
+    """The displacement where the gauge moves, the acceleration where the accelerometer does."""
+    instruments = {"structure.mode.axial.gauge": "0.9", "structure.mode.axial.accelerometer": "1.1"}
+    found = curve_of(MODE + HARD, **instruments)
+    size, felt = (linear(found["frequency"], (share,), level=6 * G)[k] for k, share in enumerate((0.9, 1.1)))
+    assert found["amplitude"] == pytest.approx(size, rel=1e-8)
+    assert found["acceleration_peak"] == pytest.approx(felt, rel=1e-8)
+    assert found["acceleration_fundamental"] == pytest.approx(felt, rel=1e-8)
+
+
+@pytest.mark.usefixtures("few")
+@pytest.mark.parametrize("law", [COULOMB, GIVES], ids=["coulomb", "elastic-plastic"])
+def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
+    found = curve_of(POINT + law + MODE + HARD)
+    drive = '[drive]\nkind = "base"\nfrequency = "{!r} Hz"\nacceleration = "6 g"\ncycles = 10\n'
+    for k in (0, len(found["level"]) // 2, -1):
+        run = pf.run(POINT + law + MODE + drive.format(float(found["frequency"][k])), **STEADY)
+        for column, name in SHOWN.items():
+            assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (k, column)
+
+
+def test_exact_a_balance_over_the_frequency_is_within_its_bars():
+    """Elastic-plastic elements by named harmonics against the map from yield to yield, which is exact."""
+    drive = HARD.replace('"150 Hz"', '"141 Hz"')
+    balance = curve_of(POINT + GIVES + MODE + drive, **{"accuracy.harmonics": "15"})
+    assert len(balance["frequency"]) > 5
+    for k in range(0, len(balance["frequency"]), 4):
+        frequency = balance["frequency"][k]
+        keys = {"drive.waveform": "sine", "drive.frequency": f"{float(frequency)!r} Hz"}
+        exact = pf.run(POINT + GIVES + MODE + '[drive]\nkind = "base"\nacceleration = "6 g"\ncycles = 9\n',
+                       **STEADY, **keys).measures
+        for column, name in SHOWN.items():
+            gap = abs(balance[column][k] - exact[name].value)
+            assert gap <= balance[f"{column}_error"][k] + exact[name].error, (frequency, column)
+
+
+@pytest.mark.parametrize("law", [COULOMB, PLASTIC], ids=["coulomb", "elastic-plastic"])
+def test_exact_levels_are_those_of_a_long_run(law):
+    """Raised from a stuck level and lowered again: every measure of the table as an exact run of 150 cycles a level."""
+    text = POINT + law + MODE.replace("0.003", "0.05") + LEVELS.format('"3 g", "5 g", "7 g", "5 g"', 150)
+    steady, run = pf.run(text, **STEADY), pf.run(text, **{"accuracy.method": "exact"})
+    ours, theirs = steady.extra["levels"], run.extra["levels"]
+    assert [one.outcome for one in ours] == ["stuck", "steady", "steady", "steady"]
+    assert [one.drive for one in ours] == [one.drive for one in theirs] == pytest.approx(G * np.array([3, 5, 7, 5]))
+    assert [one.stuck for one in ours] == [one.stuck for one in theirs]
+    round_off = {"equivalent_damping": 1e-14, "loop_area": 1e-18}
+    for a, b in zip(ours, theirs):
+        assert set(a.errors) == set(a.values) <= set(b.values) <= {*a.values, "secant_stiffness"} & {*KEPT}
+        for name, value in a.values.items():
+            assert value == pytest.approx(b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)), (b.drive, name)
+    assert abs(steady.measures["level_hysteresis"].value) < 1e-12  # the motion at a level is the only one
+
+
+def test_exact_levels_are_rows_of_the_curve():
+    run = pf.run(POINT + NONLOCAL.replace("1 um", "20 um") + MODE + LEVELS.format('"3 g", "6 g", "4 g"', 12), **STEADY)
+    curve, levels = run.extra["curve"], run.extra["levels"]
+    assert curve["level"] == pytest.approx(G * np.array([3, 6, 4])) and len(levels) == 3
+    for k, one in enumerate(levels):
+        for column, name in SHOWN.items():
+            assert curve[column][k] == one.values[name] and curve[f"{column}_error"][k] == one.errors[name]
+
+
+def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
+    """It slips where its spring bears the limit: |q| = limit/k in the motion that it holds as a spring; what counts is
+    a slip of 1e-3 bond lengths."""
+    text = POINT + GIVES + MODE + LEVELS.format('"0.2 g", "6 g"', 12) + 'onset = "slip"\n'
+    found = pf.run(text, **STEADY).measures["onset_level"]
+    own, w, stiffness = (2 * np.pi * 143, 2 * np.pi * 143, LIMIT / 20e-6)
+    size = 1 / abs(own**2 + stiffness / 0.884 - w**2 + 2j * 0.003 * own * w)
+    first = 20e-6 / size
+    assert first - found.error <= found.value <= 1.002 * first + found.error and found.error < 1e-3 * first
+
+
+def test_exact_a_level_without_a_bounded_motion_is_a_row_that_says_so():
+    """Without damping at resonance friction bounds the motion to a/mu N < 4/pi and not beyond."""
+    text = POINT + COULOMB + MODE.replace("0.003", "0") + LEVELS.format('"3 g", "4.5 g", "6 g"', 12)
+    run = pf.run(text, **STEADY)
+    assert [one.outcome for one in run.extra["levels"]] == ["stuck", "steady", "grows"]
+    assert run.outcome == "steady" and np.isnan(run.extra["curve"]["amplitude"][2])
+    with_elements = pf.run(text.replace(COULOMB, PLASTIC), **STEADY)
+    assert [one.outcome for one in with_elements.extra["levels"]] == ["stuck", "steady", "not_converged"]
+    assert any("1 of 3 levels" in said and "undamped mode" in said for said in with_elements.warnings)
+
+
+def test_exact_the_file_and_the_page_hold_accelerations_and_levels(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(POINT + COULOMB + MODE + LEVELS.format('"3 g", "5 g", "6 g"', 12) +
+                    '[accuracy]\nmethod = "harmonic"\n', "utf-8")
+    answer = cli("run", path, "-o", tmp_path / "out", "-q")
+    assert answer.code == 0, answer.err
+    with xr.open_dataset(tmp_path / "out" / "result.nc") as data:
+        assert list(data.level_outcome.values) == ["stuck", "steady", "steady"]
+        for column in SHOWN:
+            assert data[f"curve_{column}"].dims == data[f"curve_{column}_error"].dims == ("curve_point",)
+        fundamental = data.level_absolute_acceleration_fundamental
+        assert fundamental.attrs["units"] == "m s-2" and fundamental.values[0] == pytest.approx(3 * G)
+        np.testing.assert_array_equal(data.curve_acceleration_fundamental.values, fundamental.values)
+    page = (tmp_path / "out" / "report.html").read_text()
+    row = page[page.index("<th class=n>level"):].split("</tr>")[2]
+    assert "<td>steady</td><td>slips</td>" in row and row.count(" g") == 3
+    assert "Its absolute acceleration" in page and "first harmonic" in page
