@@ -144,9 +144,9 @@ def extended(m, h):
 
 
 @njit(error_model="numpy", fastmath=FAST, **INNER)
-def between(m, share, out):
-    """Write the state at a share [1] of the step into out, by its extension."""
-    for c in range(m.y.size):
+def between(m, share, out, size):
+    """Write the first `size` entries of the state at a share [1] of the step into out, by its extension."""
+    for c in range(size):
         value = m.work[EXTENSION + 6, c] * share
         for k in range(5, -1, -1):
             value = (value + m.work[EXTENSION + k, c]) * (share if k % 2 == 0 else 1 - share)

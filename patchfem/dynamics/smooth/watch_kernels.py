@@ -15,6 +15,10 @@ from . import step_kernels as steps
 
 PLACES, SHARES = np.polynomial.legendre.leggauss(4)  # of the part of a step in a cycle, for its phasor
 PARTS = 8  # of a step, among which its peaks are looked for
+ROUGHLY = 1.0  # of what a number changes by in a step, by which its peak may lie above both ends and the middle
+HALVES = 2  # of a step, in each of which sticking may begin or end once
+FLAT = 1e-11  # of a peak, that is not looked for
+STEEP = 0.25  # of the slope beside the end of a step: where its end is as steep, a peak lies in another step
 NEAR = 0.05  # of what a number changes by in a step, by which its peak may lie above the places looked at
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 ACCELERATION, FORCE, SLIP, SLIP_LEAST, OUTPUT, OUTPUT_LEAST, SLOTS = range(7)  # of the peaks
@@ -69,7 +73,7 @@ def turning(m, k, a, b, rate):
     out = 0.0
     for _ in range(60):
         middle = 0.5 * (a + b)
-        steps.between(m, middle, k.room[0])
+        steps.between(m, middle, k.room[0], m.y.size - 3)
         out, here = output_of(m, k.room[0])
         if here * rate > 0:
             a = middle
@@ -87,7 +91,7 @@ def bounds(m, h, k, parts):
     low, high = x, x
     for part in range(1, parts + 1):
         if part < parts:
-            steps.between(m, part / parts, k.room[0])
+            steps.between(m, part / parts, k.room[0], m.y.size - 3)
             x1, w1 = output_of(m, k.room[0])
         else:
             x1, w1 = output_of(m, m.work[steps.TRIAL])
@@ -156,7 +160,7 @@ def marks(m, h, k):
     end = t + h
     while k.tally[SAMPLE] < k.samples.shape[0] and k.samples[int(k.tally[SAMPLE]), 0] <= end:
         j = int(k.tally[SAMPLE])
-        steps.between(m, (k.samples[j, 0] - t) / h, k.room[0])
+        steps.between(m, (k.samples[j, 0] - t) / h, k.room[0], m.y.size)
         write(m, k.samples[j, 0], k.room[0], k.samples[j])
         k.tally[SAMPLE] += 1
 
@@ -185,7 +189,7 @@ def sharpened(m, h, k, which, at, near):
         at = min(max(at, near), 1 - near)
         for side in range(-1, 2):
             share = at + side * near
-            steps.between(m, share, k.room[0])
+            steps.between(m, share, k.room[0], m.y.size - 3)
             sizes(m, t + share * h, k.room[0], k, out)
             a, b, c = b, c, out[which]
             best = max(best, c)
@@ -197,26 +201,65 @@ def sharpened(m, h, k, which, at, near):
 
 
 @njit(error_model="numpy", **INNER)
+def looked(m, h, k, part):
+    """Write the six numbers at a part of the step of h [s] into the table."""
+    steps.between(m, part / PARTS, k.room[0], m.y.size - 3)
+    sizes(m, m.now[steps.TIME] + part / PARTS * h, k.room[0], k, k.table[part])
+
+
+@njit(error_model="numpy", **INNER)
+def may_peak(m, h, k):
+    """Whether one of the six numbers may have its largest value of all inside the step of h [s], by its ends and
+    middle."""
+    for part in (0, PARTS // 2, PARTS):
+        looked(m, h, k, part)
+    for which in range(SLOTS):
+        a, b, c = k.table[0, which], k.table[PARTS // 2, which], k.table[PARTS, which]
+        top, least = max(a, b, c), min(a, b, c)
+        if not top + ROUGHLY * (top - least) <= k.tally[PEAKS + which] + FLAT * abs(k.tally[PEAKS + which]):
+            return True
+    return False
+
+
+@njit(error_model="numpy", **INNER)
+def rise(table, at, which):
+    """What a number may rise above its highest place `at`: what it changes by beside it; 0 at an end of the step to
+    which it rises as steeply as before."""
+    if 0 < at < PARTS:
+        return table[at, which] - min(table[at - 1, which], table[at + 1, which])
+    way = 1 if at == 0 else -1
+    last, before = table[at, which] - table[at + way, which], table[at + way, which] - table[at + 2 * way, which]
+    return last if 1.5 * last - 0.5 * before < STEEP * last else 0.0
+
+
+@njit(error_model="numpy", **INNER)
 def peaks(m, h, k):
-    """Take the step of h [s] into the peaks and the harmonics of the last cycles."""
-    t = m.now[steps.TIME]
+    """Take the step of h [s] into the peaks of the last cycles."""
+    if not may_peak(m, h, k):
+        return
     for part in range(PARTS + 1):
-        steps.between(m, part / PARTS, k.room[0])
-        sizes(m, t + part / PARTS * h, k.room[0], k, k.table[part])
-        for which in range(6):
+        if part % (PARTS // 2) != 0:
+            looked(m, h, k, part)
+        for which in range(SLOTS):
             k.tally[PEAKS + which] = max(k.tally[PEAKS + which], k.table[part, which])
     for which in range(SLOTS):
-        top, at, least = -np.inf, 0, np.inf
-        for part in range(PARTS + 1):
+        at, least, peak = 0, k.table[0, which], k.tally[PEAKS + which]
+        for part in range(1, PARTS + 1):
             least = min(least, k.table[part, which])
-            if k.table[part, which] > top:
-                top, at = k.table[part, which], part
-        if top + NEAR * (top - least) >= k.tally[PEAKS + which]:
-            k.tally[PEAKS + which] = max(k.tally[PEAKS + which], sharpened(m, h, k, which, at / PARTS, 1 / PARTS))
+            at = part if k.table[part, which] > k.table[at, which] else at
+        top = k.table[at, which]
+        if top + NEAR * (top - least) >= peak and top + rise(k.table, at, which) > peak + FLAT * abs(peak):
+            k.tally[PEAKS + which] = max(peak, sharpened(m, h, k, which, at / PARTS, 1 / PARTS))
+
+
+@njit(error_model="numpy", **INNER)
+def harmonics(m, h, k):
+    """Take the step of h [s] into the harmonics of the last cycles."""
+    t = m.now[steps.TIME]
     omega = 2 * pi / k.tally[PERIOD]
     for j in range(NODES.size):
         share, weight = 0.5 * (1 + NODES[j]), 0.5 * h * WEIGHTS[j]
-        steps.between(m, share, k.room[0])
+        steps.between(m, share, k.room[0], m.y.size - 3)
         q, _, force, _, _ = state_of(m, k.room[0])
         turn, x = omega * (t + share * h), output_of(m, k.room[0])[0]
         c, s = cos(turn), sin(turn)
@@ -238,7 +281,7 @@ def mean_of(m, h, k, begin, which):
     if high <= low:
         return
     for j in range(NODES.size):
-        steps.between(m, (low + 0.5 * (1 + NODES[j]) * (high - low) - t) / h, k.room[0])
+        steps.between(m, (low + 0.5 * (1 + NODES[j]) * (high - low) - t) / h, k.room[0], m.y.size - 3)
         k.tally[which] += 0.5 * (high - low) * WEIGHTS[j] * steps.slide_of(m, k.room[0])[0]
 
 
@@ -247,9 +290,9 @@ def slipping(m, k, at):
     """Share of the slide that is irreversible at the share `at` of the step, less SHARE: < 0 where it sticks; NaN where
     it does not slide, as beside a reversal in a step of no length."""
     low = min(max(at - BESIDE, 0.0), 1 - 2 * BESIDE)
-    steps.between(m, low, k.room[0])
+    steps.between(m, low, k.room[0], m.y.size - 3)
     q0, _, _, _, slip0 = state_of(m, k.room[0])
-    steps.between(m, low + 2 * BESIDE, k.room[0])
+    steps.between(m, low + 2 * BESIDE, k.room[0], m.y.size - 3)
     q1, _, _, _, slip1 = state_of(m, k.room[0])
     if abs(q1 - q0) <= STILL * max(abs(q0), abs(q1)):
         return np.nan
@@ -273,11 +316,11 @@ def holds(m, h, k):
         before = k.tally[SIDE] if k.tally[SIDE] != 0 else -SHARE
     if before >= 0 and k.tally[SIDE] < 0:  # it starts between two steps, where the slide turns
         starts(m, k, t)
-    for part in range(1, PARTS + 1):
-        after, low, high = slipping(m, k, part / PARTS), (part - 1) / PARTS, part / PARTS
+    for part in range(1, HALVES + 1):
+        after, low, high = slipping(m, k, part / HALVES), (part - 1) / HALVES, part / HALVES
         after = before if np.isnan(after) else after
         if (before < 0) == (after < 0):
-            k.tally[HELD] += h / PARTS if after < 0 else 0.0
+            k.tally[HELD] += h / HALVES if after < 0 else 0.0
         else:
             a, b = low, high
             while b - a > 1e-9:
@@ -318,6 +361,7 @@ def watch(m, h, k):
     bounds(m, h, k, 1 if m.rows.shape[1] == 1 else 4)
     if k.tally[WANTED] > 0:
         peaks(m, h, k)
+        harmonics(m, h, k)
         mean_of(m, h, k, k.tally[BEGIN], MEANS)
         mean_of(m, h, k, k.tally[END] - k.tally[PERIOD], MEANS + 1)
         holds(m, h, k)

@@ -252,3 +252,18 @@ def test_exact_a_speed_that_grazes_zero_turns_or_passes(share):
                        np.array([1, 0.1]), np.array([1, 0.0]), MASS)
     motion, force = compared(modes, SHORT, ref.bonds, 3, BaseSine(60.0, OMEGA))
     assert motion < 1e-9 and force < 1e-8
+
+
+@pytest.mark.parametrize("law", [Bonds(0.3, 5e-6), Rate(0.3, 3e-4)])
+def test_exact_peaks_of_the_last_cycles_are_those_of_close_samples(law):
+    """A force that stands at its limit for most of a cycle has its peaks looked for only where they may rise."""
+    one, other = (Run(ONE, SINE, element(law), 12, 1e-9) for _ in range(2))
+    period = SINE.period
+    _, fine = one.last(12 * period, 3 * period)
+    other.until(9 * period)
+    other.tolerance *= 1e-2
+    close = other.response(other.until(12 * period, np.linspace(9 * period, 12 * period, 30001)))
+    for peak, column in ((fine.acceleration, close.acceleration), (fine.force, close.force)):
+        assert peak == pytest.approx(np.abs(column).max(), rel=1e-7)
+    for half, column in ((fine.slip, close.slip), (fine.swing, close.output)):
+        assert half == pytest.approx(np.ptp(column) / 2, rel=1e-7)
