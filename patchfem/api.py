@@ -251,6 +251,13 @@ class Result(found.Result):
 
     measures: Measures
 
+    def _repr_html_(self) -> str:
+        """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
+        from .export.pages.words import fragment
+        from .export.summary import cycles_of, summary_of
+
+        return fragment(summary_of(self), self.outcome.sentence, cycles_of(self))
+
     @property
     def notes(self) -> list[str]:
         """Sentences on what the model leaves out."""

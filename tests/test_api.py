@@ -3,6 +3,7 @@
 import json
 from dataclasses import FrozenInstanceError
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -285,3 +286,21 @@ def test_exact_what_takes_long_is_said_on_stderr_or_to_the_caller(capfd, monkeyp
     heard = []
     pf.run(BENCH, say=heard.append)
     assert capfd.readouterr() == ("", "compiling\n") and heard == ["compiling"]
+
+
+def test_exact_a_notebook_shows_the_answer_and_what_it_holds_as_text(runs):
+    """Every measure with its number and error as on the first screen; markup in a title is text."""
+    from patchfem.export.pages.words import pair
+
+    result = runs["rig"]
+    shown = result._repr_html_()
+    parsed = ElementTree.fromstring(shown.replace("colspan=2", "colspan='2'").replace("<br>", "<br/>"))
+    cells = [[cell.text for cell in row] for row in parsed.iter("tr")]
+    found = dict(row for row in cells if len(row) == 2)
+    assert set(found) == set(result.measures)
+    for name, one in result.measures.items():
+        assert one.value is None or found[name] == pair(name, {"value": one.value, "unit": one.unit,
+                                                               "error": one.error})
+    assert result.outcome.sentence in shown
+    marked = pf.run('title = "<script>x</script>"\n' + BENCH)._repr_html_()
+    assert "<script>" not in marked and "&lt;script&gt;" in marked

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from html import escape
 from math import isfinite, pi
 
 from ...core import rounded
@@ -126,6 +127,19 @@ def table_of(measures: dict) -> list[str]:
                  if group_of(name, pressed) == group]
         out += [group, *lines] if lines else []
     return out
+
+
+def fragment(summary: dict, sentence: str, cycles: float | None) -> str:
+    """The answer as HTML without styles of its own, for a notebook; summary and cycles as `headline` takes them."""
+    rows, measures = [], summary["measures"]
+    for line in table_of(measures):
+        name, _, value = line.strip().partition(" ")
+        cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
+        rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
+    title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
+    warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in summary["warnings"])
+    answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles)}")
+    return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 
 
 def _value(name: str, one: dict) -> str:
