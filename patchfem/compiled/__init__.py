@@ -106,6 +106,24 @@ class Entry:
         self.home, self.name, self.kept = home, name, kept
         self.words, self.codes = machine.Words(), {}
 
+    def held(self, *arguments) -> tuple:
+        """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `held_call`:
+        their words are made once. What is in their arrays may change."""
+        try:
+            kinds, words = zip(*map(self.words.of, arguments))
+        except machine.Unfit:
+            return None, b"", arguments
+        return kinds, b"".join(words), arguments
+
+    def held_call(self, held: tuple, *first):
+        """The function of some first arguments and those of `held`."""
+        kinds, words, last = held
+        if kinds is None:
+            return self(*first, *last)
+        own, mine = zip(*map(self.words.of, first))
+        code = self.codes.get(own + kinds)
+        return code(b"".join(mine) + words) if code else self(*first, *last)
+
     def __call__(self, *arguments):
         try:
             kinds, words = zip(*map(self.words.of, arguments))

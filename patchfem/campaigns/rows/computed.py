@@ -20,7 +20,7 @@ class Computed:
 
     def __init__(self, asked: Asked, say=None):
         self.asked, self.say = asked, say
-        self.patch, self.near, self.last = None, {}, (None, {})
+        self.patch, self.near, self.last, self.watcher = None, {}, (None, {}), None
         self.runs = 0
         read_as = asked.read
         self.reading = ("peak", None) if read_as is None else (read_as.reading, read_as.reading_cutoff)
@@ -52,7 +52,7 @@ class Computed:
         with placed(model.source):
             patch = self._pressed(model)
             whole = self.reading[0] not in ("peak", "fundamental")
-            watcher = Watcher(model, patch, self.say, whole)
+            watcher = self.watcher = Watcher(model, patch, self.say, whole, self.watcher)
             for k in conditions:
                 self.runs += 1
                 if not watcher.by:

@@ -35,17 +35,28 @@ class Orbits:
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.modes, self.one, self.kernels = modes, PeriodMap(modes, groups), load("dynamics.piecewise.march_kernels")
+        self.kernels, self.one = load("dynamics.piecewise.march_kernels"), PeriodMap(modes, groups)
         self.march, self.peak = self.kernels.march, load("dynamics.piecewise.dense_kernels").peak
-        self.gauge = None if modes.gauge is None else plant_of(replace(modes, output=modes.gauge))
         self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
         self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
+        self._given(modes)
+
+    def _given(self, modes: ModalBasis) -> None:
+        self.modes, self.held = modes, {}
+        self.gauge = None if modes.gauge is None else plant_of(replace(modes, output=modes.gauge))
+
+    def renewed(self, modes: ModalBasis, groups) -> bool:
+        """Take other modes and elements in the same room; False, and nothing is taken, where it does not fit."""
+        same = self.one.renewed(modes, groups)
+        if same:
+            self._given(modes)
+        return same
 
     def __call__(self, drive, near: Point | None = None) -> Seen:
         one = self.one
         point = turning(one, drive, near if self._fits(near) else None)[0].point
         used, swing = self._half(drive, point, one.plant)
-        high = self.peak(self.rows[:used], one.plant, one.clock, float(drive.moving), one.room)
+        high = self.peak.held_call(self._held("peak", one.plant, float(drive.moving)), self.rows[:used])
         first = -2 * drive.omega**2 * complex(*self.books.phasors[0]) - 1j * drive.acceleration * drive.moving
         if self.gauge is not None:
             swing = self._half(drive, point, self.gauge)[1]
@@ -68,14 +79,22 @@ class Orbits:
         over."""
         one, books, stop = self.one, self.books, (0.0, drive.period / 2)
         while True:
-            motion = one.begin(drive, point)
+            one.begin(drive, point)
             books.ledger[:], books.phasors[:], books.limits[1], books.extremes[:] = 0.0, 0.0, 0.0, (np.inf, -np.inf)
-            code, used = self.march(stop, motion, plant, one.table, one.memory, one.clock, books, one.room, self.rows)
+            code, used = self.march.held_call(self._held("march", plant), stop)
             if code == self.kernels.DONE:
                 return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
             if code != self.kernels.FULL:
                 raise NotConverged("dynamics: events pile up within a period")
-            self.rows = np.zeros((2 * len(self.rows), self.wide))
+            self.rows, self.held = np.zeros((2 * len(self.rows), self.wide)), {}
+
+    def _held(self, name: str, plant, moving: float = 0.0) -> tuple:
+        """What a compiled function is called with."""
+        one, key = self.one, (name, id(plant), moving)
+        if key not in self.held:
+            self.held[key] = self.peak.held(plant, one.clock, moving, one.room) if name == "peak" else \
+                self.march.held(one.motion, plant, one.table, one.memory, one.clock, self.books, one.room, self.rows)
+        return self.held[key]
 
 
 def _all_of(memory: Memory) -> np.ndarray:

@@ -8,8 +8,9 @@ import numpy as np
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, PatchfemError
 from .elements import Memory, sorted_stretches, table_of, virgin
-from .plant import books_of, clock_of, place, plant_of, room_of
+from .plant import Clock, books_of, clock_of, place, plant_of, room_of
 
+DRIVES = 256  # sines whose clocks are remembered
 SIGNED = "place", "way", "at", "side", "force", "slip"  # what of a memory turns over with the motion
 
 
@@ -75,13 +76,28 @@ class PeriodMap:
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.follow = load("dynamics.piecewise.slope_kernels").follow
+        self.follow, self.n = load("dynamics.piecewise.slope_kernels").follow, modes.omega.size
+        self._given(modes, groups)
+        faces = len(self.groups)
+        self.room, self.books = room_of(self.plant), books_of(2, np.zeros(2))
+        self.spare = np.zeros((2, self.n)), np.zeros(faces), np.zeros_like(self.room.coefs)
+        self.motion, self.memory = np.zeros((2, self.n)), copied(self.still)
+        self.seen, self.carried = np.zeros((2, faces), np.int64), {}
+        self.drive, self.clock, self.clocks = None, None, {}
+
+    def _given(self, modes: ModalBasis, groups) -> None:
+        """Take modes and elements."""
         self.groups, self.plant, self.table = tuple(groups), plant_of(modes), table_of(groups)
-        self.faces, self.n, self.room = self.plant.faces, modes.omega.size, room_of(self.plant)
-        self.spare = np.zeros((2, self.n)), np.zeros(len(self.groups)), np.zeros_like(self.room.coefs)
-        self.still, self.books = virgin(self.table, np.zeros(len(self.groups))), books_of(2, np.zeros(2))
-        self.memory, self.carried = copied(self.still), {}
-        self.drive, self.clock = None, None
+        self.faces, self.held = self.plant.faces, {}
+        self.still = virgin(self.table, np.zeros(len(self.groups)))
+
+    def renewed(self, modes: ModalBasis, groups) -> bool:
+        """Take other modes and elements in place of the first; False, and nothing is taken, where their numbers differ,
+        which asks for other room."""
+        same = modes.omega.size == self.n and [one.stiffness.size for one in groups] == self.table.count.tolist()
+        if same:
+            self._given(modes, groups)
+        return same
 
     def rest(self) -> Point:
         """The Point at rest, no element stretched."""
@@ -96,46 +112,61 @@ class PeriodMap:
             memory.slip[f] = share @ (memory.place[f] - sorted_stretches(one, memory, f)) / max(share.sum(), 1e-300)
         return memory
 
-    def begin(self, drive, point: Point) -> np.ndarray:
-        """Put clock, books and memory to the start of a period of a sine, in a Point; its motion (2, n), a copy.
+    def begin(self, drive, point: Point) -> None:
+        """Put clock, books, motion and memory to the start of a period of a sine, in a Point.
 
         PatchfemError for a drive that does not repeat.
         """
         if drive is not self.drive:
-            if len(drive.segments) != 1:
-                raise PatchfemError("drive: a periodic motion needs one sine that goes on; march this one")
-            self.drive, self.clock = drive, clock_of(drive, len(self.groups))
-        motion, clock, books = point.motion.reshape(2, self.n).copy(), self.clock, self.books
+            self._under(drive)
+        clock, books = self.clock, self.books
+        self.motion[:] = point.motion.reshape(2, self.n)
         for mine, given in zip(self.memory, point.memory):
             mine[...] = given
-        self.memory.place[:] = self.faces @ motion[0]
+        self.memory.place[:] = self.faces @ self.motion[0]
         clock.now[:], clock.rest[:], books.ledger[:], books.limits[1] = 0.0, 0.0, 0.0, 0.0
         books.extremes[:] = np.inf, -np.inf
-        return motion
+
+    def _under(self, drive) -> None:
+        """Set the clock to a sine; it is made once for each of the last drives."""
+        if id(drive) not in self.clocks:
+            if len(drive.segments) != 1:
+                raise PatchfemError("drive: a periodic motion needs one sine that goes on; march this one")
+            if len(self.clocks) >= DRIVES:
+                self.clocks.clear()
+            self.clocks[id(drive)] = drive, clock_of(drive, len(self.groups))
+        clock = self.clocks[id(drive)][1]
+        if self.clock is None:
+            self.clock = Clock(*(part.copy() for part in clock))
+        self.drive = drive
+        self.clock.segments[:], self.clock.period[:] = clock.segments, clock.period
 
     def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> Map:
         """The Map of a Point over a period of a sine, or over half of one. NotConverged where events pile up,
         PatchfemError for a drive that does not repeat; without `slopes` that of the Map is empty."""
-        n, motion, memory, period = self.n, self.begin(drive, point), self.memory, drive.period
+        self.begin(drive, point)
+        n, memory, seen, period = self.n, self.memory, self.seen, drive.period
         face, group = point.turned
         size = 2 * n + face.size if slopes else 0
         slope, marks, unit = self._carried(size)
         if slopes:
             slope[:], marks[:, :memory.depth.max(initial=0)] = unit, 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
-        seen = np.array([memory.slipping, memory.depth])
-        pieces = self.follow(place(period / 2 if half else period, period), motion, slope, marks, self.plant,
-                             self.table, memory, self.clock, self.books, self.room, self.spare, seen)
+        seen[0], seen[1] = memory.slipping, memory.depth
+        if size not in self.held:
+            self.held[size] = self.follow.held(self.motion, slope, marks, self.plant, self.table, memory, self.clock,
+                                               self.books, self.room, self.spare, seen)
+        pieces = self.follow.held_call(self.held[size], place(period / 2 if half else period, period))
         if pieces < 0:
             raise NotConverged("dynamics: events pile up within a period")
         rows, columns = turned = turned_of(memory)
-        end = Point(motion.ravel(), copied(memory), turned)
-        kept = 2 * n + np.flatnonzero(columns < seen[1, rows])
+        end = Point(self.motion.ravel().copy(), copied(memory), turned)
+        kept = 2 * n + (columns < seen[1, rows]).nonzero()[0]
         out = np.concatenate([slope.reshape(2 * n, size), marks[rows, columns]])
         if half:
             for part in (end.motion, out, *(getattr(end.memory, name) for name in SIGNED)):
                 np.negative(part, out=part)
-        return Map(end, out, kept, *seen, self.books.extremes[0].copy(), int(pieces))
+        return Map(end, out, kept, *seen.copy(), self.books.extremes[0].copy(), int(pieces))
 
     def _carried(self, size: int) -> tuple:
         """Room for the slopes of so many numbers, of the motion (2, n, size) and of turning places (i, t + 1, size),

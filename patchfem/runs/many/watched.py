@@ -4,6 +4,8 @@ For searches, which ask a model thousands of times. A steady engine goes straigh
 nearby; any other engine makes its run. Pieces and elements are made once for all drives.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -35,15 +37,16 @@ class Watcher:
 
     patch: the solved Patch, or None under [normal]. A call with a drive (core.BaseSine) and the `near` of another
     answer gives Watched, or None where no bounded motion is found; the answer is that of `runs.run.run` to round-off
-    where no start is given. windowed: whether histories are wanted where the engine can do without them.
+    where no start is given. windowed: whether histories are wanted where the engine can do without them; before: a
+    Watcher of another model that is no longer asked, whose room serves this one where it fits.
     """
 
-    def __init__(self, model, patch, say=None, windowed: bool = True):
+    def __init__(self, model, patch, say=None, windowed: bool = True, before: Watcher | None = None):
         self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
         steady = self.numerics.engine == HARMONIC.name
         self.by = "" if not steady else "line" if model.kind == "linear" and not model.rig.bends else steady_by(model)
-        self.made = {}
+        self.made, self.before = {}, before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> Watched | None:
         try:
@@ -87,11 +90,7 @@ class Watcher:
         return Watched(window, float(abs(-omega**2 * modes.output @ z + shift)), float(abs(modes.output @ z)))
 
     def _yields(self, drive, near) -> Watched:
-        from ...dynamics.piecewise.orbits import Orbits
-        from ..rig.pieces.run import Interfaces
-
-        modes = self.model.rig.modes
-        orbits = self._once("yields", lambda: Orbits(modes, Interfaces(self.model, self.numerics, self.patch).groups))
+        orbits = self._once("yields", self._orbits)
         try:
             seen = orbits(drive, near)
         except NotConverged:
@@ -100,6 +99,14 @@ class Watcher:
             return self._balance(drive, None)._replace(near=None)  # a start for a balance is none for a map of yields
         window = orbits.window(drive, seen.point) if self.windowed else None
         return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
+
+    def _orbits(self):
+        from ...dynamics.piecewise.orbits import Orbits
+        from ..rig.pieces.run import Interfaces
+
+        modes, groups = self.model.rig.modes, Interfaces(self.model, self.numerics, self.patch).groups
+        found = self.before.pop("yields", None)
+        return found if found is not None and found.renewed(modes, groups) else Orbits(modes, groups)
 
     def _balance(self, drive, near) -> Watched:
         from ...dynamics.harmonic.balance import periodic_response

@@ -61,6 +61,23 @@ def test_exact_one_place_for_readings_serves_many_drives():
         assert orbits(drive)[1:] == Orbits(MODES, GROUP)(drive)[1:]
 
 
+def test_exact_other_modes_and_elements_take_the_same_room():
+    """One after the other in the room of the first, every digit is that of fresh room; other numbers ask for their own
+    and leave what is there as it was."""
+    orbits, drives = Orbits(MODES, GROUP), [BaseSine(1.0, 1.0), BaseSine(2.0, 1.05)]
+    stiff = basis([1.3, 2.0], [0.05, 0.02], [0.7, 1.0], [1.0, 0.5], [0.4, 0.2])
+    gauged = replace(MODES, gauge=np.array([0.3, 1.0]))
+    others = (stiff, GROUP), (gauged, [elements_of([3.0, 0.4], [0.2, 0.25])]), (MODES, GROUP)
+    for modes, group in others:
+        assert orbits.renewed(modes, group)
+        for drive in drives:
+            assert orbits(drive)[1:] == Orbits(modes, group)(drive)[1:]
+    for modes, group in ((basis([1.0], [0.1], [1.0], [1.0], [1.0]), GROUP), (MODES, [elements_of([1.0], [0.1])]),
+                         (MODES, 2 * GROUP)):
+        assert not orbits.renewed(modes, group)
+    assert orbits(drives[0])[1:] == Orbits(MODES, GROUP)(drives[0])[1:]
+
+
 def test_refuses_a_motion_that_nothing_bounds():
     with pytest.raises(NotConverged):
         Orbits(basis([1.0], [0.0], [1.0], [1.0], [1.0]), [elements_of([1.0], [0.01])])(BaseSine(1.0, 1.0))
