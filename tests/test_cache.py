@@ -44,7 +44,7 @@ def copied(folder: Path) -> Path:
 
 def march(home: Path, cache: Path) -> dict:
     """A small march by the package in `home`, in a process of its own with its own cache of compiled code."""
-    environment = os.environ | {"PYTHONPATH": str(home), "PATCHFEM_CACHE": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {"PYTHONPATH": str(home), "PATCHFEM_CACHE": str(cache)}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run([sys.executable, "-c", MARCH, SCENE], capture_output=True, text=True, env=environment,
                           cwd=home, timeout=300)

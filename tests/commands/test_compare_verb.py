@@ -100,7 +100,7 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
 
 
 def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
-    (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm"))
+    (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm").replace("2 um", "50 um"))
     answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", tmp_path / "out")
     assert answer.code in (0, 2) and "long, the patch 12.7 mm" in answer.out + answer.err
 
