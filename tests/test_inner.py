@@ -1,14 +1,20 @@
 """Functions that compiled code calls: compiled with their callers, the same answers, callable from Python still."""
 
+import math
+import operator
 import os
 import re
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numba.core.registry import CPUDispatcher
+from numba.core import types
+from numba.core.errors import NumbaError
+from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.types.functions import BaseFunction
 
 from patchfem.compiled import inner
 from patchfem.compiled.inner import Inner, njit
@@ -128,3 +134,27 @@ def test_exact_constants_in_calls_make_no_more_functions():
 
     assert several(3.0) == 9 + 13.5 + 27
     assert len(power.overloads) == 1
+
+
+@pytest.mark.parametrize("function", [operator.add, operator.truediv, operator.pow, operator.lt, operator.getitem,
+                                      np.sqrt, math.sin, min, abs, len])
+def test_exact_a_call_means_what_numba_says_when_asked_again(function):
+    """Numbers of both kinds, truth values, constants, rows and tables: signature and key, asked first and once more."""
+    context = cpu_target.typing_context
+    context.refresh()
+    kind, kinds = context.resolve_value_type(function), (types.float64, types.int64, types.boolean, types.literal(2),
+                                                         types.float64[::1], types.float64[:, ::1])
+    meant, found = BaseFunction.get_call_type, 0
+    for given in product(kinds, repeat=1 if function in (np.sqrt, math.sin, abs, len) else 2):
+        try:
+            truth = meant.__wrapped__(kind, context, given, {})
+        except NumbaError:
+            with pytest.raises(NumbaError):
+                meant(kind, context, given, {})
+            continue
+        key = kind.get_impl_key(truth)
+        for _ in range(2):
+            assert meant(kind, context, given, {}) == truth
+            assert kind.get_impl_key(truth) == key
+        found += 1
+    assert found >= 2

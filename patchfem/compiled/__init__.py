@@ -9,12 +9,14 @@ and with it numba, only where a function of it is called whose machine code is n
 """
 
 import ast
+import gc
 import hashlib
 import os
 import platform
 import re
 import sys
 import tempfile
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
@@ -99,6 +101,18 @@ class Kernels:
         return self._bring()
 
 
+@contextmanager
+def tidied_later():
+    """No search for cyclic garbage within: a seventh of the time of a compilation, which makes millions of objects."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
 class Entry:
     """A function of a module of compiled code: its kept machine code where there is some, else by numba."""
 
@@ -135,9 +149,10 @@ class Entry:
             path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
             code = machine.found(path)
             if code is None:
-                answer = self.function()(*arguments)
-                if not machine.keep(path, self.function(), arguments):
-                    UNKEPT.add(self.kept[:-1])
+                with tidied_later():
+                    answer = self.function()(*arguments)
+                    if not machine.keep(path, self.function(), arguments):
+                        UNKEPT.add(self.kept[:-1])
                 self.codes[kinds] = False
                 return answer
             self.codes[kinds] = code
