@@ -50,7 +50,8 @@ class PieceRun:
     events: how many pieces; swing, drift: half the range of the output in the window and the motion of the slide's
     mean per cycle [m]; waves: first and third harmonic of the absolute acceleration in the window [m s-2]; end:
     (Start, memory) to go on from; ring: (amplitude [m s-2], frequency [rad/s], damping ratio) of what rings while a
-    single element holds, with an amplitude of 0 where nothing does, None where the samples have to tell.
+    single element holds, with an amplitude of 0 where nothing does, as behind elements whose sticks are too short for
+    it; None where the samples have to tell.
     """
 
     response: Response
@@ -208,10 +209,12 @@ class _Run:
 
     def _ring(self, late, before: float) -> tuple | None:
         """`PieceRun.ring` of the rows of the window; before: way of the slip before them."""
-        if self.alone is None or self.table.count[0] > 1 or len(self.drive.segments) != 1:
+        if self.alone is None or len(self.drive.segments) != 1:
             return None
         found, last = np.zeros(one.NUMBERS), self.clock.segments[0]
         load(f"{ALONE}.window_kernels").rings(late, before, self.period, (last[5], last[4], last[3]), self.alone, found)
+        if self.table.count[0] > 1:
+            return (0.0, 0.0, 0.0) if found[one.SWING] < one.RINGS else None
         return one.ring_of(self.alone, self.table.stiff[0, -1], found[one.RING])
 
     def _close(self, wide, late, before: float) -> PieceRun:

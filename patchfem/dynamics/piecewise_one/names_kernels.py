@@ -9,8 +9,8 @@ MOST = 8  # numbers of a point: motion and turning places
 # of the last cycles: ranges of slide, slip and output; largest force and coordinate; time stuck; friction work by the
 # ledger, off the ends of pieces, by quadrature, and what went to and fro; integrals with the cosine and sine of the
 # drive; of the first and the last cycle; largest acceleration; releases; mean range and secant of a cycle; whether a
-# single run interpolates; what rings, the longest stick
+# single run interpolates; what rings, the largest angle [rad] by which free motion turns in a stick
 (LOW, HIGH, SLIP_LOW, SLIP_HIGH, OUT_LOW, OUT_HIGH, FORCE, REACH, STUCK, WORK, TURNED, POWER, PASSED, Q_COS, Q_SIN,
  F_COS, F_SIN, A_COS, A_SIN, A3_COS, A3_SIN, FIRST, LAST, F_FIRST, F_LAST, ACCELERATION, STARTS, START_COS, START_SIN,
- RANGE, SECANT, EDGE, RING, LONGEST) = range(34)
+ RANGE, SECANT, EDGE, RING, SWING) = range(34)
 NUMBERS = 34

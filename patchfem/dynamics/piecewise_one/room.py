@@ -5,12 +5,15 @@ import numpy as np
 from ...compiled import kernels
 from ..piecewise.elements import Memory, Table
 from ..piecewise.plant import Books, Clock, Plant
-from .names_kernels import DAMPING, FACE, MASS, MOST, NUMBERS, RING, SQUARE
+from .names_kernels import DAMPING, FACE, MASS, MOST, NUMBERS, RING, SQUARE, SWING
 
 series, kinds = kernels("dynamics.piecewise.series_kernels"), kernels("dynamics.piecewise.drive_kernels")
 march = kernels("dynamics.piecewise.march_kernels")
 
-__all__ = ["NUMBERS", "RING"]
+__all__ = ["NUMBERS", "RING", "SWING"]
+# least angle [rad] that what rings turns in a stick: a ring is told of 1.5 periods, and a fit that leaves a tenth of it
+# over is off by tenths of a radian where elements yield one by one and the frequency falls
+RINGS = 0.95 * 3 * np.pi
 
 
 def serves(plant: Plant, clock: Clock, travel: float) -> bool:

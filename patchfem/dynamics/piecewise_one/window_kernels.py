@@ -28,7 +28,6 @@ from .names_kernels import (
     FORCE,
     HIGH,
     LAST,
-    LONGEST,
     LOW,
     MASS,
     OUT_HIGH,
@@ -49,6 +48,7 @@ from .names_kernels import (
     START_SIN,
     STARTS,
     STUCK,
+    SWING,
     TURNED,
     WORK,
 )
@@ -173,11 +173,20 @@ def free_part(row, omega, size, constant, rig):
 def rung(row, span, omega, size, constant, rig, out):
     """Note what rings over `span` [s] from the start of a row on: the rule of `response.ringing`."""
     amplitude, own, damping = free_part(row, omega, size, constant, rig)
-    out[LONGEST] = max(out[LONGEST], span)
     ratio = own / omega
     forced = span * omega > 3 * pi and damping < 1e-3 and abs(ratio - round(ratio)) < 1e-2
     if span * own >= 3 * pi and damping < 0.5 and not forced:
         out[RING] = max(out[RING], abs(rig[OUTPUT]) * amplitude)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def swung(rows, first, last, rig):
+    """Angle [rad] by which free motion turns over the rows first to last - 1, each with its stiffness."""
+    out = 0.0
+    for j in range(first, last):
+        own = rig[SQUARE] + rows[j, FACES + 1] * rig[FACE] * rig[FACE] / rig[MASS] - 0.25 * rig[DAMPING] * rig[DAMPING]
+        out += sqrt(max(own, 0.0)) * rows[j, 1]
+    return out
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -200,6 +209,7 @@ def changes(rows, used, before, period, drive, rig, out):
             held = j
         elif held >= 0:
             rung(rows[held], time - rows[held, 0], *drive, rig, out)
+            out[SWING] = max(out[SWING], swung(rows, held, j, rig))
             held = -1
         last = way
     if waits:
@@ -208,6 +218,7 @@ def changes(rows, used, before, period, drive, rig, out):
         out[START_SIN] += sin(2 * phase)
     if held >= 0:
         rung(rows[held], end - rows[held, 0], *drive, rig, out)
+        out[SWING] = max(out[SWING], swung(rows, held, used, rig))
 
 
 @njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, Start
 from patchfem.dynamics.piecewise import histories
 from patchfem.dynamics.piecewise.elements import elements_of
 from patchfem.dynamics.piecewise.steady import settled
+from patchfem.dynamics.piecewise_one import room
 from patchfem.dynamics.piecewise_one.steady import settled_alone
 from patchfem.response.measures import energy_balance
 from patchfem.response.run_events import rings
@@ -134,3 +136,27 @@ def test_exact_ring_of_an_element_that_holds():
 def test_exact_nothing_rings_where_sticks_are_short():
     done = histories.simulate(basis(1.0, 0.02), BaseSine(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4)
     assert done.ring[0] == 0.0
+
+
+@pytest.mark.parametrize("push", [0.8, 8.0])
+def test_exact_angle_of_what_rings_among_elements_that_yield(push):
+    """The sum of own frequency times length over the pieces of a stick, which decides whether its samples have to tell
+    a ring: by hand from the rows, and no ring is found where it says none."""
+    modes, drive = basis(1.0, 0.02), BaseSine(push, 0.31)
+    stiff, limit = np.array([30.0, 15.0, 10.0, 5.0]), np.array([0.003, 0.004, 0.005, 0.006])
+    groups = [elements_of(stiff, limit)]
+    run = histories._Run(modes, drive, groups, 20, 4, np.inf, None, None)
+    run.until(16, False)
+    before = float(run.before[0])
+    rows = np.concatenate(run.until(20, True))
+    out = np.zeros(room.NUMBERS)
+    load("dynamics.piecewise_one.window_kernels").rings(rows, before, drive.period, (0.31, push, 0.0), run.alone, out)
+    own = np.sqrt(1.0 + rows[:, run._at(0, 1)] - 0.02**2) * rows[:, 1]
+    held = rows[:, run._at(0, 2)] < 0.5
+    parts = np.split(own, np.flatnonzero(np.diff(held)) + 1)
+    sticks = [part.sum() for part, still in zip(parts, np.split(held, np.flatnonzero(np.diff(held)) + 1)) if still[0]]
+    assert out[room.SWING] == pytest.approx(max(sticks), rel=1e-12)
+    done = histories.simulate(modes, drive, groups, 20, window=4)
+    assert (done.ring is None) == (max(sticks) >= room.RINGS)
+    if done.ring is not None:
+        assert done.ring[0] == 0.0 and rings(done.window, modes, drive, done.log) == ({}, {})

@@ -122,16 +122,10 @@ def _read(found: _Found, others, cycles: int, window: int) -> Runs:
         slopes = np.linalg.eigvals(found.slopes[settles])
         steady[:, settles] = settled_of(*found.steady[settles][:, [read.AMOUNT, read.RESIDUAL]].T, slopes)
     lost = (found.codes == read.LOST) | ((found.codes == read.UNKNOWN) & ~stuck) | (x[read.EDGE] > 0)
-    rings = (found.counts > 1) & (x[read.LONGEST] * _fastest(found) >= 0.999 * 3 * np.pi) & ((ledger[7] > 0) | stuck)
+    rings = (found.counts > 1) & (x[read.SWING] >= made.RINGS) & ((ledger[7] > 0) | stuck)
     errors = {name: np.zeros(len(stuck)) for name in values}
     return Runs(cycles, window, values, book, found.extremes, found.phasors @ [1, 1j], stuck, lost | rings, errors,
                 PIECES.least, PIECES.closes, loads, tuple(steady))
-
-
-def _fastest(found: _Found):
-    """Fastest rate [rad/s] at which anything rings, (n,)."""
-    stiff = found.sorts[:, 1].max(axis=1)
-    return np.sqrt(found.rigs[:, read.SQUARE] + stiff * found.rigs[:, read.FACE]**2 / found.rigs[:, read.MASS])
 
 
 def _values(found: _Found, x, book: dict, others, period, window: int) -> dict:
