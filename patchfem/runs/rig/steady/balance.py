@@ -24,7 +24,7 @@ from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model, flank_of, model_of
 from ..solution import Solution, sampled_loop, seen
 from ..strips import other_measures
-from .curves import LAST, SHOWN, Shown
+from .curves import LAST, SHOWN, Shown, unlasting
 
 ADRIFT = ("the steady motion that the balance found over the grooves does not last: another one is reached from rest; "
           'use accuracy.method = "march"')
@@ -76,7 +76,9 @@ class Balance:
         others = 2 * found.harmonics if self.climbing is not None else max(1, found.harmonics // 2)
         other = periodic_point(self.modes, drive, self.group, others, self.tolerance,
                                start=found if near is not None else None)
-        stable = with_stability(found, self.modes)
+        stable, notes = with_stability(found, self.modes), ()
+        if self.climbing is None and not stable.stable:
+            found, stable, other, notes = self._lasting(drive, found, stable, other)
         values, response, book = self._measured(found, drive)
         rough = self._measured(other, drive)[0]
         # the higher harmonics follow those of `found`, not those of half as many: measured, 20 times less is left out
@@ -95,12 +97,30 @@ class Balance:
         grooves, load = self.model.grooves, response.extra.get("normal_load")
         if grooves is not None and not stable.stable:
             outcome, message = Outcome.NOT_CONVERGED, ADRIFT
+        elif not stable.stable:
+            outcome, message = Outcome.NOT_CONVERGED, unlasting(stable.multipliers)
         if load is not None and load.min() <= 0:
             from ....dynamics.grooves.run import lifts
 
             outcome, message = Outcome.NOT_CONVERGED, lifts(grooves, response.time[int(np.argmin(load))])
         return Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
-                        message=message, errors=errors, extra=extra), found
+                        message=message, errors=errors, extra=extra, notes=notes), found
+
+    def _lasting(self, drive, found, stable, other) -> tuple:
+        """In place of a Periodic that does not last the smallest one under the same drive that does, with its
+        multipliers and with half its harmonics, and a note on it; what is given, where none is found."""
+        every = branches.branches(self.modes, drive, self.group, self.tolerance)
+        lasts = [one for one in every if one.stable]
+        if not lasts:
+            return found, stable, other, ()
+        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0])
+        half = max(1, found.harmonics // 2)
+        other = periodic_point(self.modes, drive, self.group, half, self.tolerance, start=found)
+        sizes = ", ".join(f"{one.amplitude(self.modes.output):.3g} m" for one in every)
+        note = f"at this drive {len(every)} steady motions balance ({sizes}), {len(lasts)} of which last" + (
+            "" if len(lasts) == 1 else "; the smallest of these is shown, accuracy.method = \"march\" tells which one "
+            "is reached from rest")
+        return found, with_stability(found, self.modes), other, (note,)
 
     def shown(self, drive, near=None) -> Shown:
         """A point of a curve, its errors unknown."""

@@ -47,6 +47,13 @@ def exact_errors(values: dict, left: float) -> dict:
             if v is not None}
 
 
+def unlasting(multipliers) -> str:
+    """The sentence on a steady motion that does not last; multipliers: Floquet's (m,)."""
+    size = np.abs(multipliers).max()
+    return f"the steady motion that was found does not last: a disturbance of it grows {size:.3g} times in a cycle; " \
+        'use accuracy.method = "march"'
+
+
 def shown_of(drive, raw, near=None) -> Shown:
     """The Solution of a steady motion as a point of a curve."""
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
@@ -110,7 +117,8 @@ def levels_of(finder, drive):
     """
     points, said, best = [], [], None
     for part in drive.segments:
-        sine, near = BaseSine(part.amplitude, part.omega, drive.moving), points[-1].near if points else None
+        sine = BaseSine(part.amplitude, part.omega, drive.moving)
+        near = points[-1].near if points and points[-1].stable else None
         try:
             raw, near = finder.point(sine, near)
         except NotConverged as why:
@@ -122,8 +130,9 @@ def levels_of(finder, drive):
         points.append(shown_of(sine, gauged(finder.model, raw), near))
         if best is None or largest_of(points) == len(points) - 1:
             best = raw, sine
+        said += [raw.message] if raw.message else []
     if best is None:
-        raise said[0]
+        raise said[0]  # no level has a motion
 
     def probe(number: int, level: float) -> Level:
         sine = BaseSine(level, drive.segments[0].omega, drive.moving)

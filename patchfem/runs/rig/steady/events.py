@@ -10,6 +10,7 @@ from ....compiled import load
 from ....core import Outcome, PatchfemError, Start
 from ....dynamics.events.histories import simulate
 from ....dynamics.events.steady_events import steady
+from ....dynamics.harmonic.floquet import is_stable
 from ....dynamics.one_mode import sdof
 from ....dynamics.one_mode.steady import response
 from ....response.measures import half_swing
@@ -17,7 +18,7 @@ from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import largest
 from ....structure.response import receptance
 from ..exact import forces_of, run_exact
-from .curves import SHOWN, Shown, exact_errors, traced
+from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 OUTCOMES = {"unbounded": Outcome.GROWS, "stuck": Outcome.STUCK}
 
@@ -45,9 +46,11 @@ class Events:
         few = replace(self.numerics, cycles=2.0, window=1)
         here = replace(self.model.rig, drive=drive, start=found.start, levels=())
         raw = run_exact(replace(self.model, rig=here), few, self.patch)
-        extra = {"regime": found.regime, "multipliers": found.multipliers, "residual": found.residual,
-                 "map": "events"}
-        return replace(raw, outcome=OUTCOMES.get(found.regime, Outcome.STEADY), extra=extra,
+        outcome, regime, message = OUTCOMES.get(found.regime, Outcome.STEADY), found.regime, raw.message
+        if not _lasts(found):
+            outcome, regime, message = Outcome.NOT_CONVERGED, f"{regime}, unstable", unlasting(found.multipliers)
+        extra = {"regime": regime, "multipliers": found.multipliers, "residual": found.residual, "map": "events"}
+        return replace(raw, outcome=outcome, message=message, extra=extra,
                        errors=exact_errors(raw.values, found.residual), book=raw.book | {"iterations": 0.0},
                        seconds=perf_counter() - begin), found.start
 
@@ -55,7 +58,8 @@ class Events:
         """A point of a curve."""
         found = self._found(drive, near)
         size = float(np.abs(found.multipliers).max(initial=0.0))
-        return self._shown(drive, found.regime, size, found.start, 1, found.residual)
+        one = self._shown(drive, found.regime, size, found.start, 1, found.residual)
+        return one if _lasts(found) else one._replace(regime=f"{found.regime}, unstable", stable=False)
 
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency, no folds)."""
@@ -114,3 +118,8 @@ class Events:
                   **wave_measures(*np.abs(done.waves), largest(drive))}
         values = {name: value for name, value in values.items() if value is not None}
         return Shown(drive, values, exact_errors(values, residual), regime, multiplier, True, outcome, start)
+
+
+def _lasts(found) -> bool:
+    """Whether a Steady lasts as far as its multipliers tell: those of two events at once hold for one order of them."""
+    return found.regime == "unbounded" or not found.alone or is_stable(found.multipliers)

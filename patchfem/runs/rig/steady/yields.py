@@ -10,13 +10,14 @@ from time import perf_counter
 import numpy as np
 
 from ....core import Outcome
+from ....dynamics.harmonic.floquet import is_stable
 from ....dynamics.piecewise import histories
 from ....dynamics.piecewise.elements import books_begin
 from ....dynamics.piecewise.steady import steady
 from ....response.measures import half_swing
 from ....response.spectrum import wave_measures
 from ..pieces.run import Interfaces, solution_of
-from .curves import SHOWN, Shown, exact_errors, traced
+from .curves import SHOWN, Shown, exact_errors, traced, unlasting
 
 
 class Yields:
@@ -38,6 +39,8 @@ class Yields:
         few = replace(self.numerics, cycles=2.0, window=1)
         raw = solution_of(self.model, few, self.patch, drive, self.found, done, perf_counter() - begin)
         extra = {"regime": _regime(one), "multipliers": one.multipliers, "residual": one.residual, "map": "yields"}
+        if not _stable(one):
+            raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=unlasting(one.multipliers))
         return replace(raw, outcome=raw.outcome or Outcome.STEADY, steady=(None, None), extra=extra,
                        errors=exact_errors(raw.values, one.error),
                        book=raw.book | {"iterations": float(one.iterations)}), one.point
@@ -66,7 +69,7 @@ def _largest(one) -> float:
 
 
 def _stable(one) -> bool:
-    return _largest(one) <= 1
+    return is_stable(one.multipliers) if one.multipliers.size else True
 
 
 def _regime(one) -> str:
