@@ -1,5 +1,6 @@
-"""A variant of the ladder fitted: its numbers, scores and cells. The recipe stands in `rungs`."""
+"""A variant of the ladder fitted: its numbers, scores and cells, and where they are kept. The recipe is in `rungs`."""
 
+import json
 import sys
 import time
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from rungs import HELD, RUNGS, SEED, TABLE
+from rungs import HELD, HERE, RUNGS, SEED, TABLE
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.computed import Computed
@@ -15,6 +16,7 @@ from patchfem.campaigns.rows.search import Search, searched
 from patchfem.core import G_N
 
 MIL = 25.4e-6
+SCORES = HERE / "scores.json"
 
 
 def training(cells, protocol: str) -> np.ndarray:
@@ -56,3 +58,17 @@ def rounded(given, digits: int = 4):
     if isinstance(given, (list, tuple, np.ndarray)):
         return [rounded(one, digits) for one in given]
     return float(f"{given:.{digits}g}") if np.isfinite(given) else None
+
+
+def known() -> dict:
+    """What was computed: (rung, reading, protocol, placebo) -> record."""
+    rows = json.loads(SCORES.read_text("utf-8")) if SCORES.exists() else []
+    return {(row["rung"], row["reading"], row["protocol"], row["placebo"]): row for row in rows}
+
+
+def keep(rows: dict) -> None:
+    """Write the records, one a line."""
+    lines = ",\n".join(json.dumps(row) for row in rows.values())
+    partial = SCORES.with_suffix(".partial")
+    partial.write_text(f"[\n{lines}\n]\n", "utf-8")
+    partial.replace(SCORES)

@@ -12,7 +12,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from ladder import known
+from fitting import known
 from rungs import HERE, TABLE
 
 from patchfem.campaigns.rows.cells import cells_of
@@ -45,7 +45,6 @@ def main(path: Path = HERE / "ladder.svg") -> Path:
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="center", bbox_to_anchor=(0.74, 0.26), frameon=False,
                       title="fitted to 143 Hz alone")
-        figure.tight_layout()
     return path
 
 

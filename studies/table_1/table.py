@@ -1,9 +1,6 @@
-"""The table of the ladder, from scores.json: every rung under every reading, models without mechanics beside them.
+"""The tables of the ladder as markdown: every rung under every reading, models without mechanics, placebos.
 
-A score is the root mean square of ln(computed/measured) of all readings, accelerations, displacements. README.md beside
-this file holds what `main` prints; a test compares the two.
-
-Run: python studies/table_1/table.py
+A score is the root mean square of ln(computed/measured): of all readings / of accelerations / of displacements.
 """
 
 import sys
@@ -13,7 +10,6 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fitting import training
-from ladder import known
 from rungs import EACH, RUNGS, TABLE, variants
 
 from patchfem.campaigns.rows.cells import cells_of, scores
@@ -70,9 +66,8 @@ def nulls() -> list:
     return out
 
 
-def main() -> list:
-    """Print the tables as markdown; returns their lines."""
-    rows = known()
+def tables(rows: dict) -> list:
+    """Lines of markdown of what was computed: (rung, reading, protocol, placebo) -> record."""
     out = ["| model | reading | numbers | at 143 Hz | 135, 150, 155 Hz | left out | all rows | seconds |",
            "|---|---|---|---|---|---|---|---|"]
     for name, factor, fitted, held, left, whole in nulls():
@@ -89,16 +84,12 @@ def main() -> list:
             out.append(f"| {rung} | {reading} | {len(row['values'])}: {numbers(row)} | {three(row['fitted'])} | "
                        f"{three(row['others'])} | {three(left_out(rows, rung, reading))} | "
                        f"{three(every and every['fitted'])} | {row['seconds']:.0f} |")
-    out += ["", "| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]
-    for rung, reading, protocol, placebo in variants():
-        row = rows.get((rung, reading, protocol, placebo))
-        if placebo and row is not None:
-            real = rows.get((rung, reading, protocol, ""))
-            out.append(f"| {placebo.rpartition('.')[2].replace('=', ' ')}, {rung} | {three(real and real['fitted'])}, "
-                       f"{three(real and real['others'])} | {three(row['fitted'])} | {three(row['others'])} |")
-    print("\n".join(out))
+    tried = [key for key in variants() if key[3] and key in rows]
+    if tried:
+        out += ["", "| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]
+    for rung, reading, protocol, placebo in tried:
+        row, real = rows[rung, reading, protocol, placebo], rows.get((rung, reading, protocol, ""))
+        instead = f"{three(real and real['fitted'])}, {three(real and real['others'])}"
+        out.append(f"| {rung}: {placebo.rpartition('.')[2].replace('=', ' ')} | {instead} | {three(row['fitted'])} | "
+                   f"{three(row['others'])} |")
     return out
-
-
-if __name__ == "__main__":
-    main()
