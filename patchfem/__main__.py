@@ -82,6 +82,10 @@ def _guarded(words: list) -> int:
     except MemoryError:
         say("out of memory; make contact.element_size larger or the run shorter")
         return 4
+    except SystemExit as end:  # what shows help ends so where nobody reads on
+        if isinstance(end.__context__, BrokenPipeError):
+            return 0
+        raise
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

@@ -52,3 +52,15 @@ def test_exact_a_command_has_one_thread_unless_it_is_told_otherwise():
         done = subprocess.run([sys.executable, "-c", THREADS.format("/proc/self/task")], text=True, check=True,
                               capture_output=True, env=environment | told)
         assert int(done.stdout) == min(most, os.cpu_count())
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])
+def test_exact_a_pipe_that_nobody_reads_ends_a_command_quietly(words):
+    reads, writes = os.pipe()
+    os.close(reads)
+    try:
+        done = subprocess.run([sys.executable, "-m", "patchfem", *words], text=True, stdout=writes,
+                              stderr=subprocess.PIPE, timeout=60)
+    finally:
+        os.close(writes)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -302,6 +302,25 @@ def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
     assert cli("sweep", scene, *over, "-o", out, "--collect", "--no-page").code == 0 and not (out / page).exists()
 
 
+def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
+    """--resume with --keep pages: a case whose folder has no page is answered again, one that has it is not."""
+    out, over = tmp_path / "swept", ("--over", "friction.static=0.1,0.2")
+    assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 0
+    assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0
+    pages = sorted((out / "cases").glob("*/report.html"))
+    before = [page.stat().st_mtime_ns for page in pages]
+    assert len(pages) == 2
+    assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0
+    assert [page.stat().st_mtime_ns for page in pages] == before
+
+
+def test_refuses_a_mode_by_its_name_and_by_its_number(scene, tmp_path):
+    over = ("--over", "structure.mode.axial.frequency=100 Hz,110 Hz", "--over", "structure.mode.0.frequency=120 Hz")
+    answer = cli("sweep", scene, *over, "-o", tmp_path / "a")
+    assert answer.code == 2 and "structure.mode.0.frequency: stands twice, as structure.mode.axial.frequency too" \
+        in answer.err and not (tmp_path / "a").exists()
+
+
 def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
     table = tmp_path / "cases.csv"
     table.write_text("normal.load [N],friction.static\n10,0.3\n20,0.4\n", encoding="utf-8")

@@ -59,6 +59,8 @@ def cases_of(asked: Asked, request: Request) -> Cases:
             wrong.append(f"{asked.path}: nothing to sweep over; add --over table.key=v1,v2,... or a table [sweep]")
     twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
     wrong += [f"--over {key}: stands in {request.file} too" for key in sorted(twice)]
+    if not wrong:
+        wrong += _same(asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))])
     if wrong:
         first = [f"{axis.key}={axis.texts[0]}" for axis in (*axes, *(one for part in parts for one in part.axes))
                  if isinstance(axis, Axis)]
@@ -82,6 +84,17 @@ def _rows(path: Path) -> tuple:
     from .table import read as read_rows
 
     return read_rows(path)
+
+
+def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
+    """A mistake for each key that stands for the same value as one before it, by the name and by the number of a
+    mode."""
+    first, wrong = {}, []
+    for key in keys:
+        place = asked.place(key)
+        if first.setdefault(place, key) != key:
+            wrong.append(f"--over {key}: stands twice, as {first[place]} too")
+    return wrong
 
 
 def _refuse_all(asked: Asked, cases: Cases) -> None:

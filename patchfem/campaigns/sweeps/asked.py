@@ -60,6 +60,15 @@ class Asked:
         except SceneError as error:
             return [], error.mistakes
 
+    def place(self, key: str) -> str:
+        """A key with a mode's number in place of its name."""
+        pieces, modes = key.split("."), tomllib.loads(self.text).get("structure", {})
+        modes = modes.get("mode") if isinstance(modes, dict) else None
+        if pieces[:2] == ["structure", "mode"] and len(pieces) > 2 and isinstance(modes, list):
+            names = [one.get("name") if isinstance(one, dict) else None for one in modes]
+            pieces[2] = str(names.index(pieces[2])) if pieces[2] in names else pieces[2]
+        return ".".join(pieces)
+
     def digest(self) -> str:
         """Sign of what all cases share: the version, the tables as written but for [sweep], what is set, the files."""
         tables = {name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"}

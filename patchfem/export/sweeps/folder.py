@@ -20,7 +20,7 @@ from ...effects import EFFECTS
 from ...model.model import Model
 from ...runs.many.answers import FAILED, Answers
 from ..folder import save
-from ..results import LOCK, refuse_others, refuse_second
+from ..results import LOCK, PAGE, refuse_others, refuse_second
 from ..summary import summary
 
 CASES, SUMMARY, TABLES = "cases", "summary.json", ("sweep.csv", "sweep.nc", "report.html")
@@ -120,9 +120,10 @@ class Folder:
         except OSError as error:
             raise Missing(f"{self.shown}: a case cannot be written ({error.strerror}); what is whole is kept") from None
 
-    def answers(self, numbers: Iterable[int], whole: bool = False) -> tuple[list[int], Answers]:
+    def answers(self, numbers: Iterable[int], whole: bool = False, pages: bool = False) -> tuple[list[int], Answers]:
         """(numbers, Answers) of the cases whose summary is there and can be read; whole: of those alone that have their
-        results folder, or failed."""
+        results folder, or failed; pages: with its page."""
+        asked = (*["scene.resolved.toml"] * whole, *[PAGE] * pages)
         read = []
         for number in numbers:
             place = self.target / CASES / self.keys[number]
@@ -130,7 +131,7 @@ class Folder:
                 one = json.loads((place / SUMMARY).read_text(encoding="utf-8"))
             except (OSError, ValueError):
                 continue
-            if not whole or one["outcome"] == FAILED or (place / "scene.resolved.toml").is_file():
+            if one["outcome"] == FAILED or all((place / name).is_file() for name in asked):
                 read.append((number, one))
         found = Answers.blank(len(read))
         for case, (_, one) in enumerate(read):

@@ -22,7 +22,8 @@ class Place:
     """Where a sweep is kept, and how.
 
     resume: answers that are there are taken as they are; whole: the results folder of each case is kept, and one that
-    is not there is no answer; shard: (i, n) to answer the i-th of n parts only, into a folder that the parts share;
+    is not there, or has not its page where pages are asked for, is no answer; shard: (i, n) to answer the i-th of n
+    parts only, into a folder that the parts share;
     pages: the results folders have their report.html; page: the sweep has one.
     """
 
@@ -46,7 +47,7 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
         wanted = _part(len(cases), place.shard)
         total, there = Answers.blank(len(cases)), []
         if place.resume or place.shard is not None:
-            there, found = folder.answers(sorted(set(folder.there()) & set(wanted)), place.whole)
+            there, found = folder.answers(sorted(set(folder.there()) & set(wanted)), place.whole, place.pages)
             total.place(there, found)
         done = len(there)
         if told is not None:
