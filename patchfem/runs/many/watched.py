@@ -129,7 +129,8 @@ class Watcher:
 
     def _run(self, drive, near) -> Watched | None:
         model = replace(self.model, rig=replace(self.model.rig, drive=drive))
-        return _seen(ENGINES[self.numerics.engine].run(model, self.numerics, self.patch, 0, self.say, None))
+        few = replace(self.numerics, whole=False)  # what is before the window is neither kept nor measured
+        return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
 
 
 def _seen(raw) -> Watched | None:

@@ -14,6 +14,10 @@ from patchfem.campaigns.rows.fit import Beside, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fit_rows import Starts
+from patchfem.model.model import build
+from patchfem.response.spectrum import reading
+from patchfem.runs.many.watched import Watcher
+from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import SceneError, load, loads
@@ -187,6 +191,25 @@ def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
     assert np.abs(cells.logs(*cold)).max() < 1e-6  # marched rows: 400 cycles leave that much
     computed([0.46, 2.5e6], range(6))
     assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)  # from motions nearby
+
+
+def test_exact_a_marched_motion_is_watched_as_it_runs():
+    """Nothing is kept from before the window, and no bit of what is measured in it changes."""
+    model = build(loads(RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]))
+    seen, measures = Watcher(model, None)(model.rig.drive), run(plan(model)).measures
+    assert seen.acceleration == measures["absolute_acceleration_peak"].value
+    assert seen.displacement == measures["relative_displacement_amplitude"].value
+
+
+@pytest.mark.parametrize("sets", [[], ["structure.mode.axial.accelerometer=0.7"]])
+def test_exact_what_a_window_shows_is_seen_without_one(sets):
+    model = build(loads(RUBS, sets=["accuracy.method=harmonic", *sets]))
+    drive = model.rig.drive
+    whole, part = (Watcher(model, None, None, windowed)(drive) for windowed in (True, False))
+    assert part.window is None and part[1:3] == pytest.approx(whole[1:3], rel=1e-13)
+    assert abs(part.fundamental) == pytest.approx(reading(whole.window, drive, 0.0, "fundamental"), rel=1e-8)
+    assert part.acceleration == pytest.approx(np.abs(whole.window.acceleration).max(), rel=1e-3)  # of 400 samples
+    assert part.displacement == pytest.approx(np.ptp(whole.window.slide) / 2, rel=1e-4)  # the gauge moves as the slide
 
 
 def test_rows_flagged_u_are_lower_bounds(tmp_path):
