@@ -200,7 +200,7 @@ def _table(draft: Draft, model: type[Table], raw: dict[str, Any], at: str) -> An
     for key, value in raw.items():
         path = f"{at}.{key}" if at else key
         if key not in names:
-            _unknown(draft, model, key, value, path)
+            _unknown(draft, model, raw, key, path)
             continue
         inner = model_of(model, names[key])
         plain = is_value(model, names[key])
@@ -267,13 +267,16 @@ def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], val
     return None
 
 
-def _unknown(draft: Draft, model: type[Table], key: str, value: Any, path: str) -> None:
+def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, path: str) -> None:
+    from .meant import key_meant, table_meant  # of a scene with a mistake alone
+
+    value = raw[key]
     tables = [name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)]
     is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))
     known = tables if is_table and tables else list(keys(model))
-    found = choices(key, known)
-    near, question, _ = found.partition("? ")
-    help = near + "?" if question else f"known here: {', '.join(known)}" if known else "this table has no keys"
+    near = table_meant(model, raw, key) if is_table else key_meant(model, path.rpartition(".")[0], raw, key)
+    help = f"did you mean '{near}'?" if near else f"known here: {', '.join(known)}" if known else \
+        "this table has no keys"
     draft.say(path, f"unknown {'table' if is_table else 'key'}; {help}")
 
 

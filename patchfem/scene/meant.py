@@ -1,0 +1,67 @@
+"""The key or table that someone meant who wrote one that a scene does not have: by name, and by what it holds."""
+
+from collections.abc import Collection
+from difflib import get_close_matches
+
+from pydantic import ValidationError
+
+from .keys.meanings import CONDITIONS
+from .keys.types import Table, keys, model_of
+from .rules.draft import ASPERITIES, LAWS, SLIDES
+
+NEAR = 0.6  # of difflib, from which two names are alike
+SELECTORS = {"friction": ("law", LAWS), "slide": ("kind", SLIDES), "contact.asperities": ("law", ASPERITIES)}
+
+
+def key_meant(model: type[Table], at: str, written: dict, key: str) -> str:
+    """The key of the table `at` that `key` stands for, "" where nothing tells.
+
+    written: the table as it stands; a key that is there already is not meant. A name that is like it, or that shares a
+    word with it, comes before a key that the table lacks, as far as its kind fits the value.
+    """
+    free = [one for one in keys(model) if one not in written]
+    fit = [one for one in free if _fits(model, one, written[key])]
+    words = set(key.lower().split("_"))
+    for found in (get_close_matches(key, fit, 1, NEAR), [one for one in fit if words & set(one.split("_"))],
+                  [one for one in fit if one.startswith(key.lower())],
+                  [one for one in fit if one in _lacking(model, at, written)], get_close_matches(key, free, 1, NEAR)):
+        if found:
+            return found[0]
+    return ""
+
+
+def table_meant(model: type[Table], written: dict, key: str) -> str:
+    """The table that the unknown one `key` stands for, by the keys that it holds and by its name; dotted where it lies
+    deeper, "" where nothing tells."""
+    held = written[key][0] if isinstance(written[key], list) else written[key]
+    found = {}
+    for name, inner in _tables(model):
+        found[name] = len(set(held) & keys(inner).keys())
+        for deeper, last in _tables(inner):
+            found[f"{name}.{deeper}"] = len(set(held) & keys(last).keys())
+    best, near = max(found, key=found.get, default=""), get_close_matches(key, found, 1, NEAR)
+    if near and found[near[0]] >= found[best]:
+        return near[0]
+    return best if best and found[best] > len(held) / 2 else "".join(near)
+
+
+def _tables(model: type[Table]) -> list:
+    return [(key, inner) for key, name in keys(model).items() if (inner := model_of(model, name)) is not None]
+
+
+def _fits(model: type[Table], key: str, value: object) -> bool:
+    """Whether the key takes the value."""
+    try:
+        model.model_validate({key: value})
+    except ValidationError as wrong:
+        return all(error["loc"][0] != key for error in wrong.errors(include_url=False))
+    return True
+
+
+def _lacking(model: type[Table], at: str, written: dict) -> Collection:
+    """Keys that the table needs and has not: always, by the value of its selector, or under a condition."""
+    need = [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
+    selector, by = SELECTORS.get(at, ("", {}))
+    need += by.get(written.get(selector), ("", ""))[0].split() if isinstance(written.get(selector), str) else []
+    need += [key for key in keys(model) if f"{at}.{key}" in CONDITIONS]
+    return [key for key in need if key not in written]
