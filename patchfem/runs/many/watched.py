@@ -13,10 +13,11 @@ import numpy as np
 
 from ...core import NotConverged, Outcome, Response
 from ...response.measures import half_swing
-from ..rig.engines import ENGINES, HARMONIC, steady_by
+from ..rig.engines import ENGINES, HARMONIC, MARCH, steady_by
 from ..rig.numerics import choose
 
 SAMPLES = 400  # of a cycle without friction
+UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL
 
 
 class Watched(NamedTuple):
@@ -130,11 +131,21 @@ class Watcher:
     def _run(self, drive, near) -> Watched | None:
         model = replace(self.model, rig=replace(self.model.rig, drive=drive))
         few = replace(self.numerics, whole=False)  # what is before the window is neither kept nor measured
-        return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
+        if self.numerics.engine != MARCH.name:
+            return _seen(ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None))
+        from ..rig.march import Read, marched
+
+        contact, done, *_ = marched(model, few, self.patch, 0, self.say)
+        if done.outcome in UNBOUNDED:
+            return None
+        values = Read(model, few, self.patch, contact).values(done, done.amplitudes[-few.window:], None)
+        return _measured(done.window, values)
 
 
 def _seen(raw) -> Watched | None:
     """What a Solution shows; None where the motion grows, leaves its travel or was not found."""
-    if raw.outcome in (Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL):
-        return None
-    return Watched(raw.window, raw.values["absolute_acceleration_peak"], raw.values["relative_displacement_amplitude"])
+    return None if raw.outcome in UNBOUNDED else _measured(raw.window, raw.values)
+
+
+def _measured(window: Response, values: dict) -> Watched:
+    return Watched(window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"])

@@ -26,6 +26,13 @@ LATE = 1.5  # times what an end beside the asked one changes to first order
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
     """One march at numerics.steps per cycle; patch: the solved Patch or None."""
+    contact, done, seconds, prepare = marched(model, numerics, patch, frames, say, progress)
+    return Read(model, numerics, patch, contact).solution(done, seconds, prepare)
+
+
+def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
+    """(contact, MarchResult, seconds of the march, seconds before it by what they were for); arguments as `run_march`.
+    """
     rig, begin = model.rig, perf_counter()
     contact = model_of(model, numerics, patch)
     reduced = perf_counter() - begin
@@ -37,7 +44,7 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
                      frames, say, progress, rig.start, rig_levels.ends(rig), numerics.whole)
     seconds = perf_counter() - begin
     done = joined(done, patch) if rig.strips_slide_apart else done
-    return Read(model, numerics, patch, contact).solution(done, seconds, {"reduce": reduced, "load": loaded})
+    return contact, done, seconds, {"reduce": reduced, "load": loaded}
 
 
 class Read:
