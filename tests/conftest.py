@@ -2,6 +2,7 @@
 nothing. The examples of the property tests are the same in every run, so that a failure is of the change at hand;
 PATCHFEM_SEARCH=1 draws new ones."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -26,6 +27,12 @@ def pytest_xdist_auto_num_workers(config):
         config.option.dist = "no"
         return 0
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+def pytest_collection_finish(session):
+    """What has been imported and collected stays for good: no search for garbage goes through it again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)

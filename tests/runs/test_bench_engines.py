@@ -118,7 +118,7 @@ def test_exact_a_long_list_of_bonds_finds_room():
     (EXACT["coulomb"], PATCH + "[contact.shear]\n", "parallel elements"),
 ])  # fmt: skip
 def test_exact_a_plan_names_the_engine_that_runs(law, where, name):
-    what = plan(model_of(law, "sine", where=where))
+    what = plan(model_of(law, "sine", "accuracy.steps_per_cycle=200", where=where))
     result = run(what, estimate=False)
     assert what.engine == result.extra["engine"] == result.response.engine.name == f"bench, {name}"
     assert ("bond_list_about" in what.unknowns) == name.endswith("list")
@@ -223,7 +223,7 @@ def test_exact_bonds_that_lose_their_pressure_give_nothing_back():
     for _ in range(20):
         state = law.step(state, 0.1, one, one, 1.0).state
     last = law.step(state, 0.05, one, 0 * one, 1.0)
-    work, part, count = 0.0, state, 500
+    work, part, count = 0.0, state, 250
     for k in range(count):
         s0, s1 = one * (1 - k / count), one * (1 - (k + 1) / count)
         step = law.step(part, 0.05 / count, s0, np.maximum(s1, 1e-9), 1.0)

@@ -44,12 +44,12 @@ def test_exact_prescribed_path_of_points_is_the_recursion(growth):
 @pytest.mark.parametrize("order", [0.0, 1.0])
 def test_exact_prescribed_path_of_a_list_is_the_quadrature(order):
     law = Bonds(0.4, 1.0, order, "report", initial=0.0)
-    path = random_walk(2, 60, 0.6)
+    path = random_walk(2, 40, 0.6)
     forces, _, _, _ = follow(list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
     run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
-    fine = np.interp(np.linspace(0, 60, 961), np.arange(61), path)
-    means = walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 16).mean.reshape(60, 16).mean(axis=1)
+    fine = np.interp(np.linspace(0, 40, 641), np.arange(41), path)
+    means = walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 16).mean.reshape(40, 16).mean(axis=1)
     assert forces[:-1, 1] == pytest.approx(means, abs=1e-2)  # where a bond's sign turns inside a step
     assert np.median(np.abs(forces[:-1, 1] - means)) < 1e-3
 

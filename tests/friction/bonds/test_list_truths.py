@@ -50,10 +50,11 @@ def test_exact_c8_healing_under_load(order, knobs):
     assert got == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
 
 
+@pytest.mark.parametrize("count", [20_000, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("growth", [{}, GROWS])
-def test_always_long_runs_stay_bounded_and_right(growth):
-    """1e5 random steps, then the force of the same bonds by the list that only knows the last of the path."""
-    steps = np.random.default_rng(3).normal(0, 0.05, 100_000)
+def test_always_long_runs_stay_bounded_and_right(growth, count):
+    """Many random steps, then the force of the same bonds by the list that only knows the last of the path."""
+    steps = np.random.default_rng(3).normal(0, 0.05, count)
     steps[::1000] *= 400.0
     law = printed(1, growth)
     got = follow_list(law, np.concatenate([[0.0], np.cumsum(steps)]), tail=1e-9, merge=0.01)

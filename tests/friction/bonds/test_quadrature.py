@@ -138,17 +138,17 @@ def test_exact_printed_law_pushes_back_while_it_heals(order):
 @pytest.mark.parametrize("reading, order, growth", [("report", 0.0, {}), ("report", 2.0, {}), ("stretch", 1.0, {}),
                                                     ("stretch", 1.0, GROWTH), ("stretch", 2.0, {}),
                                                     ("report", 1.0, GROWTH)])
-@pytest.mark.parametrize("tail", [1e-2, 1e-5])
-def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth, tail):
+def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth):
     law = Bonds(0.4, 1.0, order, reading, **growth)
     path = np.concatenate([random_path(6, 150, 0.4), random_path(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100)])
-    cut = walk(Quadrature(law, tail), path, ONE, 0.3)
     whole = walk(Quadrature(law, 0.0), path, ONE, 0.3)
-    assert cut.state.dropped > 0 and len(cut.state.q) < len(whole.state.q)
-    gap = np.abs(cut.traction - whole.traction).max()
-    assert gap <= tail * 0.4 * 1.0
-    if reading == "report" and not growth:
-        assert gap > 0
+    for tail in (1e-2, 1e-5):
+        cut = walk(Quadrature(law, tail), path, ONE, 0.3)
+        assert cut.state.dropped > 0 and len(cut.state.q) < len(whole.state.q)
+        gap = np.abs(cut.traction - whole.traction).max()
+        assert gap <= tail * 0.4 * 1.0
+        if reading == "report" and not growth:
+            assert gap > 0
 
 
 @pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
