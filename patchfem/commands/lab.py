@@ -1,39 +1,162 @@
 """The verb that brings a laboratory's files into the forms that scenes and fits read."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from .shared import Json, Refused, flag, say, texts
+from .shared import Json, Refused, flag, say, texts, word
 
 
-def import_(file: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"], help="table.csv in SI")],
+@dataclass(frozen=True)
+class Estimate:
+    """Options of a frequency response and its modes."""
+
+    segment: word("length of the segments of the estimate, such as \"2 s\" [the whole record where it begins and ends "
+                  "in rest, else an eighth]") = ""
+    window: word("hann or none [hann where the record is cut into segments]") = ""
+    band: word("where modes are sought, such as \"20 Hz..400 Hz\"") = ""
+    decay: flag("the record is a free decay: frequency and damping without an input") = False
+    begin: word("where the free decay begins, such as \"0.2 s\" [at its largest value]") = ""
+
+
+def import_(file: Path, /, *, out: Annotated[Path, Parameter(
+        name=["-o", "--out"], help="table.csv of the records in SI, modes.toml for a scene, response.uff")],
             map_: texts('which channel of the file is what: "force=Load cell [lbf]", "displacement=12:+x", "time=t '
-                        '[s]", "force=data(:,2) [N]"; may be repeated; without it channels are taken that say so '
-                        'themselves', "--map") = (),
-            zero: flag("count time and displacement from their first row") = False, json_: Json = False):
+                        '[s]", "force=data(:,2) [N]"; of shapes: slide=12:+x; may be repeated; without it channels are '
+                        'taken that say so themselves', "--map") = (),
+            zero: flag("count time and displacement from their first row") = False,
+            modes: Annotated[Estimate, Parameter(name="*")] = Estimate(), json_: Json = False):
     """Turn the records of a laboratory file (.uff: datasets 58 in the units of 164; .mat of version 5 to 7; .csv with
-    units in its header) into the table that drive.file, slide.file and fit --to read.
+    units in its header) into the table that drive.file, slide.file and fit --to read, or into modes: of an input and a
+    response, of a free decay, of shapes (dataset 55) or frequency responses.
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """
+    ending = out.suffix.lower()
+    if ending not in (".csv", ".toml", ".uff", ".unv"):
+        raise Refused(f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff")
+    if ending == ".csv" and modes != Estimate():
+        raise Refused("--segment, --window, --band, --decay and --begin belong to modes (-o modes.toml) and responses "
+                      "(-o response.uff)")
+    if zero and ending != ".csv":
+        raise Refused("--zero belongs to a table of records (-o table.csv)")
+    if ending == ".csv":
+        answer = _table(file, out, map_, zero)
+    else:
+        answer = (_modes if ending == ".toml" else _response)(file, out, map_, modes)
+    told = answer.pop("told")
+    if json_:
+        print(json.dumps({"file": str(out), **answer}, ensure_ascii=False))
+        return
+    for note in answer["notes"]:
+        say(f"note: {note}")
+    print(f"{out}: {told}")
+
+
+def _table(file: Path, out: Path, asked, zero: bool) -> dict:
+    from ..export.lab.write import write_table
     from ..inputs.lab.read import read_records
     from ..inputs.lab.records import SI, from_zero, wanted
 
-    if out.suffix.lower() != ".csv":
-        raise Refused(f"{out}: records are written as .csv")
-    found = read_records(file, wanted(map_))
+    found = read_records(file, wanted(asked))
     values = from_zero(found.values) if zero else found.values
-    from ..export.lab.write import write_table
-
-    write_table(out, values, {name: SI[name] for name in values})
+    units = {name: SI[name] for name in values}
+    write_table(out, values, units)
     rows = len(next(iter(values.values())))
-    if json_:
-        print(json.dumps({"file": str(out), "rows": rows, "units": {name: SI[name] for name in values},
-                          "notes": found.notes}, ensure_ascii=False))
-        return
-    for note in found.notes:
-        say(f"note: {note}")
-    print(f"{out}: {rows} rows of {', '.join(values)}")
+    return {"rows": rows, "units": units, "notes": found.notes, "told": f"{rows} rows of {', '.join(values)}"}
+
+
+def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
+    from ..export.lab.modes import fragment
+    from ..export.lab.write import write_text
+    from ..identify import measured_modes as measured
+
+    shapes, notes = _shapes(file, asked, how)
+    if shapes is not None:
+        found = measured.of_shapes(*shapes)
+    else:
+        values, notes = _records(file, asked)
+        found = measured.of_decay(values, _second(how.begin, "--begin")) if how.decay else \
+            measured.of_drive(values, _second(how.segment, "--segment"), _window(how.window), _band(how.band))
+    write_text(out, fragment(found, file.name))
+    listed = [{"frequency": f, "damping": zeta, "about": about} for f, zeta, about in
+              zip(found.frequency.tolist(), found.damping.tolist(), found.about)]
+    told = "; ".join(f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed)
+    return {"modes": listed, "moving_mass": found.mass, "notes": [*notes, *found.notes], "told": told}
+
+
+def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
+    from ..export.lab.write import write_response
+    from ..identify.measured_modes import estimated
+
+    if how.decay or how.begin or how.band:
+        raise Refused("--decay, --begin and --band belong to modes (-o modes.toml)")
+    values, notes = _records(file, asked)
+    found, step, drive, response = estimated(values, _second(how.segment, "--segment"), _window(how.window))
+    write_response(out, found, drive, response)
+    return {"lines": found.frequency.size, "segments": found.segments, "window": found.window, "notes": notes,
+            "told": f"{response} over {drive}, {found.frequency.size} lines from {found.segments} segments of "
+                    f"{found.segment * step:.4g} s, window {found.window}"}
+
+
+def _records(file: Path, asked) -> tuple:
+    from ..inputs.lab.read import read_records
+    from ..inputs.lab.records import wanted
+
+    found = read_records(file, wanted(asked))
+    return found.values, found.notes
+
+
+def _shapes(file: Path, asked, how: Estimate) -> tuple:
+    """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
+    from ..inputs.lab.read import UNIVERSAL
+    from ..inputs.lab.records import UNITS, wanted
+
+    names = {text.partition("=")[0].strip() for text in asked}
+    if file.suffix.lower() not in UNIVERSAL or how != Estimate() or names & set(UNITS):
+        return None, ()
+    from ..core import PatchfemError
+    from ..identify.measured_modes import PLACES
+    from ..inputs.lab.universal import sets_of
+    from ..structure import universal
+
+    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in sets_of(file)):
+        return None, ()
+    try:
+        shapes = universal.read(file)
+    except PatchfemError as error:
+        raise type(error)(str(error).removeprefix("structure.file: ")) from None
+    return (shapes, {one.quantity: one.source for one in wanted(asked, PLACES)}), ()
+
+
+def _second(text: str, option: str) -> float | None:
+    """A time in words as seconds, None for no words."""
+    return None if not text else _quantity(text, "time", option)
+
+
+def _quantity(text: str, kind: str, option: str) -> float:
+    from ..scene.keys.quantities import parse
+
+    try:
+        return parse(text, kind)
+    except ValueError as error:
+        raise Refused(f"{option} {text}: {error}") from None
+
+
+def _window(text: str) -> str | None:
+    if text not in ("", "hann", "none"):
+        raise Refused(f"--window {text}: hann or none")
+    return text or None
+
+
+def _band(text: str) -> tuple:
+    if not text:
+        return (0.0, float("inf"))
+    low, dots, high = text.partition("..")
+    ends = tuple(_quantity(one.strip(), "frequency", "--band") for one in (low, high)) if dots else ()
+    if len(ends) != 2 or not 0 <= ends[0] < ends[1]:
+        raise Refused(f'--band {text}: two rising frequencies are wanted, such as "20 Hz..400 Hz"')
+    return ends

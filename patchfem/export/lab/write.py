@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ...core import Missing, PatchfemError
 from ..fields.vtu import whole
-from . import ENDINGS, matlab, table, universal
+from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
 
@@ -37,7 +37,21 @@ def export(folder: Path, out: Path) -> str:
 def write_table(out: Path, values: dict, units: dict) -> None:
     """Write arrays of one length by name as CSV with their units; Missing where `out` cannot be written."""
     columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
+    _written(out, lambda partial: table.write(partial, None, columns))
+
+
+def write_text(out: Path, text: str) -> None:
+    """Write a text; Missing where `out` cannot be written."""
+    _written(out, lambda partial: partial.write_text(text, encoding="utf-8"))
+
+
+def write_response(out: Path, estimate, drive: str, response: str) -> None:
+    """Write a frequency response as a universal file; Missing where `out` cannot be written."""
+    _written(out, lambda partial: modes.write_response(partial, estimate, drive, response))
+
+
+def _written(out: Path, write) -> None:
     try:
-        whole(Path(out), lambda partial: table.write(partial, None, columns))
+        whole(Path(out), write)
     except OSError as error:
         raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None

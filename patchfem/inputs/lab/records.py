@@ -67,8 +67,10 @@ class Records:
     notes: list = field(default_factory=list)
 
 
-def wanted(texts) -> list:
+def wanted(texts, names=UNITS) -> list:
     """`Wanted` of texts such as "force=Load cell [lbf]"; several may stand in one text, separated by commas.
+
+    names: those that may be asked for.
 
     PatchfemError for a text that is none, for an unknown quantity or unit, and for a quantity asked for twice.
     """
@@ -79,9 +81,9 @@ def wanted(texts) -> list:
             raise PatchfemError(f"--map {text}: NAME=CHANNEL or NAME=CHANNEL [unit] is wanted, such as "
                                 "\"force=Load cell [lbf]\"")
         name, source, unit = parts[1], parts[2], parts[3] or ""
-        if name not in UNITS:
-            raise PatchfemError(f"--map {name}: not known; one of {', '.join(UNITS)}")
-        if unit:
+        if name not in names:
+            raise PatchfemError(f"--map {name}: not known; one of {', '.join(names)}")
+        if unit and name in UNITS:
             factor_of(name, unit, "--map ")
         if name in [one.quantity for one in found]:
             raise PatchfemError(f"--map {name}: asked for twice")

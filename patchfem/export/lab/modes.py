@@ -1,0 +1,49 @@
+"""Identified modes as the [structure] of a scene, and a frequency response with its coherence as a universal file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from .universal import SI, program, write_sets
+
+FORCE, ACCELERATION, FREQUENCY = 13, 12, 18  # data types of dataset 58
+KINDS = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
+OVER = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
+RESPONSE, COHERENCE = 4, 6  # function types
+
+
+def fragment(found, source: str) -> str:
+    """[structure] and its [[structure.mode]] as text; found: `identify.measured_modes.Listed`; source: of the numbers,
+    in words."""
+    lines = [f"# modes of {plain(source)}, by {program()}"] + [f"# {plain(note)}" for note in found.notes]
+    mass = f'moving_mass = "{found.mass!r} kg"' if found.mass is not None else \
+        'moving_mass = "1 kg"  # assumed: the record does not tell it'
+    lines += ["", "[structure]", mass]
+    for k, (f, zeta, about) in enumerate(zip(found.frequency.tolist(), found.damping.tolist(), found.about)):
+        lines += ["", "[[structure.mode]]", f'name = "mode {k + 1}"', f'frequency = "{f!r} Hz"',
+                  f"damping = {zeta!r}" + (f"  # {plain(about)}" if about else "")]
+        lines += [f'{key} = "{float(row[k])!r} rad/m"' if key == "pitch" else f"{key} = {float(row[k])!r}"
+                  for key, row in found.rows.items()]
+    return "\n".join(lines) + "\n"
+
+
+def plain(text: str) -> str:
+    """A text for a comment: one line of letters that a file of text can hold."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def write_response(path: Path, estimate, drive: str, response: str) -> None:
+    """Write an estimated frequency response (dataset 58, type 4) and its coherence (type 6), response and reference at
+    1:+x; structure.file reads it where the input is a force."""
+    (kind, unit), (over, below) = KINDS[response], OVER[drive]
+    both = {"type": 58, "binary": 1, "id1": f"{response} over {drive}", "id2": program(), "rsp_node": 1, "rsp_dir": 1,
+            "ref_node": 1, "ref_dir": 1, "abscissa_spacing": 0, "abscissa_spec_data_type": FREQUENCY,
+            "abscissa_axis_lab": "Frequency", "abscissa_axis_units_lab": "Hz", "x": np.array(estimate.frequency)}
+    sets = [SI, both | {"func_type": RESPONSE, "ordinate_spec_data_type": kind, "ordinate_axis_units_lab": unit,
+                        "orddenom_spec_data_type": over, "orddenom_axis_units_lab": below,
+                        "data": np.array(estimate.value)}]
+    if estimate.coherence is not None:
+        sets.append(both | {"func_type": COHERENCE, "id1": f"coherence of {response} and {drive}",
+                            "ordinate_spec_data_type": 0, "orddenom_spec_data_type": 0,
+                            "data": np.array(estimate.coherence)})
+    write_sets(path, sets)

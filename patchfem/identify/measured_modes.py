@@ -1,0 +1,161 @@
+"""Modes of a rig as a scene lists them, from a driven record, from a free decay, or from measured shapes."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core import PatchfemError
+from ..structure.places import Shapes
+from .decay import decay
+from .driven_modes import POWER, Modes, driven_modes
+from .frequency_response import Estimate, even_step, h1
+
+INPUTS = ("force", "base_acceleration")
+PLACES = ("slide", "output", "base", "normal", "pitch")
+WIDER = 0.05  # share by which the estimate's damping may lie above that of the record before it is said
+LOOSE, LOOSE_DECAY = 0.1, 0.05  # shares of a record that the modes may leave over before it is said
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Listed:
+    """Modes of [[structure.mode]].
+
+    frequency (n,) [Hz], damping (n,); rows: key of the table -> (n,); mass [kg] or None where the record does not tell
+    it; about: n lines of words on each mode; notes: sentences on all; estimate: the frequency response, or None.
+    """
+
+    frequency: np.ndarray
+    damping: np.ndarray
+    rows: dict
+    mass: float | None
+    about: list
+    notes: list = field(default_factory=list)
+    estimate: Estimate | None = None
+
+
+def response_of(values: dict) -> str:
+    """The one response among records; PatchfemError where there is none or several."""
+    found = [name for name in POWER if name in values]
+    if len(found) != 1:
+        raise PatchfemError(f"one response is wanted, {' or '.join(POWER)}; there are {', '.join(found) or 'none'}: "
+                            "choose by --map")
+    return found[0]
+
+
+def estimated(values: dict, segment: float | None = None, window: str | None = None) -> tuple:
+    """(estimate, step [s], input, response by name) of records with `time`; segment [s]. PatchfemError where one is
+    lacking."""
+    response, inputs = response_of(values), [name for name in INPUTS if name in values]
+    if len(inputs) != 1 or "time" not in values:
+        raise PatchfemError("a frequency response wants time, a response and one input, force or base_acceleration; "
+                            "there are " + ", ".join(values) + ": choose by --map, or take a free decay by --decay")
+    step = even_step(values["time"])
+    count = None if segment is None else round(segment / step)
+    return h1(step, values[inputs[0]], values[response], count, window), step, inputs[0], response
+
+
+def of_drive(values: dict, segment: float | None, window: str | None, band: tuple) -> Listed:
+    """Modes of a response to a force (at one place with it), or to the acceleration of the base.
+
+    An acceleration is absolute, a displacement or velocity relative to the base. The contact is taken to slide where
+    the response was measured.
+    """
+    estimate, step, drive, response = estimated(values, segment, window)
+    force, motion = values[drive], values[response]
+    if drive == "base_acceleration" and response == "acceleration":
+        motion = motion - force
+    relative = h1(step, force, motion, estimate.segment, estimate.window)
+    found = driven_modes(step, force, motion, response, relative, band)
+    rows, mass, notes = _of_force(found) if drive == "force" else _of_base(found)
+    return Listed(found.frequency, found.damping, rows, mass, _told(found), _noted(found, estimate, step) + notes,
+                  estimate)
+
+
+def _of_force(found: Modes) -> tuple:
+    if found.residue[0] <= 0:
+        raise PatchfemError(f"the mode at {found.frequency[0]:.5g} Hz moves against the force: force and response are "
+                            "not at one place or one has the wrong sign, so the modal mass is not known")
+    size = np.sqrt(np.abs(found.residue) / found.residue[0])
+    turned = found.residue < 0
+    notes = [f"the mode at {f:.5g} Hz moves against the force, as it cannot at one place; its sign is left out"
+             for f in found.frequency[turned]]
+    return {"slide": size, "output": size}, 1 / float(found.residue[0]), notes
+
+
+def _of_base(found: Modes) -> tuple:
+    taken = -found.residue  # participation times output
+    size = np.sqrt(np.abs(taken))
+    scale = max(1.0, float(np.sqrt(np.sum(size**2))))
+    out = np.sign(taken) * size * scale
+    return {"slide": out, "output": out, "base": size / scale}, None, \
+        ["the motion of the base tells no mass: set moving_mass"]
+
+
+def _told(found: Modes) -> list:
+    out = []
+    for k, (zeta, error) in enumerate(zip(found.damping, found.error)):
+        read = "" if not found.read[k] > 0 else f"; the windowed estimate reads {found.read[k]:.4g}"
+        seen = "" if found.coherence is None else f"; coherence {found.coherence[k]:.3g}"
+        out.append(f"damping {zeta:.4g} +- {error:.1g} from the record itself{read}{seen}")
+    return out
+
+
+def _noted(found: Modes, estimate: Estimate, step: float) -> list:
+    """Sentences on what the window adds and on what the modes leave over."""
+    notes = []
+    wide = found.read > (1 + WIDER) * found.damping
+    if wide.any():
+        k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
+        notes.append(f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
+                     f"{found.frequency[k]:.5g} Hz: the estimate reads a damping of {found.read[k]:.4g}, the record "
+                     f"has {found.damping[k]:.4g}, which is written; a free decay (--decay) tells it without an input")
+    if found.misfit > LOOSE:
+        notes.append(f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: "
+                     "noise, or a rig that is not linear")
+    return notes
+
+
+def of_decay(values: dict, begin: float | None = None) -> Listed:
+    """Modes of a free decay from `begin` [s] of its times on, unless given from its largest value."""
+    name = response_of(values)
+    if "time" not in values:
+        raise PatchfemError("a free decay wants time; choose by --map")
+    time, value = values["time"], values[name]
+    start = int(np.argmax(np.abs(value - value[-value.size // 20:].mean()))) if begin is None else \
+        int(np.searchsorted(time, begin))
+    found = decay(time[start:], value[start:])
+    about = [f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {fall:.4g}" for zeta, error, fall in
+             zip(found.damping, found.error, found.decrement())]
+    notes = ["a free decay tells no mass and no share of each mode: set moving_mass, slide, base and output"]
+    if found.misfit > LOOSE_DECAY:
+        notes.append(f"the decay leaves {100 * found.misfit:.0f} % of the record unexplained: it is noisy or not "
+                     "exponential, as where friction damps; the damping is a mean over it")
+    size = np.where(np.arange(found.frequency.size) == np.argmax(found.amplitude), 1.0, 0.0)
+    return Listed(found.frequency, found.damping, {"slide": size, "output": size}, None, about, notes)
+
+
+def of_shapes(shapes: Shapes, places: dict) -> Listed:
+    """Modes of measured shapes; places: what of PLACES -> "12:+x", `slide` at least unless there is one place only.
+
+    The mass is that which the modes hold at the place that slides (or `base`), 1 / sum phi^2: no less is possible.
+    """
+    from ..structure.places import AXES
+
+    if "slide" not in places:
+        if len(shapes.motion) != 1:
+            first = next(iter(shapes.motion))
+            raise PatchfemError(f"the file has {len(shapes.motion)} places; say where the contact slides, such as "
+                                f"--map slide={first[0]}:+{AXES[first[1]]}")
+        node, axis = next(iter(shapes.motion))
+        places = {"slide": f"{node}:+{AXES[axis]}", **places}
+    motion = {key: shapes.at(text, key) for key, text in places.items()}
+    held = float(np.sum(motion.get("base", motion["slide"])**2))
+    if not held > 0:
+        raise PatchfemError("no mode moves the place that slides")
+    order = np.argsort(shapes.frequency, kind="stable")
+    rows = {key: row[order] / np.sqrt(held) for key, row in motion.items()}
+    rows.setdefault("output", rows["slide"])
+    rows.setdefault("base", rows["slide"])
+    mass = f"moving_mass is what these modes hold there, {1 / held:.5g} kg; a heavier one leaves some of it out"
+    return Listed(shapes.frequency[order], shapes.zeta[order], rows, 1 / held, [""] * order.size,
+                  [*shapes.notes, mass])

@@ -1,0 +1,133 @@
+"""Modes from records: closed-form responses give back their numbers, a window its bias, friction its sentence."""
+
+import numpy as np
+import pytest
+from lab_modes import OMEGA, RESIDUE, SAMPLES, STEP, TIME, ZETA, driven, free
+
+from patchfem.core import PatchfemError
+from patchfem.identify.decay import decay
+from patchfem.identify.driven_modes import driven_modes
+from patchfem.identify.frequency_response import even_step, h1
+from patchfem.identify.measured_modes import of_decay, of_drive
+
+HERTZ = OMEGA / (2 * np.pi)
+
+
+@pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
+def test_exact_a_record_gives_its_modes_back_where_the_windowed_estimate_does_not(quantity):
+    """Segments of 0.5 s blur the 143 Hz peak, 1.1 Hz wide; the record itself has no window."""
+    force, response = driven(quantity)
+    estimate = h1(STEP, force, response)
+    found = driven_modes(STEP, force, response, quantity, estimate)
+    np.testing.assert_allclose(found.frequency, HERTZ, rtol=1e-9)
+    np.testing.assert_allclose(found.damping, ZETA, rtol=1e-7)
+    np.testing.assert_allclose(found.residue, RESIDUE, rtol=1e-7)
+    assert estimate.segments == 15 and estimate.window == "hann" and found.misfit < 1e-8
+    assert found.read[0] > 1.5 * ZETA[0] and 0.2 < found.coherence[0] < found.coherence[1] < 1
+
+
+def test_exact_a_static_estimate_is_the_response_itself():
+    """Without a window over a whole number of periods, H1 of a steady response is H at every line."""
+    lines = np.fft.rfftfreq(SAMPLES, STEP)
+    H = 1 / (1 + 2j * lines / 300)
+    spectrum = np.where((lines > 5) & (lines < 700), np.exp(1j * lines**2), 0)
+    force, response = np.fft.irfft(spectrum, SAMPLES), np.fft.irfft(H * spectrum, SAMPLES)
+    found = h1(STEP, force, response, SAMPLES, "none")
+    there = np.abs(found.frequency - 350) < 340
+    np.testing.assert_allclose(found.value[there], H[np.searchsorted(lines, found.frequency[there])], rtol=1e-9)
+    assert found.coherence is None and found.segments == 1
+
+
+def test_order_coherence_is_the_share_of_the_response_that_follows_the_input():
+    """White noise of variance r beside a unit response: 1/(1 + r), within the scatter of 127 segments."""
+    rng = np.random.default_rng(2)
+    force = rng.normal(size=2**15)
+    for r in (0.25, 1.0):
+        found = h1(STEP, force, force + np.sqrt(r) * rng.normal(size=force.size), 512, "hann")
+        assert np.mean(found.coherence) == pytest.approx(1 / (1 + r), abs=0.02)
+        assert abs(np.mean(found.value) - 1) < 0.02
+
+
+def test_always_noise_leaves_the_damping_within_its_error():
+    force, response = driven("acceleration")
+    rng, hits = np.random.default_rng(3), 0
+    for _ in range(2):
+        noisy = response + 0.1 * np.std(response) * rng.normal(size=SAMPLES)
+        found = driven_modes(STEP, force, noisy, "acceleration", h1(STEP, force, noisy))
+        assert found.frequency.size == 2 and found.misfit == pytest.approx(0.1, rel=0.05)
+        hits += int(np.sum(np.abs(found.damping - ZETA) < 1.5 * found.error))  # 1.5 of 95 %: 3 sigma
+        np.testing.assert_allclose(found.damping, ZETA, rtol=0.02)
+    assert hits == 4
+
+
+@pytest.mark.parametrize("amplitudes", [(0.3, 0.2), (0.3, 0.0)])
+def test_exact_a_free_decay_gives_frequency_damping_and_decrement(amplitudes):
+    found = decay(*free(amplitudes))
+    n = int(np.count_nonzero(amplitudes))
+    np.testing.assert_allclose(found.frequency, HERTZ[:n], rtol=1e-10)
+    np.testing.assert_allclose(found.damping, ZETA[:n], rtol=1e-8)
+    np.testing.assert_allclose(found.amplitude, amplitudes[:n], rtol=1e-8)
+    np.testing.assert_allclose(found.decrement(), 2 * np.pi * ZETA[:n] / np.sqrt(1 - ZETA[:n]**2), rtol=1e-8)
+
+
+def test_always_a_noisy_decay_lies_within_its_error():
+    time, value = free()
+    rng = np.random.default_rng(4)
+    for _ in range(2):
+        found = decay(time, value + 0.01 * rng.normal(size=time.size))
+        assert (np.abs(found.damping - ZETA) < 1.6 * found.error).all()
+
+
+def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
+    """Coulomb friction takes the same from every cycle: a straight line, then rest."""
+    time = TIME[:2000]
+    value = np.maximum(1 - time / 0.6, 0) * np.cos(OMEGA[0] * time)
+    found = of_decay({"time": time, "displacement": value}, 0.0)
+    assert any("exponential, as where friction damps" in note for note in found.notes)
+    assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)  # one mode, not the several that would make the line
+    clean = of_decay(dict(zip(("time", "displacement"), free())), 0.0)
+    assert len(clean.notes) == 1 and "logarithmic decrement" in clean.about[0]
+
+
+def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
+    force, response = driven("acceleration")
+    found = of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf))
+    assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
+    np.testing.assert_allclose(found.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
+    assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, which is written" in found.notes[0]
+
+
+def test_exact_the_base_tells_shares_and_no_mass():
+    """Absolute acceleration of a block that holds 0.9 of its mass in two modes: A = -base * output each."""
+    base, relative = driven("acceleration")
+    found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2}, None, None,
+                     (0, np.inf))
+    np.testing.assert_allclose(found.rows["base"]**2, RESIDUE / 2, rtol=1e-6)
+    np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE / 2, rtol=1e-6)
+    assert found.mass is None and "tells no mass" in found.notes[-1]
+    found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative}, None, None,
+                     (0, np.inf))
+    assert np.sum(found.rows["base"]**2) == pytest.approx(1, rel=1e-9)  # more is not possible, the output grows
+    np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE, rtol=1e-6)
+
+
+def test_refuses_records_by_name():
+    force, response = driven("acceleration")
+    with pytest.raises(PatchfemError, match="moves against the force"):
+        of_drive({"time": TIME, "force": -force, "acceleration": response}, None, None, (0, np.inf))
+    with pytest.raises(PatchfemError, match="one input, force or base_acceleration; there are time, acceleration"):
+        of_drive({"time": TIME, "acceleration": response}, None, None, (0, np.inf))
+    with pytest.raises(PatchfemError, match="between 300 and 400 Hz"):
+        of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (300, 400))
+    with pytest.raises(PatchfemError, match="one response is wanted"):
+        of_decay({"time": TIME, "force": force})
+    with pytest.raises(PatchfemError, match="the input is zero"):
+        h1(STEP, 0 * force, response)
+    with pytest.raises(PatchfemError, match="a segment of 10 samples"):
+        h1(STEP, force, response, 10)
+    with pytest.raises(PatchfemError, match="evenly sampled"):
+        even_step(TIME**1.01)
+    with pytest.raises(PatchfemError, match="grows instead of decaying"):
+        decay(TIME[:500], np.exp(3 * TIME[:500]) * np.cos(OMEGA[0] * TIME[:500]))
+    with pytest.raises(PatchfemError, match="rings and decays"):
+        decay(TIME[:500], np.ones(500))
