@@ -24,7 +24,8 @@ def toml(table: Table) -> str:
 
 def effects(root: Table) -> list[str]:
     """Effects in contract naming: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``."""
-    return [effect for name in type(root).model_fields for effect in _effects(getattr(root, name), name)]
+    tables = ((name, getattr(root, name)) for name in type(root).model_fields)
+    return [effect for name, table in tables if table is not None for effect in _effects(table, name)]
 
 
 def _effects(table: Any, at: str) -> Iterator[str]:
@@ -46,7 +47,8 @@ def _effects(table: Any, at: str) -> Iterator[str]:
         if not chosen:
             yield at
         for name in inner:
-            yield from _effects(getattr(table, name), f"{at}.{name}")
+            if (one := getattr(table, name)) is not None:
+                yield from _effects(one, f"{at}.{name}")
 
 
 @cache

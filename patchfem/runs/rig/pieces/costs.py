@@ -8,6 +8,7 @@ one after the other, and grows as the root of the tolerance falls; a spring that
 to the march too.
 """
 
+from functools import lru_cache
 from math import inf, log2, pi, sqrt
 
 import numpy as np
@@ -35,6 +36,7 @@ def pairs_of(model: Model) -> int:
     return int(min(max(MOST_PAIRS + log2(model.accuracy.tolerance / AT) / 2, 0), MOST_PAIRS))
 
 
+@lru_cache(8)
 def sizes(model: Model) -> tuple:
     """(elements, stiffness [N/m] of those of the stiffest interface) that the interfaces of a rig have, estimated."""
     count, stiff = 0, 0.0
@@ -61,7 +63,8 @@ def pieces(model: Model) -> float:
     modes, drive = model.rig.modes, model.rig.drive
     count, stiff = sizes(model)
     reach = float((np.asarray(modes.interfaces)**2).sum(axis=1).max(initial=0.0)) / modes.mass
-    damping = float(np.linalg.norm(modes.dampers, 2))
+    dampers = modes.dampers
+    damping = float(np.linalg.norm(dampers, 2)) if dampers.size > 1 else abs(float(dampers[0, 0]))
     rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max())**2 + stiff * reach)
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
     return max(rate * drive.period, 2 * pi * fastest(drive)) / REACH + 2 * count * fastest(drive) + 2 + rows
