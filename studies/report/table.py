@@ -4,8 +4,7 @@ See README.md in this folder, which this script writes from the studies themselv
 
 A study that has QUESTION, ANSWER and REPRODUCED is asked for them, without running it; of the others question and
 answer stand in the gallery of studies/README.md. Seconds are CPU seconds of `python STUDY`, start and compiled code
-loaded included, as `--measure` saw them one after the other and keeps them in seconds.json; a study that has none yet,
-or that wants another program, has a dash.
+loaded included, as `--measure` saw them one after the other and keeps them in seconds.json.
 
 Run: python studies/report/table.py [--measure [STUDY ...]]
 """
@@ -88,7 +87,8 @@ def table(found: list, seconds: dict) -> str:
     known = [seconds[one.path] for one in found if seconds.get(one.path) is not None]
     return "\n".join([
         "# All studies in one table", "Written by `table.py` from the studies; seconds are CPU seconds of one core. "
-        f"The {len(known)} of {len(found)} studies that run here by themselves take {sum(known):.0f} s together.", "",
+        f"{len(known)} of {len(found)} studies are measured, {sum(known):.0f} s together; a dash stands where none is "
+        "measured yet, or where a study wants a file or another program.", "",
         f"Of {len(figures)} studies of figures of the report {yes} reproduce theirs, the others in part or not. "
         "[The ten conclusions of the report](conclusions.md) have a table of their own.", "",
         "| study | question | answer | seconds | figure reproduced |", "|---|---|---|---|---|", *rows, ""])
