@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from scene_texts import COULOMB, MODE, NONLOCAL, PLASTIC, POINT, SECOND, SWEEP
+from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PLASTIC, POINT, SECOND, SHEAR, SWEEP
 
 import patchfem as pf
 from patchfem.response.levels import KEPT
@@ -178,3 +178,18 @@ def test_always_a_balanced_motion_is_not_steady_where_none_lasts():
     levels = pf.run(LOCKED + LEVELS.format('"2 g", "5 g"', 12).replace("143 Hz", "200 Hz"), **STEADY)
     assert [one.outcome for one in levels.extra["levels"]] == ["stuck", "not_converged"]
     assert levels.outcome == "stuck" and any("1 of 2 levels" in said for said in levels.warnings)
+
+
+@pytest.mark.parametrize("spring", ['[structure.stiffening]\ncubic = "1e15 N/m^3"\n',
+                                    '[structure.bonded]\nstiffness = "3e6 N/m"\nwavelength = "80 um"\n'],
+                         ids=["stiffening", "interlock"])
+def test_exact_coulomb_behind_shear_balances_beside_a_spring_that_bends(spring):
+    """Behind the shear of the pieces Coulomb's law is a set of springs that slip: a march ends in the balance."""
+    text = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + COULOMB + MODE.replace("0.003", "0.05") + spring
+    steady = pf.run(text + SINE.format(143, 10), **STEADY)
+    march = pf.run(text + SINE.format(143, 60), **{"accuracy.method": "march", "accuracy.steps_per_cycle": "400"})
+    assert steady.outcome == march.outcome == "steady"
+    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
+                 "loop_area"):
+        ours, theirs = steady.measures[name], march.measures[name]
+        assert abs(ours.value - theirs.value) <= ours.error + theirs.error < 0.1 * ours.value, name

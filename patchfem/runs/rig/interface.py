@@ -4,6 +4,7 @@ import numpy as np
 
 from ...dynamics.march import models
 from ...effects import has
+from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import law_from
@@ -12,7 +13,7 @@ from ...model.model import Model
 from ...slip.fields import shear_of
 from ...structure.drive_sizes import omega_of
 from ..bench.averaged import limit_share
-from ..patch.shared.kept import elements
+from ..patch.shared.kept import elements, strip_elements
 from .numerics import Numerics, quadrature_of
 from .strips import strip_loads
 
@@ -34,8 +35,12 @@ def model_of(model: Model, numerics: Numerics, patch):
     rows, found = [*rig.modes.interfaces], []
     if many:
         loads = strip_loads(patch) if patch is not None else [one.load for one in rig.interfaces]
-        found += [joints.Joint(k, _element(rig.interfaces[k if patch is None else 0], load, rig.speed))
-                  for k, load in enumerate(loads)]
+        parts = [_element(rig.interfaces[k if patch is None else 0], load, rig.speed) for k, load in enumerate(loads)]
+        if model.soft:  # strips, each with the elements of its own
+            f = model.friction
+            length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
+            parts = [parallel(*one) for one in strip_elements(patch, f.static, length)]
+        found += [joints.Joint(k, one) for k, one in enumerate(parts)]
     if rig.interlock is not None:
         found.append(joints.interlock(0, *rig.interlock))
     if rig.cubic is not None:
@@ -100,6 +105,8 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if not soft:
         return models.element_model(one)
 
+    if patch.strips is not None:  # one slide of them all
+        return models.jenkins_model(*map(np.concatenate, zip(*strip_elements(patch, f.static, one.length))))
     found = elements(patch, f.static, one.length)
     return models.jenkins_model(found.stiffness, found.yield_slide, found)
 

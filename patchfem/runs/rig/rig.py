@@ -18,7 +18,7 @@ from ...structure.drive_sizes import sinusoidal, slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
 from ..results.notes import creeping, of_growth, two_books, unbounded, unripe, warming
-from ..results.result import FRAMES, Result, frames_of, without_errors
+from ..results.result import FRAMES, Result, frames_of, still, without_errors
 from ..results.travel import ended, travelled
 from . import levels
 from .engines import ENGINES, Variant, unbalanced
@@ -93,8 +93,10 @@ def _behind(model, numerics, contact) -> dict:
 
 
 def _notes(model, patch, raw) -> list:
-    """What the law of a run means, as far as it has to be said."""
+    """What the law of a run means, as far as it has to be said, and what its fields leave out."""
     f = model.friction
+    if patch is not None and patch.strips is not None and model.soft:
+        return ["strips that slip part by part have no common shear stress: the fields hold the pressure"]
     if f is None or not has(f.law, "bonds"):
         return []
     limit = f.static * borne(model, patch)
@@ -219,6 +221,8 @@ def rig_fields(model, numerics, patch, raw) -> dict:
     """Interface frames of the last cycle."""
 
     sigma, f = patch.pressure.sigma_n, model.friction
+    if model.soft and patch.strips is not None:  # strips have no common field of shear
+        return still(patch)
     if model.rig.load_varies:
         from .varying_load import frames_of as varying_frames
 

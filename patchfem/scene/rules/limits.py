@@ -67,10 +67,19 @@ def combinations(draft: Draft, kind: str) -> None:
         _behind_shear(draft, law, shear)
     if contact is not None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
-        if contact.strips is not None and shear:
+        if contact.strips is not None and shear and not _slips_in_strips(kind, contact, law):
             draft.say("contact.strips", unbuilt(f"beside {shear}", "either"))
         elif contact.strips is not None and has(law.law, "averaged"):
             draft.say("contact.strips", unbuilt(f"beside law '{law.law}'", "out"))
+
+
+def _slips_in_strips(kind: str, contact: Contact, law: Friction) -> bool:
+    """Whether strips each slip part by part: elements of a constant load behind the pieces' own shear, and no spring
+    that couples the strips."""
+    skin, holder = contact.asperities, contact.holder
+    alone = (skin is None or skin.tangential_ratio is None) and (holder is None or holder.tangential_stiffness is None)
+    elements = carries(law, "pieces") and carries(law, "shear")
+    return kind == "rig" and contact.shear is not None and alone and elements
 
 
 def _interfaces(draft: Draft, interfaces: tuple) -> None:

@@ -6,6 +6,8 @@ The last patches are kept, so that it lasts for runs that follow each other.
 from dataclasses import fields
 from functools import lru_cache
 
+import numpy as np
+
 from ....slip.shear_modes import JenkinsSet, jenkins_set, scaled
 from ..measures import measures, plane_band
 from ..press import Patch
@@ -64,6 +66,20 @@ def elements(patch: Patch, static: float, length: float) -> JenkinsSet:
     if length or not static > 0:
         return jenkins_set(patch.giving, static * load, length)
     return scaled(_unit(patch), static)
+
+
+@lru_cache(maxsize=2 * KEPT)
+def strip_elements(patch: Patch, static: float, length: float) -> tuple:
+    """Parallel elements (stiffness (t,) [N/m], yield slide (t,) [m]) of every strip of a patch in strips, each behind
+    its own share of the pieces and under its own pressure; a strip that is open has one that yields at once.
+
+    static and length as in `elements`.
+    """
+    giving = patch.giving * len(patch.strips.offsets)  # strips do not feel each other: each has its part of the width
+    idle = np.array([1 / giving.mean()]), np.zeros(1)
+    found = [jenkins_set(giving, static * one, length) if static > 0 and one.any() else None
+             for one in patch.strips.force]
+    return tuple(idle if one is None else (one.stiffness, one.yield_slide) for one in found)
 
 
 @lru_cache(maxsize=2 * KEPT)
