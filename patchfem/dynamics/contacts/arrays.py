@@ -74,14 +74,15 @@ class Rub(namedtuple("Rub", ("force", "memory", "before", "now", "modes", "under
     __slots__ = ()
 
 
-class Climbing(namedtuple("Climbing", ("flank", "now_at", *Rub._fields))):
+class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields))):
     """A law with memory along flanks, `grooves.contact_kernels`.
 
     flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
-    `march.varying_friction_kernels`; now_at (12,): speed of what rises [m/s], vertical force of the step before [N],
+    `march.varying_friction_kernels`; now_at (14,): speed of what rises [m/s], vertical force of the step before [N],
     the last two slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried
-    last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and 1 where
-    a slide was kept; the rest is as of `Rub`, with the normal force for the load.
+    last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and the
+    force f at the end of the step before, then the normal force at both ends of the step [N]; share (m,): of the points
+    in the normal force; the rest is as of `Rub`, with their shares of it for the loads.
     """
 
     __slots__ = ()

@@ -1,7 +1,9 @@
 """A rig whose load climbs the flanks of matched grooves as it slides (`friction.grooves`).
 
-In: `core.ModalBasis`, a drive, grooves under their load, Coulomb's law or a force that follows the speed. Out: a
-`MarchResult`, as the march gives it. Between a stop and the next release the motion is smooth: eq. 3.4 with the force
-of the flank, by a Runge-Kutta method whose steps the error chooses. Every stop, every release and every sample is the
-end of a step. Read `run`, then `loop_kernels`: where steps end; `step_kernels`: the force of the flank, one step.
+In: `core.ModalBasis`, a drive, grooves under their load, a law of friction. Out: a `MarchResult`, as the march gives
+it. Under Coulomb's law, or a force that follows the speed, the motion between a stop and the next release is smooth:
+eq. 3.4 with the force of the flank, by a Runge-Kutta method whose steps the error chooses. Read `run`, then
+`loop_kernels`: where steps end; `step_kernels`: the force of the flank, one step. Laws with memory are a contact of the
+march, `climbing` and `contact_kernels`; `periodic` and `cycle_kernels` sample laws along a cycle for the harmonic
+balance.
 """

@@ -6,13 +6,14 @@ import numpy as np
 
 from ...core import Outcome, Response
 from ...friction.grooves import Grooves
+from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from ..contacts.arrays import Climbing, sheared
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, POINTS, Rubbing, bonds, plastic
 from .run import lifts, refuse_heavy
 
 HERE = "dynamics.grooves.contact_kernels"
-RISE, VERTICAL, LIFTS = 0, 1, 4  # of Climbing.now_at
+RISE, VERTICAL, LIFTS, BEFORE, NORMAL = 0, 1, 4, 12, 13  # of Climbing.now_at
 
 
 def model_of(grooves: Grooves, load: float, static: float, length: float, law, modes) -> "ClimbingModel":
@@ -25,13 +26,32 @@ def model_of(grooves: Grooves, load: float, static: float, length: float, law, m
     return ClimbingModel(grooves, load, plastic(static, length) if law is None else bonds(law))
 
 
+def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -> "ClimbingModel":
+    """The model whose points are those of a solved Patch, behind the shear modes of its pieces: `count` of them, or as
+    many as the tolerance asks for."""
+    law, force = model.law, patch.pressure.sigma_n * patch.pieces.interface.weight
+    limit, weakening = law.static * force, 1.0
+    if law.growth[0] >= 0:
+        weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
+    found = shear_modes(patch.giving, limit, law.length, count, weakening) if count is not None else \
+        enough_modes(patch.giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance, weakening)
+    return replace(model, shear=found, share=tuple(force[found.points] / force.sum()))
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ClimbingModel:
-    """What `march.march` needs to know: grooves under a load [N], and the law as under a load that changes."""
+    """What `march.march` needs to know: grooves under a load [N], and the law as under a load that changes.
+
+    shear: ShearModes on the points under load where the pieces give way, share (a,): those of the points in the load.
+    The pieces climb as one: the height and the slope are those at the slide of the holder, and the points share the
+    normal force as they share the load.
+    """
 
     grooves: Grooves
     load: float
     law: Rubbing
+    shear: object = None
+    share: tuple = (1.0,)
 
     @property
     def kind(self) -> tuple:
@@ -50,7 +70,7 @@ class ClimbingModel:
 
     @property
     def reduction(self):
-        """None: no shear modes."""
+        """ShearModes, None of pieces that are rigid in shear."""
 
     @property
     def set_valued(self) -> bool:
@@ -64,20 +84,32 @@ class ClimbingModel:
 
     def build(self, hub=None) -> tuple:
         """(Climbing, None) with arrays of their own, at rest at the slide 0."""
-        g, law = self.grooves, self.law
-        normal = np.array([self.load * np.hypot(1.0, float(g.slope(0.0)))])
-        memory = np.zeros((3, 1))
+        g, law, share = self.grooves, self.law, np.array(self.share, float)
+        whole, size = self.load * np.hypot(1.0, float(g.slope(0.0))), share.size
+        normal, memory = whole * share, np.zeros((3, size))
         memory[1 if law.kind == PLASTIC else 0] = normal * (1.0 if law.kind == PLASTIC else law.force[3])
-        weight = np.array([law.static / (law.length if law.kind == POINTS else 1.0)])
-        at = np.zeros(12)
-        at[VERTICAL] = self.load
+        weight = np.full(size, law.static / (law.length if law.kind == POINTS else 1.0))
+        psi, kappa = (np.zeros((size, 0)), ()) if self.shear is None else (self.shear.shape, self.shear.stiffness)
+        at = np.zeros(14)
+        at[[VERTICAL, BEFORE, NORMAL]] = self.load, whole, whole
         flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, law.kind])
-        return Climbing(flank, at, np.array(law.force, float), memory, normal.copy(), normal, np.zeros((0, 1)),
-                        np.arange(1), **sheared(weight, law.length, law.growth, np.zeros((1, 0)), ())), None
+        return Climbing(flank, at, share, np.array(law.force, float), memory, normal.copy(), normal,
+                        np.array(psi.T, order="C"), np.arange(size),
+                        **sheared(weight, law.length, law.growth, psi, kappa)), None
 
     def shown(self, contact) -> dict:
-        """Nothing: one point has no field."""
-        return {}
+        """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share
+        of the vertical force [N], (3, a); nothing of one point, which has no field."""
+        if self.shear is None:
+            return {}
+        top, bottom = contact.memory[0], contact.memory[1]
+        if self.law.kind == PLASTIC:
+            force, over = self.law.static * top, self.law.length * np.divide(top, bottom, where=bottom > 0,
+                                                                             out=np.zeros_like(top))
+        else:
+            force, over = self.law.static / self.law.length * bottom, np.divide(bottom, top, where=top > 0,
+                                                                                out=np.zeros_like(top))
+        return {"nodes": np.stack([force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]])}
 
 
 class ClimbingRun(Run):
@@ -89,8 +121,9 @@ class ClimbingRun(Run):
         steep, c = float(model.grooves.slope(q)), self.contact
         c.now_at[RISE] = steep * v
         normal = model.load * np.hypot(1.0, steep)
-        c.memory[:] *= normal / c.before  # it was built at the slide 0
-        c.before[:] = c.now[:] = normal
+        c.memory[:] *= normal / c.now_at[NORMAL]  # it was built at the slide 0
+        c.before[:] = c.now[:] = normal * c.share
+        c.now_at[[BEFORE, NORMAL]] = normal
         self.ledger[0] += self.strained()
 
     def response(self, rows, number) -> Response:

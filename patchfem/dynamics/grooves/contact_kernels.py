@@ -3,8 +3,10 @@
 Over a step of dq the path ds = int sqrt(1 + t^2) dq runs along the flank and the height rises by dz. The law acts over
 ds under a normal force that goes from R0 to R1, R = V sqrt(1 + t^2) + f t, and pulls with f on the mean; then the force
 against the slide is U = (V dz + f ds)/dq, which does exactly the work that height, lifted mass and law take. What rises
-keeps its own speed w, dz = dt (w0 + w1)/2, so V = N + m (w1 - w0)/dt takes exactly what its kinetic energy gains. The
-functions are those that `march.loop_kernels` asks of every contact.
+keeps its own speed w, dz = dt (w0 + w1)/2, so V = N + m (w1 - w0)/dt takes exactly what its kinetic energy gains.
+Where the pieces give way the points share R and slide along the flank behind their shear modes, as in
+`contacts.shear_solve_kernels`; the path ds is that of the holder. The functions are those that `march.loop_kernels`
+asks of every contact.
 """
 
 from math import cos, sin, sqrt
@@ -13,13 +15,19 @@ import numpy as np
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
-from ..contacts.shear_solve_kernels import halfway
-from ..march.varying_friction_kernels import press_all, rub_commit, rub_force, rub_state
+from ..contacts.shear_points_kernels import SLOPE
+from ..contacts.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
+from ..contacts.shear_solve_kernels import pulled as drawn
+from ..dense_kernels import factor
+from ..dense_kernels import solve as solve_factored
+from ..march.varying_friction_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
 from ..modal_kernels import narrowed
 
 SET_VALUED = False
 LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND = range(6)  # of contacts.arrays.Climbing.flank
-RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE = range(12)  # of now
+RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL = \
+    range(14)  # of now_at
+TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
 INNER = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
 
@@ -44,19 +52,63 @@ def over(flank, q, dq):
 
 @njit(error_model="numpy", **LEAN)
 def drag(ds, flat, end, dt, c):
-    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.now becomes the normal force
-    flat + f end at the end, on a slope `end`, where f is the force there."""
-    kind, pulled, gain = int(c.flank[KIND]), 0.0, 0.0
-    for _ in range(60):
-        before = c.now[0]
+    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.now become the shares of the
+    normal force flat + f end at the end, on a slope `end`, where f is the force there."""
+    kind, pulled, gain, at, gives = int(c.flank[KIND]), 0.0, 0.0, c.now_at, c.kappa.size > 0
+    close = (1e-12 if gives else 1e-14) * c.flank[LOAD]
+    tried, missed = 0.0, 0.0
+    for count in range(60):
+        before = at[NORMAL]
         press_all(kind, c)
-        pulled, gain = rub_force(ds, kind, c, 0.5 * (c.before[0] + before), dt)
+        if gives:
+            c.y[0, 0] = ds
+            pulled = descend(ds, 0.0, kind, False, c, TINY * c.force[0] * c.flank[LOAD])[0]
+        else:
+            pulled, gain = rub_force(ds, kind, c, 0.5 * (at[BEFORE] + before), dt)
         bound = c.force[0] * before
-        after = min(max(2 * pulled - c.now_at[PLACE], -bound), bound)
-        c.now[0] = max(flat + after * end, 0.0)
-        if abs(c.now[0] - before) <= 1e-14 * c.flank[LOAD]:
+        after = min(max(2 * pulled - at[PLACE], -bound), bound)
+        now = max(flat + after * end, 0.0)
+        miss = now - before
+        if gives and count > 0 and abs(miss) > close and abs(missed - miss) > 0.1 * abs(before - tried):
+            load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))  # secant: a solve is dear
+        else:
+            load(c, now)
+        tried, missed = before, miss
+        if abs(miss) <= close:
             break
-    return pulled, gain
+    return pulled, stiff(c) if gives else gain
+
+
+@njit(error_model="numpy", **LEAN)
+def load(c, normal):
+    """Put the normal force [N] on the points."""
+    c.now_at[NORMAL] = normal
+    for j in range(c.now.size):
+        c.now[j] = c.share[j] * normal
+
+
+@njit(error_model="numpy", **LEAN)
+def stiff(c):
+    """Slope [N/m] of the force over the slide of the holder, of points behind shear modes that have been solved for."""
+    hess, p, total = c.hess[0], c.room[STEP], 0.0
+    for j in range(int(c.count[0])):
+        total += c.points[SLOPE, j]
+    if c.ready[0] == 0.0:
+        hessian(0.0, False, c, hess)
+        if not factor(hess):
+            return total
+        c.ready[0] = 1.0
+    drawn(SLOPE, c.psi, c.points, int(c.count[0]), p)
+    p[0] = 0.0
+    return max(total - bent(hess, p, c.room[GRADIENT]), 0.01 * total)
+
+
+@njit(error_model="numpy", **LEAN)
+def bent(hess, p, room):
+    """p . hess^-1 p (n,) of a factor."""
+    for k in range(p.size):
+        room[k] = p[k]
+    return solve_factored(hess, room)
 
 
 @njit(error_model="numpy", **LEAN)
@@ -111,14 +163,18 @@ def commit(dq, force, q, v0, v1, dt, c):
     at, kind = c.now_at, int(c.flank[KIND])
     t0, t1 = steep(c.flank, q), steep(c.flank, q + dq)
     along = (force - at[HELD] * at[MEAN_SLOPE]) / at[PATH]
-    lost = rub_commit(at[PATH] * dq, along, v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1), dt, kind, c)
+    lost, fine = rub_commit(at[PATH] * dq, along, v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1), dt, kind, c), True
+    if c.kappa.size:
+        more, count = spring_back(kind, c, c.force[0] * c.flank[LOAD] * 1e-11)
+        lost, fine = lost + more, count > 0
     if c.flank[LIFTED] > 0.0:
         at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
         at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
     at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD], at[LAST], dq
-    c.before[0] = c.now[0]
-    at[PLACE] = rub_state(kind, c, 0.0, 0.0)[0]
-    return lost, True
+    for j in range(c.now.size):
+        c.before[j] = c.now[j]
+    at[BEFORE], at[PLACE] = at[NORMAL], rub_state(kind, c, 0.0, 0.0)[0]
+    return lost, fine
 
 
 @njit(error_model="numpy", **LEAN)

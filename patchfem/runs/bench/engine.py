@@ -49,7 +49,7 @@ def engine_of(model, slide, points: int = 1, choice: Choice | None = None) -> En
     f, soft = model.friction, bool(model.soft)
     if model.slide.across is not None:
         return Engine(PLANE, _stepped_seconds(model, slide, 1))
-    if soft and has(f.law, "bonds"):
+    if soft and (has(f.law, "bonds") or model.grooves is not None):
         from ...slip.shear_modes import SHEAR_MODES
 
         modes = model.accuracy.shear_modes or SHEAR_MODES

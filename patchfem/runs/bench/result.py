@@ -5,7 +5,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
-from ..results.notes import of_growth, two_books, unbounded, unripe, warming
+from ..results.notes import climbing_as_one, of_growth, two_books, unbounded, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, without_errors
 from ..results.travel import FAR, ended, reach, travelled
 from . import bench
@@ -42,6 +42,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if has(f.law, "bonds"):
         peak = fine.values["friction_ratio_peak"] / f.static if f.static > 0 and not model.load_varies else None
         notes = of_growth(model.bonds, peak)
+    notes = [*notes, *climbing_as_one(model, patch)]
     return Result(what, outcome, without_errors(found, estimate), fine, fine, patch, fields, seconds, warnings,
                   {"engine": fine.engine.name, "steps": steps, "notes": notes})
 

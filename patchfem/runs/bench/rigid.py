@@ -37,14 +37,19 @@ def rigid(model, patch, path: tuple, frames: int, engine: Engine, watch: Watch) 
     return Slid(done.force, loads, slip, done.ledger, done.at, tau, local)
 
 
-def climbing(model, load: float):
-    """The model of a law with memory along the flanks of grooves, under a load [N]; in a bench no mass is lifted."""
-    from ...dynamics.grooves.climbing import model_of
+def climbing(model, load: float, patch=None, count: int | None = None):
+    """The model of a law with memory along the flanks of grooves, under a load [N]; in a bench no mass is lifted.
+
+    patch: the solved Patch where its pieces give way, count: how many shear modes stand for them, None: by the
+    tolerance.
+    """
+    from ...dynamics.grooves.climbing import giving, model_of
 
     f = model.friction
     law = model.bonds if has(f.law, "bonds") else None
-    return model_of(model.grooves if model.rig is not None else replace(model.grooves, lifted_mass=0.0), load,
-                    f.static, f.bond_length, law, model.rig.modes if model.rig is not None else None)
+    found = model_of(model.grooves if model.rig is not None else replace(model.grooves, lifted_mass=0.0), load,
+                     f.static, f.bond_length, law, model.rig.modes if model.rig is not None else None)
+    return giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
 
 
 def one_point(model, load: float, engine: Engine) -> ContactModel:

@@ -10,11 +10,14 @@ from ...slip.fields import element_fields, point_fields, shear_of
 from ..patch.shared.kept import elements
 from .follow import follow
 from .ledger import Slid
+from .rigid import climbing
 from .watch import Watch
 
 
 def with_shear(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     """Slide the holders along the samples time [s], slide [m] (k,). NotConverged where a step misses its residual."""
+    if model.grooves is not None:
+        return _climbing(model, patch, time, slide, frames, watch)
     if has(model.friction.law, "bonds"):
         return _points(model, patch, time, slide, frames, watch)
     return _elements(model, patch, time, slide, frames, watch)
@@ -30,14 +33,42 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)
 
 
+def _climbing(model, patch, time, slide, frames, watch) -> Slid:
+    """Points behind the shear modes of pieces that climb grooves as one."""
+    load = patch.pressure.load
+    contact = climbing(model, load, patch, model.accuracy.shear_modes)
+    done = follow(contact, time, slide, frames, watch, not has(model.friction.law, "timeless"))
+    refuse_missed(done)
+    tau, local = climbed_fields(patch, contact, done.states)
+    return Slid(done.force, np.full(time.size, load), done.slip, done.ledger, done.at, tau, local)
+
+
+def refuse_missed(done) -> None:
+    """NotConverged where a step missed its residual."""
+    if done.missed:
+        raise NotConverged(f"{done.missed} steps of the bench missed the force residual; raise "
+                           "accuracy.steps_per_cycle", "")
+
+
+def climbed_fields(patch, contact, states) -> tuple:
+    """Traction (f, m) [Pa], climb included, and irreversible local slip (f, m) [m] of points behind shear modes over
+    grooves; states: f of (slide [m], `ClimbingModel.shown`)."""
+    index, m = contact.shear.points, patch.x.size
+    tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
+    for i, (slide, (along, elastic, vertical)) in enumerate(states):
+        t = float(contact.grooves.slope(slide))
+        tau[i, index] = (vertical * t + along * np.hypot(1.0, t)) / patch.pieces.interface.weight[index]
+        local[i] = slide
+        local[i, index] -= elastic / np.hypot(1.0, t)
+    return tau, local
+
+
 def _points(model, patch, time, slide, frames, watch) -> Slid:
     """Bond points behind the shear modes."""
     law = model.bonds
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     shear = shear_of(patch, law, model.accuracy.shear_modes, model.accuracy.tolerance)
     done = follow(points_model(law, weight, sigma, shear), time, slide, frames, watch, law.grows)
-    if done.missed:
-        raise NotConverged(f"{done.missed} steps of the bench missed the force residual; raise "
-                           "accuracy.steps_per_cycle", "")
+    refuse_missed(done)
     tau, local = point_fields(patch, law, shear, done.states)
     return Slid(done.force, np.full(time.size, patch.pressure.load), done.slip, done.ledger, done.at, tau, local)

@@ -11,6 +11,17 @@ BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says 
 BOUND = 1e-3  # share of mu_s N that friction may exceed before a run says so
 
 
+def climbing_as_one(model, patch) -> list:
+    """The note on pieces that give way over grooves: how far a point is from where its flank is taken."""
+    if model.grooves is None or not model.soft:
+        return []
+    limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
+    apart = float((patch.giving @ limit).max())
+    return [f"{model.soft} over grooves: the pieces climb as one, by height and slope at the slide of the holders, "
+            f"from which a point at its limit lies up to {apart:.3g} m, {apart / model.grooves.wavelength:.2g} of the "
+            "wavelength; the points share the normal force as they share the load"]
+
+
 def warming(model, patch, response, work: float | None = None) -> list:
     """The line on the rise of the surface temperature, where the scene names one."""
     if model.heat is None:

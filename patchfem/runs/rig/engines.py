@@ -175,7 +175,8 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and (varies or model.soft):
         out.append(space_rung(Variant(few, coarse), quarter))
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
-    if shape is not None and (varies or (coarse is not None and has(model.friction.law, "bonds"))):
+    climbs = model.grooves is not None
+    if shape is not None and (varies or climbs or (coarse is not None and has(model.friction.law, "bonds"))):
         out.append(space_rung(Variant(replace(few, shear_modes=max(1, shape.size // 2)), patch), quarter))
     return [*out, *_summed(model, few, patch, solution)]
 

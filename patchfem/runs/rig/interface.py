@@ -26,7 +26,7 @@ def model_of(model: Model, numerics: Numerics, patch):
     """
     rig, many = model.rig, len(model.rig.modes.interfaces) > 1
     if model.grooves is not None:
-        return _climbing(model, patch)
+        return _climbing(model, patch, numerics.shear_modes)
     alone = None if many else contact_model(model, numerics, patch)
     if not many and not rig.bends:
         return alone
@@ -51,13 +51,13 @@ def model_of(model: Model, numerics: Numerics, patch):
     return joints.JointsModel(beside, tuple(found), np.array(rows), size)
 
 
-def _climbing(model: Model, patch):
+def _climbing(model: Model, patch, count: int | None = None):
     """The model of a rig whose load climbs grooves."""
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     if not has(f.law, "memoryless"):
         from ..bench.rigid import climbing
 
-        return climbing(model, load)
+        return climbing(model, load, patch, count)
     from ...dynamics.grooves.run import model_of
 
     speed = None if has(f.law, "set-valued") else f.reference_speed

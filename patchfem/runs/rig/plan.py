@@ -37,7 +37,7 @@ def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
     steps = int(numerics.cycles * numerics.steps)
     each, points = 1e-6, unknowns.get("interface_points", 1)
     if model.grooves is not None:
-        each = CLIMB
+        each = CLIMB + (4 * _of_modes(numerics, points, unknowns) if soft else 0.0)  # the normal force is searched
     elif f is not None and has(f.law, "bonds"):
         if quadrature_of(model, numerics).engine != "recursion":
             entries, seconds = list_cost(model, numerics)

@@ -17,7 +17,7 @@ from ...response.settling import slip_period
 from ...structure.drive_sizes import sinusoidal, slowest
 from ..bench.averaged import limit_tractions
 from ..effort import MOST_STEPS, refuse_endless
-from ..results.notes import creeping, of_growth, two_books, unbounded, unripe, warming
+from ..results.notes import climbing_as_one, creeping, of_growth, two_books, unbounded, unripe, warming
 from ..results.result import FRAMES, Result, frames_of, still, without_errors
 from ..results.travel import ended, travelled
 from . import levels
@@ -94,14 +94,14 @@ def _behind(model, numerics, contact) -> dict:
 
 def _notes(model, patch, raw) -> list:
     """What the law of a run means, as far as it has to be said, and what its fields leave out."""
-    f = model.friction
+    f, climb = model.friction, climbing_as_one(model, patch)
     if patch is not None and patch.strips is not None and model.soft:
         return ["strips that slip part by part have no common shear stress: the fields hold the pressure"]
     if f is None or not has(f.law, "bonds"):
-        return []
+        return climb
     limit = f.static * borne(model, patch)
     steady = limit > 0 and not model.rig.load_varies
-    return of_growth(model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None)
+    return [*of_growth(model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None), *climb]
 
 
 def _said(model, patch, raw, outcome, found) -> list:
@@ -112,6 +112,8 @@ def _said(model, patch, raw, outcome, found) -> list:
     out = [*out, *created_warning(model, raw.book, model.rig.cycles)]
     if patch is not None and model.rig.load_varies:
         out = [*out, *shear_note(model, raw.contact)]
+    if model.grooves is not None and model.soft:
+        out = [*out, *modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)]
     return out
 
 
@@ -142,6 +144,11 @@ def shear_note(model, contact) -> list:
     if contact is None or contact.reduction is None:
         return []
     kept, nodes = contact.reduction.stiffness.size, contact.sets.x.size
+    return modes_note(model, kept, nodes)
+
+
+def modes_note(model, kept: int, nodes: int) -> list:
+    """The sentence on the shear modes of points whose normal force changes."""
     return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
             f"tangential modes of {nodes} nodes stand for what gives way (accuracy.shear_modes)"]
 
@@ -238,6 +245,11 @@ def rig_fields(model, numerics, patch, raw) -> dict:
     from ...slip.fields import element_fields, point_fields
 
     shots = raw.snapshots
+    if model.soft and model.grooves is not None:
+        from ..bench.shear import climbed_fields
+
+        tau, local = climbed_fields(patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots])
+        return frames_of(patch, np.array([s["time"] for s in shots]), tau, local, np.array([s["slide"] for s in shots]))
     time = np.array([s["time"] for s in shots])
     shear = bool(model.soft)
     pointed = shear or (numerics.per_point and model.grooves is None)

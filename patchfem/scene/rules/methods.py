@@ -176,6 +176,8 @@ def _harmonic(m: Motion, method: str) -> str:
         return f"'harmonic' with {named(law)}: use 'march', or {refusal('harmonic')}"
     if m.spring.endswith("grooves]") and has(law.law, "bonds"):
         return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring}", "march or stiff")
+    if m.spring.endswith("grooves]") and m.soft:
+        return unbuilt(f"'harmonic' with law '{law.law}' beside {m.spring} and {m.soft}", "march")
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
     return unbuilt(f"'harmonic' with law '{law.law}' beside {beside}", "march") if has(law.law, "bonds") and beside \

@@ -1,0 +1,132 @@
+"""Points behind shear modes over grooves: rigid pieces, flat ground, one spring before all points, books, a scene."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.core import BaseSine, ModalBasis
+from patchfem.dynamics.grooves.climbing import ClimbingModel
+from patchfem.dynamics.march.hub import follow_path
+from patchfem.dynamics.march.march import march
+from patchfem.dynamics.march.models import jenkins_model
+from patchfem.dynamics.march.varying_load import bonds, plastic
+from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.grooves import Grooves
+from patchfem.response.measures import energy_balance
+from patchfem.scene.scene import loads
+from patchfem.slip.shear_modes import jenkins_set, shear_modes
+
+LOAD, MU, LENGTH, COUNT = 115.65, 0.4, 1e-6, 12
+PLACES = np.linspace(-1, 1, COUNT)
+SHARE = np.exp(PLACES) / np.exp(PLACES).sum()
+GIVING = 5e-9 * np.exp(-2 * np.abs(PLACES[:, None] - PLACES))
+LAWS = {"elastic-plastic": plastic(MU, LENGTH), "bonds": bonds(Bonds(MU, LENGTH))}
+GROOVES = Grooves(80e-6, 7.5e-6, 0.3)
+
+
+def slid(model, slide):
+    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()[0]
+    assert follow_path(slide, 1e-3, model.kind, contact, None, 1e-9, energies, forces) == 0
+    return forces, energies
+
+
+def giving(law, grooves, compliance, share=SHARE):
+    modes = shear_modes(compliance, MU * LOAD * share, LENGTH, share.size)
+    return ClimbingModel(grooves, LOAD, law, modes, tuple(share))
+
+
+def wave(steps):
+    return 20e-6 * np.sin(np.linspace(0, 7.3, steps + 1))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_exact_pieces_that_hardly_give_way_are_one_point(law):
+    soft, rigid = (slid(model, wave(200))[0] for model in (giving(LAWS[law], GROOVES, 1e-8 * GIVING),
+                                                           ClimbingModel(GROOVES, LOAD, LAWS[law])))
+    np.testing.assert_allclose(soft[:-1], rigid[:-1], rtol=0, atol=1e-6 * LOAD)
+
+
+def test_exact_on_flat_ground_they_are_the_exact_set_of_elements():
+    """Flanks of a slope of 1e-12: the force at the end of every step."""
+    found = jenkins_set(GIVING, MU * LOAD * SHARE, LENGTH)
+    exact = slid(jenkins_model(found.stiffness, found.yield_slide), wave(200))[0]
+    here = slid(giving(LAWS["elastic-plastic"], Grooves(80e-6, 1e-17), GIVING), wave(200))[0]
+    np.testing.assert_allclose(here[:-1, 0], exact[:-1, 0], rtol=0, atol=1e-10 * LOAD)
+
+
+def spring_before_all(grooves, slide, stiffness):
+    """Force against the slide of one elastic-plastic point behind one spring [N/m] along the flank, by small explicit
+    steps: f = K (s - l), l the path of the point, f = mu R/eps times what of l is elastic, |f| <= mu R."""
+    force, along, springs = np.zeros(slide.size), 0.0, LOAD * np.hypot(1, grooves.slope(slide[0]))
+    force[0] = LOAD * grooves.slope(slide[0])
+    for i in range(1, slide.size):
+        t = float(grooves.slope(slide[i]))
+        path = np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (slide[i] - slide[i - 1])
+        normal = LOAD * np.hypot(1, t) + along * t
+        springs = max(springs, normal)
+        own = MU * springs / LENGTH
+        tried = along + path * own * stiffness / (own + stiffness)
+        limit = MU * normal
+        if abs(tried) > limit:  # springs above the load go with the path that slips
+            tried = np.copysign(limit, tried)
+            slips = abs(path - (tried - along) * (1 / stiffness + 1 / own))
+            springs = normal + (springs - normal) * np.exp(-slips / LENGTH)
+        along = tried
+        force[i] = LOAD * t + along * np.hypot(1, t)
+    return force
+
+
+def test_exact_one_spring_before_all_points_by_small_steps():
+    steps, fine = 400, 40
+    for stiffness in (2e7, 2e8):
+        model = giving(LAWS["elastic-plastic"], GROOVES, np.full((COUNT, COUNT), 1 / stiffness))
+        here = slid(model, wave(steps))[0][:, 0]
+        true = spring_before_all(GROOVES, wave(steps * fine), stiffness)[::fine]
+        np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_exact_the_books_close(law):
+    """On a given slide and in a march, with a mass that rises."""
+    forces, energies = slid(giving(LAWS[law], GROOVES, GIVING), wave(200))
+    work = forces[:-1, 1] @ np.diff(wave(200))
+    assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-10)
+    assert energies[:-1, 0].min() >= -1e-15 * work
+    one = np.ones(1)
+    basis = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194)
+    model = giving(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), GIVING)
+    done = march(basis, BaseSine(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
+    assert done.outcome is None and energy_balance(done.ledger) < 1e-11
+
+
+@pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
+def test_exact_frames_of_a_scene_sum_up_to_its_force(law):
+    """Tractions of a bench and of a rig, climb included, over the area."""
+    text = f"""
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6 mm"
+load = "115.65 N"
+substrate = "Ti-8Al-1Mo-1V"
+element_size = "1 mm"
+grooves = {{wavelength = "80 um", amplitude = "7.5 um"}}
+[contact.shear]
+[friction]
+law = "{law}"
+static = 0.4
+bond_length = "1 um"
+[accuracy]
+steps_per_cycle = 100
+"""
+    slide = '[slide]\nkind = "triangle"\namplitude = "15 um"\nspeed = "1 mm/s"\ncycles = 2\n'
+    rig = '[structure]\nmoving_mass = "1.2 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n' \
+        'damping = 0.003\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 5\n'
+    for motion in (slide, rig):
+        found = pf.run(loads(text + motion))
+        area = found.patch.pieces.interface.weight
+        tau, time = found.fields["shear_stress"], found.fields["time"]
+        force = np.interp(time, found.response.time, found.response.force)
+        np.testing.assert_allclose(tau[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115.65)
+        assert np.isfinite(found.fields["slip"]).all() and found.measures["energy_balance"].value < 1e-10
+        assert any("climb as one" in note for note in found.extra["notes"])
