@@ -1,5 +1,6 @@
 """Functions that compiled code calls: compiled with their callers, the same answers, callable from Python still."""
 
+import gc
 import math
 import operator
 import os
@@ -16,7 +17,7 @@ from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.types.functions import BaseFunction
 
-from patchfem.compiled import inner
+from patchfem.compiled import inner, tidied_later
 from patchfem.compiled.inner import Inner, njit
 
 KERNELS = """\
@@ -158,3 +159,15 @@ def test_exact_a_call_means_what_numba_says_when_asked_again(function):
             assert kind.get_impl_key(truth) == key
         found += 1
     assert found >= 2
+
+
+@pytest.mark.parametrize("searched", [True, False])
+def test_exact_garbage_is_searched_for_as_before_once_code_is_compiled(searched):
+    try:
+        (gc.enable if searched else gc.disable)()
+        with pytest.raises(ValueError), tidied_later():
+            assert not gc.isenabled()
+            raise ValueError
+        assert gc.isenabled() == searched
+    finally:
+        gc.enable()
