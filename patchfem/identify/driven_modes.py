@@ -25,7 +25,7 @@ FAINT = 3e-3  # least share of the response (of its root mean square) that a mod
 WHOLE = 1e-8  # of the response: less is round-off
 ROUGH = 12  # looks at a start, before the best goes on
 EDGE = 32  # samples at both ends that are not fitted: there the transform joins end and start by a jump
-SAMPLES = 2**17  # of the record that are fitted, from its start
+SAMPLES = 2**16  # of the record that are fitted, from its start
 LOWEST, WIDEST = 1e-6, 0.5  # damping ratios
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..core import PatchfemError
 from ..structure.places import Shapes
 from .decay import decay
-from .driven_modes import POWER, Modes, driven_modes
+from .driven_modes import POWER, SAMPLES, Modes, driven_modes
 from .frequency_response import Estimate, even_step, h1
 
 INPUTS = ("force", "base_acceleration")
@@ -67,6 +67,8 @@ def of_drive(values: dict, segment: float | None, window: str | None, band: tupl
     relative = h1(step, force, motion, estimate.segment, estimate.window)
     found = driven_modes(step, force, motion, response, relative, band)
     rows, mass, notes = _of_force(found) if drive == "force" else _of_base(found)
+    if force.size > SAMPLES:
+        notes.append(f"the modes are fitted to the first {SAMPLES} of {force.size} samples, {SAMPLES * step:.4g} s")
     return Listed(found.frequency, found.damping, rows, mass, _told(found), _noted(found, estimate, step) + notes,
                   estimate)
 
@@ -104,7 +106,7 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
     """Sentences on what the window adds and on what the modes leave over."""
     notes = []
     wide = found.read > (1 + WIDER) * found.damping
-    if wide.any():
+    if wide.any() and estimate.segments > 1:  # one whole record is cut nowhere: what it reads more is noise
         k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
         notes.append(f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
                      f"{found.frequency[k]:.5g} Hz: the estimate reads a damping of {found.read[k]:.4g}, the record "

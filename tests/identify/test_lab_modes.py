@@ -38,6 +38,23 @@ def test_exact_a_static_estimate_is_the_response_itself():
     assert found.coherence is None and found.segments == 1
 
 
+def test_exact_a_blow_that_rings_out_within_the_record_needs_no_window():
+    """A bell-shaped blow and modes that lose e^-9 and more: one segment, whose H1 is H wherever the blow has power."""
+    lines = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
+    force = 50 * np.exp(-((TIME - 0.4) / 1e-3)**2)
+    H = sum(a / (w * w + lines**2 + 0.04 * w * lines) for w, a in zip(OMEGA, RESIDUE))
+    response = np.fft.irfft(lines**2 * H * np.fft.rfft(force), SAMPLES)
+    found = h1(STEP, force, response)
+    assert found.window == "none" and found.segments == 1 and found.coherence is None
+    truth = (lines**2 * H)[np.searchsorted(lines.imag / (2 * np.pi), found.frequency - 1e-6)]
+    np.testing.assert_allclose(found.value, truth, rtol=1e-8)
+    modes = driven_modes(STEP, force, response, "acceleration", found)
+    np.testing.assert_allclose(modes.damping, 0.02, rtol=1e-7)
+    np.testing.assert_allclose(modes.read, 0.02, rtol=1e-6)
+    listed = of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf))
+    assert not listed.notes and listed.mass == pytest.approx(1 / 1.2, rel=1e-7)
+
+
 def test_order_coherence_is_the_share_of_the_response_that_follows_the_input():
     """White noise of variance r beside a unit response: 1/(1 + r), within the scatter of 127 segments."""
     rng = np.random.default_rng(2)
@@ -50,14 +67,11 @@ def test_order_coherence_is_the_share_of_the_response_that_follows_the_input():
 
 def test_always_noise_leaves_the_damping_within_its_error():
     force, response = driven("acceleration")
-    rng, hits = np.random.default_rng(3), 0
-    for _ in range(2):
-        noisy = response + 0.1 * np.std(response) * rng.normal(size=SAMPLES)
-        found = driven_modes(STEP, force, noisy, "acceleration", h1(STEP, force, noisy))
-        assert found.frequency.size == 2 and found.misfit == pytest.approx(0.1, rel=0.05)
-        hits += int(np.sum(np.abs(found.damping - ZETA) < 1.5 * found.error))  # 1.5 of 95 %: 3 sigma
-        np.testing.assert_allclose(found.damping, ZETA, rtol=0.02)
-    assert hits == 4
+    noisy = response + 0.1 * np.std(response) * np.random.default_rng(3).normal(size=SAMPLES)
+    found = driven_modes(STEP, force, noisy, "acceleration", h1(STEP, force, noisy))
+    assert found.frequency.size == 2 and found.misfit == pytest.approx(0.1, rel=0.05)
+    assert (np.abs(found.damping - ZETA) < 1.5 * found.error).all()  # 1.5 of 95 %: 3 sigma
+    np.testing.assert_allclose(found.damping, ZETA, rtol=0.02)
 
 
 @pytest.mark.parametrize("amplitudes", [(0.3, 0.2), (0.3, 0.0)])
@@ -131,3 +145,18 @@ def test_refuses_records_by_name():
         decay(TIME[:500], np.exp(3 * TIME[:500]) * np.cos(OMEGA[0] * TIME[:500]))
     with pytest.raises(PatchfemError, match="rings and decays"):
         decay(TIME[:500], np.ones(500))
+
+
+@pytest.mark.slow
+def test_always_the_stated_error_of_a_damping_holds_in_nineteen_of_twenty():
+    """Fifteen noisy records and decays: of 60 dampings more than 85 % lie within their 95 % half-width."""
+    force, response = driven("acceleration")
+    time, value = free()
+    rng, inside = np.random.default_rng(6), []
+    for _ in range(15):
+        noisy = response + 0.1 * np.std(response) * rng.normal(size=SAMPLES)
+        found = driven_modes(STEP, force, noisy, "acceleration", h1(STEP, force, noisy))
+        inside += (np.abs(found.damping - ZETA) < found.error).tolist()
+        found = decay(time, value + 0.01 * rng.normal(size=time.size))
+        inside += (np.abs(found.damping - ZETA) < found.error).tolist()
+    assert len(inside) == 60 and np.mean(inside) > 0.85, np.mean(inside)
