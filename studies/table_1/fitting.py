@@ -20,21 +20,24 @@ SCORES = HERE / "scores.json"
 
 
 def training(cells, protocol: str) -> np.ndarray:
-    """Which readings (n,) a protocol fits: "143", "all" or "without FREQUENCY"."""
+    """Which readings (n,) a protocol fits: "143", with or without more starts, "all" or "without FREQUENCY"."""
     if protocol == "all":
         return np.ones(cells.row.size, bool)
-    held = HELD if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
+    held = HELD if protocol.startswith("143") else f"frequency={protocol.split()[1]} Hz"
     return ~cells.chosen(held)
 
 
 def fitted(rung: str, reading: str, protocol: str, placebo: str = "", starts: int = 0) -> dict:
     """Fit a rung under a reading to the readings of a protocol, as a record of numbers that JSON keeps.
 
-    starts: random ones, 0 takes those of the recipe. Returns names and values of what is free, scores of the readings
-    that were fitted and of the others, all cells (acceleration [g] with the reading, displacement [mil] at every
-    condition), the training rms at the end of every start, motions computed and CPU seconds.
+    starts: random ones, 0 takes those of the recipe, or of a protocol "143, 12 starts". Returns names and values of
+    what is free, scores of the readings that were fitted and of the others, all cells (acceleration [g] with the
+    reading, displacement [mil] at every condition), the training rms at the end of every start, motions computed and
+    CPU seconds.
     """
     begin, cells, one = time.process_time(), cells_of(TABLE), RUNGS[rung]
+    if protocol.endswith(" starts"):
+        starts = int(protocol.split()[1])
     question = one.question(reading, *([placebo] if placebo else []))
     computed, seen = Computed(question.asked(cells.conditions)), training(cells, protocol)
     found = searched(cells, computed, seen, Search(starts or one.starts, SEED), "")

@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from fitting import training
-from rungs import EACH, RUNGS, TABLE, variants
+from rungs import AFTERWARDS, EACH, RUNGS, TABLE, variants
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.nulls import NULLS, predicted
@@ -84,6 +84,11 @@ def tables(rows: dict) -> list:
             out.append(f"| {rung} | {reading} | {len(row['values'])}: {numbers(row)} | {three(row['fitted'])} | "
                        f"{three(row['others'])} | {three(left_out(rows, rung, reading))} | "
                        f"{three(every and every['fitted'])} | {row['seconds']:.0f} |")
+    for key in AFTERWARDS:
+        if row := rows.get(key):
+            out.append(f"| afterwards: {key[0]}, {key[2].split(', ')[1]} | {key[1]} | {len(row['values'])}: "
+                       f"{numbers(row)} | {three(row['fitted'])} | {three(row['others'])} | - | - | "
+                       f"{row['seconds']:.0f} |")
     tried = [key for key in variants() if key[3] and key in rows]
     if tried:
         out += ["", "| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]

@@ -124,6 +124,9 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     best = min(row["others"]["acceleration"] for row in records.values()
                if row["protocol"] == "143" and not row["placebo"])
     assert best > none["constant"][0]["acceleration"], "no model fitted at 143 Hz predicts accelerations better"
+    patches = [row for row in records.values() if row["rung"] == "patch"]
+    assert min(row["fitted"]["all"] for row in patches) == pytest.approx(0.25, abs=0.005)
+    assert min(row["others"]["all"] for row in patches) == pytest.approx(0.315, abs=0.005)
     left = [table.left_out(records, rung, reading) for rung, one in fitting.RUNGS.items() for reading in one.each]
     assert min(one["acceleration"] for one in left if one) > strong, "no model beats the strong null"
 
