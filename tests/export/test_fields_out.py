@@ -291,8 +291,8 @@ def test_always_every_number_of_a_block_is_finite(bench):
 def test_exact_a_run_says_where_its_fields_are_and_how_an_older_paraview_opens_them(tmp_path):
     (tmp_path / "point.toml").write_text(BENCH, "utf-8")
     (tmp_path / "pair.toml").write_text(CROWNED, "utf-8")
-    assert "fields" not in cli("run", tmp_path / "point.toml", "-o", tmp_path / "point", "-q").out
-    answer = cli("run", tmp_path / "pair.toml", "-o", tmp_path / "my pair", "-q")
+    assert "fields" not in cli("run", tmp_path / "point.toml", "-o", tmp_path / "point").out
+    answer = cli("run", tmp_path / "pair.toml", "-o", tmp_path / "my pair")
     said = answer.out.splitlines()[-1]
     assert said.startswith(f"fields: {tmp_path / 'my pair' / NAME} ") and "ParaView 5.13" in said
     command = shlex.split(said.split("`")[1])
