@@ -143,7 +143,7 @@ class Run:
         self.cycles, self.loops, self.wave = cycles, loops_of(element.kernels), wave_of(drive)
         self.moving, self.kept = started(modes, drive, self.wave, element, cycles, start)
         self.kept = self.kept._replace(turns=np.zeros((ROOM, self.kept.turns.shape[1])))
-        self.turns, self.begun, self.outcome, self.message = [], 0.0, None, ""
+        self.turns, self.begun, self.outcome, self.message, self.progress = [], 0.0, None, "", None
         self.swift = fits(modes, element, self.wave, travel)
         self.until(0.0)
         self.first, self.begun = self.settled()[0], float(self.kept.tally[STORED])
@@ -151,6 +151,7 @@ class Run:
     def fork(self, drive):
         """A copy of the motion as it stands that goes on by itself, under another drive."""
         twin = copy(self)
+        twin.progress = None
         twin.moving = type(self.moving)(*(array.copy() for array in self.moving))
         twin.kept, twin.turns = type(self.kept)(*(array.copy() for array in self.kept)), list(self.turns)
         if drive is not self.drive:
@@ -196,6 +197,8 @@ class Run:
             status = self._beside(float(time)) if swift else \
                 self.loops.advance(self.moving, self.kept, float(time), end, self.tolerance, float(self.travel))
             self._judge(status)
+            if self.progress is not None:  # here alone, for a step cut for its sake would change the motion
+                self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == FINISHED and self.time >= time:
                 break
         return self.kept.samples[:int(self.kept.tally[SAMPLE])]
@@ -286,16 +289,13 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
 
     element: a law with its rate form (`friction.protocol.Element`) on the one interface of the modes; window: whole
     cycles kept at the end; travel [m]: of the output, where the run ends; frames: snapshots of the interface in the
-    last cycle. The outcome is set for travel and where no step meets the tolerance (not_converged, `message` says
-    where).
+    last cycle; progress(share): called where the run comes back for other reasons, so it changes nothing. The outcome
+    is set for travel and where no step meets the tolerance (not_converged, `message` says where).
     """
     run, period = Run(modes, drive, element, cycles, tolerance, travel, start), drive.period
     run.ends_only(window)
     end, kept, shots = cycles * period, [], []
-    if progress is not None and run.time < end - max(window, 2) * period:
-        for part in np.linspace(run.time, end - max(window, 2) * period, 20)[1:-1]:
-            run.until(part)
-            progress(part / end)
+    run.progress = progress
     whole = min(2.0, cycles) * period
     if window * period < whole:
         run.until(end - whole)

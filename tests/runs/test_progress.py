@@ -1,0 +1,29 @@
+"""Progress is said on the way and changes nothing: a run on a terminal answers as one in a pipe does."""
+
+import pytest
+
+import patchfem as pf
+from patchfem.scene.scene import loads
+from patchfem.scene.starting import text_of
+
+LAWS = {"coulomb": "", "elastic-plastic": 'bond_length = "1 um"', "nonlocal": 'bond_length = "1 um"',
+        "tanh": 'reference_speed = "10 mm/s"', "lugre": 'stiffness = "1e8 N/m"\nstribeck_speed = "10 mm/s"',
+        "iwan": 'stiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5'}
+
+
+def scene(law, *sets):
+    return loads(text_of("rig").replace('"coulomb"', f'"{law}"\n{LAWS[law]}'), sets=("drive.cycles=40", *sets))
+
+
+@pytest.mark.parametrize("law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))])
+def test_exact_who_looks_on_sees_the_same_motion(law, sets):
+    alone = pf.run(scene(law, *sets))
+    seen = pf.run(scene(law, *sets), progress=lambda share: None)
+    assert {name: (one.value, one.error) for name, one in alone.measures.items()} == \
+           {name: (one.value, one.error) for name, one in seen.measures.items()}
+
+
+def test_always_a_long_run_is_told_on_the_way():
+    shares = []
+    pf.run(scene("nonlocal", "drive.cycles=6000"), progress=shares.append)
+    assert sum(0.2 < share < 0.9 for share in shares) >= 1 and shares == sorted(shares) and shares[-1] <= 1.0
