@@ -2,9 +2,12 @@
 
 import os
 import re
+import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
+from command_line import cli
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "patchfem/CHANGES.md", "patchfem/scene/GUIDE.md", "patchfem/scene/README.md", "studies/README.md",
@@ -70,3 +73,26 @@ def test_exact_the_map_of_the_guide():
     fraction, peak = names["answer"].fraction[:, :, 0], names["answer"].peak[:, :, 0]
     assert fraction.shape == (3, 3) and (peak[1:] > peak[:-1]).all() and (peak[:, 1:] > peak[:, :-1]).all()
     assert (fraction[:, 1:] <= fraction[:, :-1]).all() and fraction[1, 2] == pytest.approx(0.2225, abs=1e-3)
+
+
+def test_always_the_recipes_of_the_readme_run(tmp_path, monkeypatch):
+    """As they stand, in an empty folder that holds a trace before and one after; each shows its answer."""
+    monkeypatch.chdir(tmp_path)
+    x = np.arange(0, 4e-3, 2e-6)
+    before = 2e-6 * np.sin(2 * np.pi * x / 80e-6) + 1e-7 * np.random.default_rng(1).standard_normal(x.size)
+    after = np.where(abs(x - 2e-3) < 1e-3, np.minimum(before, 0.5e-6), before)
+    for name, heights in (("before", before), ("after", after)):
+        rows = "\n".join(f"{1e3 * place},{1e6 * height}" for place, height in zip(x, heights))
+        (tmp_path / f"{name}.csv").write_text(f"x [mm],z [um]\n{rows}\n")
+    lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", text("README.md"), re.S)[1].splitlines()
+    said = {}
+    for line in lines:
+        command, _, question = line.partition("#")
+        for words in command.split("&&"):
+            answer = cli(*shlex.split(words)[1:])
+            assert answer.code == 0, answer.err
+        said[question.strip()] = answer.out
+    assert "5 cases: 5 steady" in said["how much tilt may I allow?"]
+    joint = said["how stiff is my joint, what does it damp?"]
+    assert "secant_stiffness" in joint and "loop_area" in joint and "dissipated per cycle" in joint
+    assert "worn" in said["is my pad worn?"]
