@@ -37,11 +37,12 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
     print(write(folder, out, frame))
 
 
-def view(folder: Path, /, *, out: out_in("picture.png in place of a window") = None, frame: Frame = None,
+def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,
+         frame: Frame = None,
          magnify: Annotated[float | None, Parameter(help="what displacements are magnified by, such as 1000")] = None):
-    """Show the pressed pieces of a results folder in a window, or draw them into a picture.
+    """Show the pressed pieces of a results folder in a window, or draw them into a picture or a film.
 
-    Example: patchfem view out/rig -o pieces.png
+    Example: patchfem view out/rig -o cycle.gif
     """
     from ..export.drawing.view import view as show
 

@@ -40,7 +40,7 @@ def body(sign: float, frames: int, rng) -> dict:
             "bond": {"normal_bond": rng.normal(size=(frames, 4)) * 1e6}}
 
 
-def write_small(folder, frames: int = 3, seed: int = 0):
+def write_small(folder, frames: int = 3, seed: int = 0, times=None):
     """A results folder with only fields.vtkhdf; what was given to the writer."""
     rng = np.random.default_rng(seed)
     gap = rng.random((frames, 4)) * 1e-6
@@ -48,7 +48,7 @@ def write_small(folder, frames: int = 3, seed: int = 0):
                  "status": rng.integers(0, 3, (frames, 4))}
     pair = body(-1.0, frames, rng), body(1.0, frames, rng)
     blocks = blocks_of(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
-    times = np.cumsum(rng.random(frames))
+    times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
     folder.mkdir(exist_ok=True)
     write_series(folder / NAME, blocks, times, UNITS)
     return SimpleNamespace(blocks=blocks, times=times, pair=pair, interface=interface)

@@ -1,4 +1,7 @@
-"""The picture of the pressed pieces without OpenGL: the panels of export.panels drawn by matplotlib."""
+"""The picture of the pressed pieces without OpenGL: the panels of export.panels drawn by matplotlib.
+
+A picture is drawn once; a film shows frame after frame in the same picture.
+"""
 
 from pathlib import Path
 
@@ -10,43 +13,95 @@ from ..scales import axis_unit
 from .panels import Panel, borders, curves, panels
 from .pictures import BLUE, ORANGE, STYLE
 
+LOOK = STYLE | {"axes.grid": False}
+
 
 def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
     """Draw both pieces whole and near their contact, and the stress along the interface, as the ending of `path`
     says."""
-    from matplotlib.figure import Figure
+    with matplotlib.rc_context(LOOK):
+        Picture(frame, head, panels(frame, magnify), (18, 10)).figure.savefig(path, dpi=100)
 
-    with matplotlib.rc_context(STYLE | {"axes.grid": False}):
-        figure = Figure(figsize=(18, 10))
-        grid = figure.add_gridspec(2, 2)
-        whole, close = panels(frame, magnify)
-        _bodies(figure, figure.add_subplot(grid[:, 0]), frame, whole, f"{head}\n{whole.title()}")
-        _bodies(figure, figure.add_subplot(grid[0, 1]), frame, close, f"where they touch, {close.title()}")
-        axes = figure.add_subplot(grid[1, 1])
-        x, shown, unit = curves(frame)
-        for (label, values), colour in zip(shown, (BLUE, ORANGE)):
-            axes.plot(x, values, color=colour, label=label)
+
+class Picture:
+    """A figure of one frame that `show` turns into that of another one of the same series.
+
+    head: its first line; shown: (whole, close) Panels; size [inch]; reach: (lowest, highest) stress [Pa] of the axis of
+    the curves, that of the frame unless given. Axes and colours stay as they are first drawn.
+    """
+
+    def __init__(self, frame: Frame, head: str, shown: tuple, size: tuple, reach: tuple | None = None):
+        from matplotlib.figure import Figure
+
+        self.figure = Figure(figsize=size)
+        grid = self.figure.add_gridspec(2, 2)
+        self.bodies = [_Bodies(self.figure, self.figure.add_subplot(grid[at]), frame, panel)
+                       for at, panel in zip(((slice(None), 0), (0, 1)), shown)]
+        axes = self.figure.add_subplot(grid[1, 1])
+        self.reach = reach
+        x, stresses, unit = curves(frame, reach)
+        self.lines = [axes.plot(x, values, color=colour, label=label)[0]
+                      for (label, values), colour in zip(stresses, (BLUE, ORANGE))]
         axes.set(xlabel="x [mm]", ylabel=f"stress on the interface [{unit}]")
-        axes.legend()
-        figure.savefig(path, dpi=100)
+        if reach is not None:
+            low, high = np.array(reach) * axis_unit(reach, "Pa")[1]
+            axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+        axes.legend(loc="best" if reach is None else "upper right")
+        self._head(head, shown)
+
+    def show(self, frame: Frame, head: str, shown: tuple) -> None:
+        """Move the pieces and the curves to another frame."""
+        for one, panel in zip(self.bodies, shown):
+            one.show(frame, panel)
+        for line, (_, values) in zip(self.lines, curves(frame, self.reach)[1]):
+            line.set_ydata(values)
+        self._head(head, shown)
+
+    def pixels(self) -> np.ndarray:
+        """The picture (height, width, 3) uint8 at 100 dots per inch; what the first one measures out stays so."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        with matplotlib.rc_context(LOOK):
+            canvas = FigureCanvasAgg(self.figure)
+            self.figure.set_dpi(100)
+            canvas.draw()
+            self.figure.set_layout_engine("none")
+            return np.array(canvas.buffer_rgba())[..., :3]
+
+    def _head(self, head: str, shown: tuple) -> None:
+        for one, before, panel in zip(self.bodies, (f"{head}\n", "where they touch, "), shown):
+            one.axes.set_title(before + panel.title())
 
 
-def _bodies(figure, axes, frame: Frame, panel: Panel, text: str) -> None:
-    from matplotlib.collections import LineCollection, PolyCollection
+class _Bodies:
+    """The cells of a panel, coloured by their stress, with the borders of the pieces."""
 
-    unit, scale = axis_unit([panel.top], "Pa")
-    size, polygons, values = np.diff(frame.offsets), [], []
-    for count in np.unique(size[panel.cells]):
-        mine = panel.cells & (size == count)
-        corners = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
-        polygons += list(panel.places[corners])
-        values.append(frame.cell_data["von_mises"][mine] * scale)
-    drawn = PolyCollection(polygons, array=np.concatenate(values), cmap="viridis", edgecolors="none",
-                           antialiaseds=False, rasterized=True)
-    drawn.set_clim(0, max(panel.top * scale, 1e-12))
-    axes.add_collection(drawn)
-    for edges, colour in zip(borders(frame, panel.cells), ("black", "white")):
-        axes.add_collection(LineCollection(panel.places[edges], colors=colour, linewidths=1.2))
-    left, right, bottom, top = panel.window
-    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title=text)
-    figure.colorbar(drawn, ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
+    def __init__(self, figure, axes, frame: Frame, panel: Panel):
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        unit, self.scale = axis_unit([panel.top], "Pa")
+        self.axes, self.edges = axes, borders(frame, panel.cells)
+        self.cells = []  # (which, corners, collection) of triangles and of quadrilaterals
+        size = np.diff(frame.offsets)
+        for count in np.unique(size[panel.cells]):
+            mine = panel.cells & (size == count)
+            corners = frame.connectivity[frame.offsets[:-1][mine][:, None] + np.arange(count)]
+            drawn = PolyCollection(panel.places[corners], cmap="viridis", edgecolors="none", antialiaseds=False,
+                                   rasterized=True)
+            drawn.set_clim(0, max(panel.top * self.scale, 1e-12))
+            axes.add_collection(drawn)
+            self.cells.append((mine, corners, drawn))
+        self.borders = [LineCollection([], colors=colour, linewidths=1.2) for colour in ("black", "white")]
+        for one in self.borders:
+            axes.add_collection(one)
+        left, right, bottom, top = panel.window
+        axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+        self.show(frame, panel)
+        figure.colorbar(self.cells[0][2], ax=axes, label=f"von Mises stress [{unit}]", shrink=0.7)
+
+    def show(self, frame: Frame, panel: Panel) -> None:
+        for mine, corners, drawn in self.cells:
+            drawn.set_verts(panel.places[corners])
+            drawn.set_array(frame.cell_data["von_mises"][mine] * self.scale)
+        for one, edges in zip(self.borders, self.edges):
+            one.set_segments(panel.places[edges])

@@ -17,8 +17,8 @@ class Panel:
     """One view of both pieces.
 
     places: (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion; slide [mm] of the upper piece
-    as a whole, drawn as long as it is; window: (left, right, bottom, top) [mm] of what is drawn; top: stress [Pa] at
-    the upper end of the colours; over: whether some cell exceeds it.
+    as a whole, drawn `aside` times as long as it is; window: (left, right, bottom, top) [mm] of what is drawn; top:
+    stress [Pa] at the upper end of the colours; over: whether some cell exceeds it.
     """
 
     places: np.ndarray
@@ -28,12 +28,15 @@ class Panel:
     window: tuple
     top: float
     over: bool
+    aside: float = 1.0
 
     def title(self) -> str:
         """Head of the panel: how much its motion is magnified, and which stress the top colour stands for."""
         text = "drawn as meshed" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
         unit, scale = axis_unit([self.top], "Pa")
         text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over else ""
+        if self.aside != 1:
+            return text + f"\nthe slide of {self.slide * 1e3:.3g} um {self.aside:g} times as large"
         return text + (f"\nthe slide of {self.slide * 1e3:.3g} um as it is" if self.slide and self.factor > 1 else "")
 
     def ticks(self) -> tuple:
@@ -44,22 +47,24 @@ class Panel:
                      for low, high in ((left, right), (bottom, top)))
 
 
-def panels(frame: Frame, magnify: float | None = None) -> tuple:
+def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | None = None, aside: float = 1.0) -> tuple:
     """Panels of both pieces whole and of the place where they touch, each with a factor of its own unless `magnify` is
-    given.
+    given, one for both or one for each.
 
+    close: second window [mm], that of `near` unless given; aside: factor of the slide of the upper piece as a whole.
     The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
     """
-    move, slide = moved(frame), slide_of(frame)
+    motion = moved(frame), slide_of(frame), aside
     used = np.unique(np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)]))
     x, y = frame.points[used, :2].T * 1e3
     whole = (x.min(), x.max(), y.min(), y.max())
-    return tuple(_panel(frame, (move, slide), window, share, magnify)
-                 for window, share in ((whole, 0.995), (near(frame), 1.0)))
+    factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
+    return tuple(_panel(frame, motion, *each)
+                 for each in zip((whole, near(frame) if close is None else close), (0.995, 1.0), factors))
 
 
 def _panel(frame: Frame, motion: tuple, window: tuple, share: float, magnify: float | None) -> Panel:
-    move, slide = motion
+    move, slide, aside = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
     mine = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
@@ -74,11 +79,11 @@ def _panel(frame: Frame, motion: tuple, window: tuple, share: float, magnify: fl
     limit = limit if limit < CLIPPED * largest else largest
     whole = np.zeros_like(move)
     whole[upper_points(frame), 0] = slide
-    places = (frame.points[:, :2] + min(magnify, 1.0) * whole + magnify * (move - whole)) * 1e3
+    places = (frame.points[:, :2] + min(magnify, 1.0) * aside * whole + magnify * (move - whole)) * 1e3
     drawn = places[np.unique(frame.connectivity[np.repeat(here, np.diff(frame.offsets))])]
     low, high = (drawn.min(axis=0), drawn.max(axis=0)) if len(drawn) else ((left, bottom), (right, top))
     return Panel(places, here, float(magnify), slide * 1e3, (low[0], high[0], low[1], high[1]), limit,
-                 largest > limit * (1 + 1e-6))
+                 largest > limit * (1 + 1e-6), aside)
 
 
 def _exceeded(values, weight, share: float) -> float:
@@ -166,13 +171,16 @@ def areas(frame: Frame) -> np.ndarray:
     return out
 
 
-def curves(frame: Frame) -> tuple:
-    """Stresses along the interface of a frame: (x (m,) [mm], ((label, values (m,) in the unit), ...), unit)."""
+def curves(frame: Frame, reach: tuple | None = None) -> tuple:
+    """Stresses along the interface of a frame: (x (m,) [mm], ((label, values (m,) in the unit), ...), unit).
+
+    reach: (lowest, highest) stress [Pa] that the unit suits, that of the frame unless given.
+    """
     line = frame.interface()
     shown = [("normal stress", frame.point_data["normal_stress"][line])]
     if "shear_stress" in frame.point_data:
         shown.append(("shear stress", frame.point_data["shear_stress"][line]))
-    unit, scale = axis_unit(np.concatenate([values for _, values in shown]), "Pa")
+    unit, scale = axis_unit(np.concatenate([values for _, values in shown]) if reach is None else reach, "Pa")
     return frame.points[line, 0] * 1e3, tuple((label, values * scale) for label, values in shown), unit
 
 

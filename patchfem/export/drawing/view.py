@@ -7,6 +7,7 @@ a broken driver ends the process that asks; without it a picture is drawn by mat
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ..fields.series import Frame, Series
 from ..scales import axis_unit
+from . import reels
 from .panels import Panel, borders, curves, panels
 
 ENDINGS = (".png", ".svg", ".pdf")
@@ -31,15 +33,20 @@ ROOM = (110, 170, 95, 105)  # pixels left, right, under and over the pieces
 
 
 def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None, say=print) -> None:
-    """Open a window on the fields of a results folder (the last frame or `frame`), or draw them into `out`.
+    """Open a window on the fields of a results folder (the last frame or `frame`), or draw them into `out`, of which
+    .gif, .mp4 and .html show the last cycle.
 
     magnify: factor of the drawn motion, one that makes it visible by default. Missing without fields, without a screen
-    for the window or when `out` cannot be written; PatchfemError for another ending, frame or factor.
+    for the window, without what writes .mp4 or when `out` cannot be written; PatchfemError for another ending, frame or
+    factor, and for a film of one frame.
     """
     if magnify is not None and not (np.isfinite(magnify) and magnify >= 0):
         raise PatchfemError(f"--magnify: {magnify} must be 0 or more")
+    if out is not None and Path(out).suffix in reels.ENDINGS:
+        _film(folder, Path(out), frame, magnify)
+        return
     if out is not None and Path(out).suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}")
+        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(reels.ENDINGS)}")
     with Series(folder) as series:
         one = series.frame(-1 if frame is None else frame)
         head = series.path.parent.resolve().name
@@ -57,8 +64,7 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
 
 def _picture(one: Frame, head: str, magnify, out: Path, say) -> None:
     why = no_opengl() if out.suffix == ".png" else None
-    partial = out.with_name(f".{out.stem}.partial{out.suffix}")
-    try:
+    with _whole(out) as partial:
         if why is None and out.suffix == ".png":
             _plotter(one, head, magnify, True).screenshot(partial)
         else:
@@ -67,6 +73,29 @@ def _picture(one: Frame, head: str, magnify, out: Path, say) -> None:
             from .flat import draw
 
             draw(one, head, magnify, partial)
+
+
+def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
+    if frame is not None:
+        raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; name a .png for one frame")
+    from .film import shoot
+
+    reels.ready(out)
+    with Series(folder) as series:
+        try:
+            with _whole(out) as partial:
+                said = shoot(series, series.path.parent.resolve().name, magnify, partial)
+        except OSError as error:
+            raise Missing(f"{out}: cannot be written ({error.strerror or error})") from None
+    print(f"{out}: {said}")
+
+
+@contextmanager
+def _whole(out: Path):
+    """The place where a file is written, of the same ending; it takes the place of an older one only when whole."""
+    partial = out.with_name(f".{out.stem}.partial{out.suffix}")
+    try:
+        yield partial
         os.replace(partial, out)
     finally:
         partial.unlink(missing_ok=True)

@@ -1,0 +1,118 @@
+"""The pressed pieces through the last cycle as a film: .gif, .mp4 or a page with a slider; needs no OpenGL.
+
+All frames have one scale of colours, one factor of the motion and one window, so that what changes is what moves. The
+slide of the upper piece as a whole is taken out before the rest is magnified, and drawn with a factor of its own: the
+factor that shows a bent pad would throw the block aside by half its length.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..fields.series import Frame, Series
+from .flat import Picture
+from .panels import near, panels, rounded, slide_of
+from .reels import write
+
+APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
+SIZE = (12.0, 6.8)  # inches; an even number of pixels, as video wants
+SLIDE = 0.03  # share of the length of the pieces that the largest slide takes
+LASTS = 2.4  # s that a cycle takes, as far as LEAST and MOST let it
+LEAST, MOST = 0.04, 0.3  # s that a frame takes
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """What all frames of a film share.
+
+    numbers: of its frames in the series; factors of the motion in both panels; close: window [mm] of the second one;
+    aside: factor of the slide; windows: ((left, right, bottom, top), ...) [mm] drawn; tops: stresses [Pa] at the upper
+    ends of the colours; over: whether some cell exceeds them; reach: (lowest, highest) stress [Pa] on the interface.
+    """
+
+    numbers: tuple
+    factors: tuple
+    close: tuple
+    aside: float
+    windows: tuple
+    tops: tuple
+    over: tuple
+    reach: tuple
+
+    def panels(self, frame: Frame) -> tuple:
+        """The panels of a frame, with the windows and colours of the film."""
+        return tuple(replace(one, window=window, top=top, over=over) for one, window, top, over in zip(
+            panels(frame, self.factors, self.close, self.aside), self.windows, self.tops, self.over))
+
+
+def moving(times) -> tuple:
+    """Numbers of the frames that follow each other up to the end of the times (f,) [s].
+
+    Of a rig these are the frames of its last cycle, without the pressed state long before them; of a bench all of its
+    slide.
+    """
+    steps = np.diff(times)
+    apart = np.flatnonzero(steps > APART * np.median(steps)) if steps.size else steps
+    return tuple(range(int(apart[-1]) + 1 if apart.size else 0, len(times)))
+
+
+def film_of(series: Series, magnify: float | None = None) -> Film:
+    """What the frames of the last cycle of a series share; PatchfemError where there is only one frame.
+
+    magnify: factor of the motion in both panels; unless given the largest that suits every frame, one for each panel.
+    """
+    numbers = moving(series.times)
+    if len(numbers) < 2:
+        raise PatchfemError(f"{series.path}: holds one frame, in which nothing moves; name a picture with -o FILE.png")
+    seen, windows, slides, reach = [], [], [], []
+    for number in numbers:
+        one = series.frame(number)
+        seen.append(panels(one, magnify))
+        windows.append(near(one))
+        slides.append(abs(slide_of(one)) * 1e3)
+        line = one.interface()
+        for name in ("normal_stress", "shear_stress"):
+            if name in one.point_data:
+                reach += [one.point_data[name][line].min(), one.point_data[name][line].max()]
+    factors = tuple(min(both) for both in zip(*((one.factor for one in pair) for pair in seen)))
+    close = (*_hull(windows)[:2], *windows[0][2:])
+    left, right = np.array([pair[0].window for pair in seen])[:, :2].T
+    length = float((right - left).max())
+    aside = rounded(SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
+    film = Film(numbers, factors, close, aside, (), (), (), (float(min(reach)), float(max(reach))))
+    shown = [panels(series.frame(number), factors, close, aside) for number in numbers]
+    return replace(film, windows=tuple(_hull([pair[k].window for pair in shown]) for k in (0, 1)),
+                   tops=tuple(max(pair[k].top for pair in shown) for k in (0, 1)),
+                   over=tuple(any(pair[k].over for pair in shown) for k in (0, 1)))
+
+
+def _hull(windows: list) -> tuple:
+    low, high = np.min(windows, axis=0), np.max(windows, axis=0)
+    return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
+
+
+def images(series: Series, film: Film, head: str) -> Iterator:
+    """(What it shows in words, picture (height, width, 3) uint8) of every frame of a film."""
+    picture = None
+    for number in film.numbers:
+        frame = series.frame(number)
+        text = f"{head}, {frame.time:.6g} s"
+        shown = film.panels(frame)
+        if picture is None:
+            picture = Picture(frame, text, shown, SIZE, film.reach)
+        else:
+            picture.show(frame, text, shown)
+        yield text, picture.pixels()
+
+
+def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
+    """Write the film of a series as the ending of `out` says; one line on it. Missing without what writes it."""
+    film = film_of(series, magnify)
+    count = len(film.numbers)
+    write(out, images(series, film, head), head, float(np.clip(LASTS / count, LEAST, MOST)))
+    first, last = series.times[list(film.numbers)][[0, -1]]
+    return f"{count} frames, {first:.6g} s to {last:.6g} s"
+

@@ -1,0 +1,201 @@
+"""Films of the last cycle: every frame there, one scale for all, the slide not magnified with the rest; refusals."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+import stat
+import sys
+
+import numpy as np
+import pytest
+from command_line import cli
+from exported import write_small
+from PIL import Image
+
+from patchfem.export.drawing import reels
+from patchfem.export.drawing.film import APART, SIZE, film_of, images, moving
+from patchfem.export.drawing.flat import Picture
+from patchfem.export.drawing.panels import slide_of, upper_points
+from patchfem.export.fields.series import Series
+
+WIDE, HIGH = 1200, 680
+TITLE = 180  # rows of the titles, of which one names the folder
+RECORDER = """\
+#!{python}
+import sys
+data = b"" if {code} else sys.stdin.buffer.read()
+print("the codec is missing", file=sys.stderr)
+open(sys.argv[-1], "wb").write(" ".join(sys.argv[1:]).encode() + b"\\n" + data)
+sys.exit({code})
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """The pressed state and three frames of random fields long after it."""
+    folder = tmp_path_factory.mktemp("film") / "<b>out"
+    write_small(folder, 4, times=[0.0, 7.0, 7.1, 7.2])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def drawn(small):
+    """(Film, pictures) of the small series."""
+    with Series(small) as series:
+        film = film_of(series)
+        return film, [picture for _, picture in images(series, film, "out")]
+
+
+def test_exact_the_last_cycle_is_without_the_pressed_state():
+    cycle = 0.007 * np.arange(1, 17) / 16
+    assert moving(np.array([0.0, *(1.39 + cycle)])) == tuple(range(1, 17))
+    assert moving(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(range(7))  # a bench's: as even as steps allow
+    assert moving(np.array([0.0, 1.0, 2.0, 3.0 + APART])) == (3,)
+    assert moving(np.array([0.0])) == (0,) and moving(np.array([0.0, 2.0])) == (0, 1)
+
+
+def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(bench):
+    with Series(bench) as series:
+        film = film_of(series)
+        assert film.numbers == tuple(range(len(series))) and len(series) > 10
+        frames = [series.frame(number) for number in film.numbers]
+    mises = np.array([one.cell_data["von_mises"][one.cell_data["part"] < 2] for one in frames])
+    assert film.tops[0] == mises.max() if not film.over[0] else film.tops[0] < mises.max()
+    line = frames[0].interface()
+    stress = [one.point_data[name][line] for one in frames for name in ("normal_stress", "shear_stress")]
+    assert film.reach == (np.min(stress), np.max(stress))
+    pairs = [film.panels(one) for one in frames]
+    for k in (0, 1):
+        assert len({(one[k].window, one[k].top, one[k].over, one[k].factor, one[k].aside) for one in pairs}) == 1
+        places = np.concatenate([one[k].places[np.unique(frame.connectivity[np.repeat(
+            one[k].cells, np.diff(frame.offsets))])] for one, frame in zip(pairs, frames)])
+        left, right, bottom, top = film.windows[k]
+        assert (places[:, 0].min(), places[:, 0].max()) == (left, right)
+        assert (places[:, 1].min(), places[:, 1].max()) == (bottom, top)
+
+
+def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
+    with Series(bench) as series:
+        film = film_of(series)
+        frames = [series.frame(number) for number in film.numbers]
+    slides = np.array([slide_of(one) for one in frames])
+    length = 12.7e-3
+    assert 0.01 < film.aside * np.abs(slides).max() / length < 0.035
+    for one, slide in zip(frames, slides):
+        far = upper_points(one)
+        far = far[one.points[far, 1] == one.points[:, 1].max()]
+        move = one.point_data["displacement"][far, 0] - slide
+        for panel in film.panels(one):
+            aside = panel.places[far, 0] * 1e-3 - one.points[far, 0]
+            assert aside == pytest.approx(film.aside * slide + panel.factor * move, abs=1e-7 * length)
+            assert np.abs(aside).max() < 0.1 * length
+
+
+def test_exact_a_shown_frame_is_that_frame_drawn_anew(small, drawn):
+    """Moved on from the first picture or drawn by itself, a frame is the same to the last pixel."""
+    film, pictures = drawn
+    with Series(small) as series:
+        for k, number in ((0, 1), (2, 3)):
+            frame = series.frame(number)
+            picture = Picture(frame, f"out, {frame.time:.6g} s", film.panels(frame), SIZE, film.reach)
+            assert np.array_equal(picture.pixels(), pictures[k])
+    assert [one.shape for one in pictures] == [(HIGH, WIDE, 3)] * 3
+    assert all((one != pictures[0]).any() for one in pictures[1:])
+
+
+def test_exact_the_range_of_colours_is_the_same_in_every_frame(small):
+    with Series(small) as series:
+        film = film_of(series)
+        first = series.frame(film.numbers[0])
+        picture = Picture(first, "", film.panels(first), SIZE, film.reach)
+        assert len(picture.bodies[0].cells) == 2  # triangles and quadrilaterals
+        for number in film.numbers:
+            frame = series.frame(number)
+            picture.show(frame, "", film.panels(frame))
+            for bodies, top in zip(picture.bodies, film.tops):
+                for mine, _, cells in bodies.cells:
+                    assert cells.get_clim() == (0, top * bodies.scale)
+                    assert np.array_equal(cells.get_array(), frame.cell_data["von_mises"][mine] * bodies.scale)
+
+
+def test_exact_gif_has_every_frame_and_its_colours(small, drawn, tmp_path):
+    film, pictures = drawn
+    answer = cli("view", small, "-o", tmp_path / "a.gif")
+    assert answer.code == 0 and "3 frames, 7 s to 7.2 s" in answer.out, answer.err
+    with Image.open(tmp_path / "a.gif") as gif:
+        assert (gif.n_frames, gif.size, gif.info["loop"]) == (len(film.numbers), (WIDE, HIGH), 0)
+        frames = []
+        for k in range(gif.n_frames):
+            gif.seek(k)
+            frames.append(np.array(gif.convert("RGB")).astype(int))
+    bar = 500 + int(np.argmax([len(np.unique(frames[0][:, x], axis=0)) for x in range(500, 540)]))
+    assert len(np.unique(frames[0][:, bar], axis=0)) > 50  # the bar of colours of the whole
+    for one, picture in zip(frames, pictures, strict=True):
+        assert np.array_equal(one[:, bar], frames[0][:, bar])
+        off = np.abs(one - picture)[TITLE:]  # 256 colours stand for all
+        assert off.mean() < 0.5 and np.percentile(off, 99) < 8  # but softened edges of lines
+        assert (np.abs(one - pictures[0])[TITLE:].mean() > 1) == (picture is not pictures[0])
+    assert [path.name for path in tmp_path.iterdir()] == ["a.gif"]
+
+
+def test_exact_page_holds_every_frame_to_the_last_pixel(small, drawn, tmp_path):
+    answer = cli("view", small, "-o", tmp_path / "a.html")
+    assert answer.code == 0, answer.err
+    page = (tmp_path / "a.html").read_text("utf-8")
+    shown = re.findall(r'<img alt="([^"]+)" src="data:image/png;base64,([^"]+)">', page)
+    assert [alt for alt, _ in shown] == [f"&lt;b&gt;out, {time:g} s" for time in (7, 7.1, 7.2)]
+    assert "<b>out" not in page and 'max="2"' in page
+    assert not re.search(r"(src|href)=.?https?:", page)  # nothing from a network
+    read = [np.array(Image.open(io.BytesIO(base64.b64decode(data)))) for _, data in shown]
+    assert all(np.array_equal(one[TITLE:], other[TITLE:]) for one, other in zip(read, drawn[1], strict=True))
+
+
+def recorder(folder, monkeypatch, code: int):
+    program = folder / "ffmpeg"
+    program.write_text(RECORDER.format(python=sys.executable, code=code))
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", str(folder))
+
+
+def test_exact_mp4_gives_every_frame_to_ffmpeg(small, drawn, tmp_path, monkeypatch):
+    (tmp_path / "bin").mkdir()
+    recorder(tmp_path / "bin", monkeypatch, 0)
+    answer = cli("view", small, "-o", tmp_path / "a.mp4")
+    assert answer.code == 0, answer.err
+    words, data = (tmp_path / "a.mp4").read_bytes().split(b"\n", 1)
+    assert f"-s {WIDE}x{HIGH}".encode() in words and WIDE % 2 == HIGH % 2 == 0
+    read = np.frombuffer(data, np.uint8).reshape(-1, HIGH, WIDE, 3)
+    assert len(read) == 3 and np.array_equal(read[:, TITLE:], np.array(drawn[1])[:, TITLE:])
+
+
+def test_refuses_mp4_that_ffmpeg_cannot_write_and_leaves_nothing(small, tmp_path, monkeypatch):
+    (tmp_path / "bin").mkdir()
+    recorder(tmp_path / "bin", monkeypatch, 1)
+    answer = cli("view", small, "-o", tmp_path / "a.mp4")
+    assert answer.code == 4 and "the codec is missing" in answer.err
+    assert [path.name for path in tmp_path.iterdir()] == ["bin"]
+
+
+def test_refuses_mp4_without_ffmpeg_before_anything_is_drawn(small, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(reels, "find_spec", lambda name: None)
+    monkeypatch.setattr(Picture, "__init__", None)
+    answer = cli("view", small, "-o", tmp_path / "a.mp4")
+    assert answer.code == 4 and "pip install imageio-ffmpeg" in answer.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_refuses_a_film_without_fields_of_one_frame_or_of_a_named_one(small, tmp_path):
+    (tmp_path / "lumped").mkdir()
+    answer = cli("view", tmp_path / "lumped", "-o", tmp_path / "a.gif")
+    assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
+    write_small(tmp_path / "still", 1)
+    answer = cli("view", tmp_path / "still", "-o", tmp_path / "a.gif")
+    assert answer.code == 2 and "nothing moves" in answer.err and "-o FILE.png" in answer.err
+    answer = cli("view", small, "-o", tmp_path / "a.gif", "--frame", "1")
+    assert answer.code == 2 and "--frame" in answer.err
+    answer = cli("view", small, "-o", tmp_path / "none" / "a.gif")
+    assert answer.code == 4 and "cannot be written" in answer.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lumped", "still"]
