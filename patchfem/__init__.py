@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         Scene,
         SceneError,
         build,
+        compare,
         demo,
         load,
         plan,
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "demo", "load", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "compare", "demo", "load", "plan", "run", "run_many", "sweep"]
 
 
 def __getattr__(name: str):

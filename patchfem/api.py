@@ -1,4 +1,5 @@
-"""The verbs for Python: `load` and `build` a scene, `plan`, `run` and `sweep` it, look at the `Result`.
+"""The verbs for Python: `load` and `build` a scene, `plan`, `run` and `sweep` it, look at the `Result`;
+`compare` two measured surfaces.
 
     import patchfem as pf
     result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "demo", "load", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "compare", "demo", "load", "plan", "run", "run_many", "sweep"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
@@ -141,6 +142,25 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     if isinstance(models, str | Path | Scene | Model):
         models = [models]
     return answers(meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
+
+
+def compare(before: str | Path, after: str | Path, /, *other: str | Path, direction: str = "",
+            units: tuple[str, str] | None = None) -> dict[str, Any]:
+    """Compare a measured surface before with the same surface after: the dict that compare.json holds, in SI.
+
+    before, after: files of two traces or two areal scans; other: the pair of traces of the other direction. direction:
+    "x" or "y", along which the first two run. units: of x and of z for files that name none, as ("mm", "um"). In the
+    dict `verdict` and `sentences` are words; `shift`, `worn_depth_mean`, `amplitude_ratio` and so on have `value`,
+    `low`, `high`, `unit`, and a `reason` where the value is None. PatchfemError for files that do not fit together.
+    """
+    from .export.surfaces.compare import data_of
+    from .surface.compare.compare import directions_of
+    from .surface.compare.measured import compared_files
+    from .surface.compare.verdict import verdicts
+
+    parts = compared_files((before, after, *other), direction, units)
+    directions = directions_of(parts)
+    return data_of(parts, verdicts(parts, directions), directions)
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:

@@ -22,24 +22,12 @@ def compare(before: Path, after: Path, /, *other: Path,
     """
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: x or y is wanted")
-    if len(other) not in (0, 2):
-        raise Refused(f"compare: {2 + len(other)} files; two are wanted, or four: before and after along one direction,"
-                      " then before and after along the other")
-    from ..surface.areal import Areal
-    from ..surface.compare.compare import compared, directions_of
+    from ..surface.compare.compare import directions_of
+    from ..surface.compare.measured import compared_files
     from ..surface.compare.verdict import verdicts
-    from ..surface.files.read import read_surface
 
     named = tuple(word.strip() for word in units.split(",")) if units else None
-    files = [read_surface(path, named) for path in (before, after, *other)]
-    areal = [isinstance(one, Areal) for one in files]
-    if len(set(areal)) > 1 or (areal[0] and other):
-        raise Refused("compare: two or four traces are wanted, or two areal scans")
-    first = direction or ("x" if other or areal[0] else "")
-    pairs = [(files[0], files[1], first)]
-    if other or areal[0]:
-        pairs.append((*files[-2:], "y" if first == "x" else "x"))
-    parts = [compared(*one) for one in pairs]
+    parts = compared_files((before, after, *other), direction, named)
     directions = directions_of(parts)
     found = verdicts(parts, directions)
     target = out if out is not None else Path("out") / f"{before.stem}-{after.stem}"

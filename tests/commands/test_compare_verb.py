@@ -8,6 +8,7 @@ import pytest
 from command_line import ALWAYS, MODULES, cli, loaded
 from pairs import UM, pair
 
+import patchfem as pf
 from patchfem.surface.profile import Profile
 from patchfem.surface.synthetic import report_area
 
@@ -117,6 +118,18 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
         f"{a / UM:.1f},{b / UM:.1f},{z[k, i] / UM:.5f}\n" for k, b in enumerate(y) for i, a in enumerate(x)))
     found = json.loads(cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
     assert found["verdict"] == "no change shown" and "one row" in found["worn_depth_max"]["reason"]
+
+
+def test_exact_python_gives_what_the_command_writes(files, tmp_path):
+    said = json.loads(cli("compare", *files[:2], "--direction", "y", "--json", "-o", tmp_path / "out").out)
+    found = pf.compare(str(files[0]), files[1], direction="y")
+    assert json.loads(json.dumps(found)) == said and found["direction"] == "y" and found["verdict"] == "reduced"
+
+
+@pytest.mark.parametrize("count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is wanted")])
+def test_refuses_from_python_what_the_command_refuses(files, count, direction, says):
+    with pytest.raises(pf.PatchfemError, match=says):
+        pf.compare(*(files[0],) * count, direction=direction)
 
 
 def test_refuses_a_scene_without_a_patch(files, tmp_path):

@@ -1,0 +1,29 @@
+"""Files of measured surfaces, before and after: read, put in pairs, each direction compared."""
+
+from ...core import PatchfemError
+from ..areal import Areal
+from ..files.read import read_surface
+from .compare import Comparison, compared
+
+
+def compared_files(paths: tuple, direction: str = "", units: tuple | None = None) -> list[Comparison]:
+    """One `Comparison` for each direction that the files show.
+
+    paths: of the surface before and after, along one direction; two more for the other direction, of traces only. An
+    areal scan shows both. direction: "x", "y" or "" for two traces of no told direction; with four files or a scan it
+    is that of the first pair, x unless told. units: of x and of z as `read_surface` takes them. PatchfemError for
+    another number of files, another direction, a trace beside a scan and four scans.
+    """
+    if direction not in ("", "x", "y"):
+        raise PatchfemError(f"compare: direction {direction!r}: x or y is wanted")
+    if len(paths) not in (2, 4):
+        raise PatchfemError(f"compare: {len(paths)} files; two are wanted, or four: before and after along one "
+                            "direction, then before and after along the other")
+    files = [read_surface(path, units) for path in paths]
+    scans = {isinstance(one, Areal) for one in files}
+    if len(scans) > 1 or (True in scans and len(files) == 4):
+        raise PatchfemError("compare: two or four traces are wanted, or two areal scans")
+    if len(files) == 2 and True not in scans:
+        return [compared(*files, direction)]
+    first = direction or "x"
+    return [compared(*files[:2], first), compared(*files[-2:], "y" if first == "x" else "x")]

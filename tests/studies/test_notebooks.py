@@ -1,0 +1,84 @@
+"""The notebooks: short, without stored outputs, of the public names alone, and true from the first cell to the last."""
+
+import ast
+import os
+from pathlib import Path
+
+import nbformat
+import pytest
+from jupyter_client import KernelManager
+from nbclient import NotebookClient
+
+import patchfem as pf
+
+ROOT = Path(__file__).parents[2]
+NAMES = ("own_joint", "misalignment", "before_after", "accuracy_time")
+BOOKS = {name: nbformat.read(ROOT / f"studies/notebooks/{name}.ipynb", 4) for name in NAMES}
+PICTURES = {"own_joint": 2, "misalignment": 1, "before_after": 1, "accuracy_time": 1}
+
+
+def sources(name: str, kind: str) -> list:
+    return [cell.source for cell in BOOKS[name].cells if cell.cell_type == kind]
+
+
+@pytest.fixture(scope="module")
+def kernel(tmp_path_factory):
+    """One process for all notebooks, which imports and loads compiled code once, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("notebooks")
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_CONFIG_DIR"):
+            patch.setenv(name, str(folder / name.lower()))
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+        patch.delenv("MPLBACKEND", raising=False)
+        manager = KernelManager(kernel_name="python3")
+        yield manager, folder
+        if manager.has_kernel:
+            manager.shutdown_kernel(now=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_always_what_a_notebook_says_holds(name, kernel):
+    """Each cell runs in an emptied namespace, the asserts among them; pictures are shown, nothing is complained of."""
+    manager, folder = kernel
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, BOOKS[name].cells)],
+                                    metadata=BOOKS[name].metadata)
+    book = nbformat.from_dict(book)
+    NotebookClient(book, km=manager, timeout=120, resources={"metadata": {"path": str(folder)}}).execute()
+    outputs = [one for cell in book.cells for one in cell.get("outputs", ())]
+    shown = [one for one in outputs if any(kind.startswith("image/") for kind in one.get("data", ()))]
+    assert len(shown) == PICTURES[name]
+    assert [one.text for one in outputs if one.get("name") == "stderr"] == []
+    assert list(folder.glob("*.*")) == []
+
+
+def test_always_every_notebook_is_run_and_linked():
+    assert sorted(path.stem for path in (ROOT / "studies/notebooks").iterdir()) == sorted(NAMES)
+    pages = (ROOT / "studies/README.md").read_text("utf-8")
+    assert [name for name in NAMES if f"(notebooks/{name}.ipynb)" not in pages] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_always_a_notebook_is_valid_and_keeps_no_output(name):
+    nbformat.validate(BOOKS[name])
+    assert all(cell.outputs == [] and cell.execution_count is None for cell in BOOKS[name].cells
+               if cell.cell_type == "code")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_always_a_notebook_is_read_in_five_minutes(name):
+    """At 200 words and 40 lines of code a minute."""
+    words = sum(len(text.split()) for text in sources(name, "markdown"))
+    lines = sum(bool(line.strip()) for text in sources(name, "code") for line in text.splitlines())
+    assert words / 200 + lines / 40 < 5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_always_a_notebook_uses_public_names_and_checks_itself(name):
+    tree = ast.parse("\n".join(sources(name, "code")))
+    ours = [one for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom)) for one in
+            ([node.module] if isinstance(node, ast.ImportFrom) else [each.name for each in node.names])
+            if one.startswith("patchfem")]
+    used = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute) and
+            isinstance(node.value, ast.Name) and node.value.id == "pf"}
+    assert ours == ["patchfem"] and used and used <= set(pf.__all__)
+    assert sum(isinstance(node, ast.Assert) for node in ast.walk(tree)) >= 4
