@@ -16,7 +16,7 @@ SELECTORS = {"friction": ("law", LAWS), "slide": ("kind", SLIDES), "contact.aspe
 def key_meant(model: type[Table], at: str, written: dict, key: str) -> str:
     """The key of the table `at` that `key` stands for, "" where nothing tells.
 
-    written: the table as it stands; a key that is there already is not meant. A name that is like it, or that shares a
+    written: the table as it stands; a key that is there already is hardly meant. A name that is like it, or that shares a
     word with it, comes before a key that the table lacks, as far as its kind fits the value.
     """
     free = [one for one in keys(model) if one not in written]
@@ -24,7 +24,8 @@ def key_meant(model: type[Table], at: str, written: dict, key: str) -> str:
     words = set(key.lower().split("_"))
     for found in (get_close_matches(key, fit, 1, NEAR), [one for one in fit if words & set(one.split("_"))],
                   [one for one in fit if one.startswith(key.lower())],
-                  [one for one in fit if one in _lacking(model, at, written)], get_close_matches(key, free, 1, NEAR)):
+                  [one for one in fit if one in _lacking(model, at, written)], get_close_matches(key, free, 1, NEAR),
+                  get_close_matches(key, keys(model), 1, NEAR)):
         if found:
             return found[0]
     return ""
