@@ -17,6 +17,7 @@ import ast
 import random
 import sys
 from collections import Counter
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from statistics import median, quantiles
@@ -24,6 +25,7 @@ from tokenize import COMMENT, generate_tokens
 from typing import NamedTuple
 
 PACKAGE = "patchfem"
+IMPORTING = (ast.Import, ast.ImportFrom, ast.Call)
 DEFS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 
@@ -48,6 +50,12 @@ def sources(root: Path, folder: str = PACKAGE) -> dict:
     return tree
 
 
+@cache
+def nodes_of(text: str) -> tuple:
+    """The nodes of a source, its module first; a source is parsed once."""
+    return tuple(ast.walk(ast.parse(text)))
+
+
 def folder_of(name: str, tree: dict) -> str:
     """The folder that holds a file, "" for the top; the name of an `__init__` is its folder."""
     return name if any(other.startswith(name + ".") for other in tree) else name.rpartition(".")[0]
@@ -56,10 +64,12 @@ def folder_of(name: str, tree: dict) -> str:
 def imports(name: str, text: str, tree: dict) -> list:
     """Every import that a walk of the file finds, one entry for each name imported; np.load("data.npz") is none."""
     package = [PACKAGE, *(part for part in folder_of(name, tree).split(".") if part)]
-    parsed, out = ast.parse(text), []
+    (parsed, *nodes), out = nodes_of(text), []
     outer = {id(node) for node in parsed.body} | {id(inner) for node in parsed.body if _for_types(node)
                                                   for inner in node.body}
-    for node in ast.walk(parsed):
+    for node in nodes:
+        if not isinstance(node, IMPORTING):
+            continue
         for dotted, taken in _asked(node, package):
             head, _, target = dotted.partition(".")
             ours, by_name = head == PACKAGE, isinstance(node, ast.Call)
@@ -165,14 +175,14 @@ def _docstring(node) -> set:
 def _code_and_comments(text: str) -> tuple:
     """(lines that are not empty, comment or docstring; comments, those behind code too)."""
     lines = {i for i, line in enumerate(text.split("\n"), 1) if line.strip() and not line.lstrip().startswith("#")}
-    docs = set().union(*map(_docstring, ast.walk(ast.parse(text))))
+    docs = set().union(*map(_docstring, nodes_of(text)))
     return len(lines - docs), sum(token.type == COMMENT for token in generate_tokens(StringIO(text).readline))
 
 
 def figures(root: Path) -> dict:
     """Name of each figure -> its value, in the order of the table."""
     tree = sources(root)
-    functions = [node for text in tree.values() for node in ast.walk(ast.parse(text)) if isinstance(node, DEFS)]
+    functions = [node for text in tree.values() for node in nodes_of(text) if isinstance(node, DEFS)]
     lengths = [node.end_lineno - node.lineno + 1 - len(_docstring(node)) for node in functions]
     docs = [ast.get_docstring(node) for node in functions if ast.get_docstring(node)]
     code, comments = map(sum, zip(*map(_code_and_comments, tree.values())))

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from house import DEFS, circles, folder_of, graph_of, imports, sources
+from house import DEFS, circles, folder_of, graph_of, imports, nodes_of, sources
 
 HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
@@ -27,7 +27,7 @@ MODULE_LINES, FUNCTION_LINES, FOLDER_FILES = 400, 90, 16
 
 def reading_order(tree: dict) -> list:
     """(number, name) of each entry of the numbered list in the package's docstring."""
-    listed = ast.get_docstring(ast.parse(tree.get("", ""))) or ""
+    listed = ast.get_docstring(nodes_of(tree.get("", ""))[0]) or ""
     return [(int(number), name.rstrip("/")) for number, name in re.findall(r"^\s*(\d+)\.\s+`([\w/]+)`", listed, re.M)]
 
 
@@ -68,11 +68,11 @@ def of_outside(found: dict) -> list:
     return out + ([f"meshio in {' and '.join(sorted(exporters))}"] if len(exporters) > 1 else [])
 
 
-def of_scene(name: str, parsed) -> list:
+def of_scene(name: str, nodes) -> list:
     """The lines on which a file that should not knows a Scene: by its name, as a parameter, in an annotation."""
     if any(fnmatch(name, place) for place in (*SCENE, *SCENE_ALSO)):
         return []
-    lines = {node.lineno for node in ast.walk(parsed) if _knows(node)}
+    lines = {node.lineno for node in nodes if _knows(node)}
     return [f"{name} knows a Scene (line {', '.join(map(str, sorted(lines)))})"] if lines else []
 
 
@@ -90,8 +90,8 @@ def of_sizes(tree: dict, parsed: dict) -> list:
     """Modules, functions and folders that have grown too large."""
     lines = {name: text.count("\n") for name, text in tree.items()}
     out = [f"{name} has {count} lines" for name, count in lines.items() if count > MODULE_LINES]
-    for name, module in parsed.items():
-        sizes = [(node.name, node.end_lineno - node.lineno + 1) for node in ast.walk(module) if isinstance(node, DEFS)]
+    for name, nodes in parsed.items():
+        sizes = [(node.name, node.end_lineno - node.lineno + 1) for node in nodes if isinstance(node, DEFS)]
         out += [f"{name}.{function} has {count} lines" for function, count in sizes if count > FUNCTION_LINES]
     held = Counter(folder_of(name, tree) for name in tree)
     return out + [f"{name or 'the top'} holds {count} files" for name, count in held.items() if count > FOLDER_FILES]
@@ -99,7 +99,7 @@ def of_sizes(tree: dict, parsed: dict) -> list:
 
 def of_effects(tree: dict) -> list:
     """Modules that the table of effects names and that do not exist."""
-    nodes = ast.walk(ast.parse(tree.get("effects", "")))
+    nodes = nodes_of(tree.get("effects", ""))
     texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     named = {text.removeprefix("patchfem.") for text in texts if re.fullmatch(r"patchfem(\.\w+)+", text)}
     return [f"effects names {name}, which does not exist" for name in sorted(named - set(tree))]
@@ -107,7 +107,7 @@ def of_effects(tree: dict) -> list:
 
 def faults(tree: dict) -> list:
     """Every breach of the ladder in a dict {dotted name: source}, as sentences."""
-    parsed = {name: ast.parse(text) for name, text in tree.items()}
+    parsed = {name: nodes_of(text) for name, text in tree.items()}
     found = {name: imports(name, text, tree) for name, text in tree.items()}
     order = reading_order(tree)
     rungs = {name: number for number, name in order} | {"": len(order) + 1, "__main__": len(order) + 1}

@@ -16,8 +16,8 @@ SELECTORS = {"friction": ("law", LAWS), "slide": ("kind", SLIDES), "contact.aspe
 def key_meant(model: type[Table], at: str, written: dict, key: str) -> str:
     """The key of the table `at` that `key` stands for, "" where nothing tells.
 
-    written: the table as it stands; a key that is there already is hardly meant. A name that is like it, or that shares a
-    word with it, comes before a key that the table lacks, as far as its kind fits the value.
+    written: the table as it stands; a key that is there already is hardly meant. A name that is like it, or that shares
+    a word with it, comes before a key that the table lacks, as far as its kind fits the value.
     """
     free = [one for one in keys(model) if one not in written]
     fit = [one for one in free if _fits(model, one, written[key])]

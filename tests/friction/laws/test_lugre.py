@@ -113,6 +113,7 @@ def test_exact_a_march_settles_on_the_harmonic_balance(law):
     assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
 
 
+@pytest.mark.slow  # its loop takes 7 s to compile; always on with Bouc and Wen's law, of the same form
 def test_exact_two_alike_interfaces_move_alike():
     both = masses(DAMPED, 2)
     slides, alone = both.response.extra["slides"], masses(DAMPED, 1).response.slide
