@@ -11,8 +11,8 @@ Frame = Annotated[int | None, Parameter(help="number of the frame, from 0; the l
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(
-        name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf; histories.uff, "
-                                   ".mat or .csv")],
+        name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf; cycle.py (plays "
+                                   "the last cycle in ParaView); histories.uff, .mat or .csv")],
            frame: Frame = None,
            histories: flag("the histories and loops as .csv, not the interface") = False):
     """Write the fields of a results folder in another format, or its histories and loops; of a fit the measured loop
@@ -32,6 +32,13 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
         return
     if histories:
         raise Refused(f"--histories: they are written as {', '.join(ENDINGS)}, not as {out.suffix or out}")
+    if out.suffix == ".py":
+        if frame is not None:
+            raise Refused("--frame: a script plays the whole last cycle")
+        from ..export.drawing.paraview import write_script
+
+        print(write_script(folder, out))
+        return
     from ..export.fields.vtu import export as write
 
     print(write(folder, out, frame))

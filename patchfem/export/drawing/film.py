@@ -30,7 +30,8 @@ class Film:
 
     numbers: of its frames in the series; factors of the motion in both panels; close: window [mm] of the second one;
     aside: factor of the slide; windows: ((left, right, bottom, top), ...) [mm] drawn; tops: stresses [Pa] at the upper
-    ends of the colours; over: whether some cell exceeds them; reach: (lowest, highest) stress [Pa] on the interface.
+    ends of the colours; over: whether some cell exceeds them; reach: (lowest, highest) stress [Pa] on the interface;
+    pressure: highest normal stress [Pa] there.
     """
 
     numbers: tuple
@@ -41,6 +42,12 @@ class Film:
     tops: tuple
     over: tuple
     reach: tuple
+    pressure: float
+
+    @property
+    def seconds(self) -> float:
+        """How long a frame is shown [s]."""
+        return float(np.clip(LASTS / len(self.numbers), LEAST, MOST))
 
     def panels(self, frame: Frame) -> tuple:
         """The panels of a frame, with the windows and colours of the film."""
@@ -67,22 +74,22 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
     numbers = moving(series.times)
     if len(numbers) < 2:
         raise PatchfemError(f"{series.path}: holds one frame, in which nothing moves; name a picture with -o FILE.png")
-    seen, windows, slides, reach = [], [], [], []
+    seen, windows, slides, reach = [], [], [], {"normal_stress": [], "shear_stress": []}
     for number in numbers:
         one = series.frame(number)
         seen.append(panels(one, magnify))
         windows.append(near(one))
         slides.append(abs(slide_of(one)) * 1e3)
         line = one.interface()
-        for name in ("normal_stress", "shear_stress"):
-            if name in one.point_data:
-                reach += [one.point_data[name][line].min(), one.point_data[name][line].max()]
+        for name in reach.keys() & one.point_data.keys():
+            reach[name] += [float(one.point_data[name][line].min()), float(one.point_data[name][line].max())]
     factors = tuple(min(both) for both in zip(*((one.factor for one in pair) for pair in seen)))
     close = (*_hull(windows)[:2], *windows[0][2:])
     left, right = np.array([pair[0].window for pair in seen])[:, :2].T
     length = float((right - left).max())
     aside = rounded(SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
-    film = Film(numbers, factors, close, aside, (), (), (), (float(min(reach)), float(max(reach))))
+    both = [value for values in reach.values() for value in values]
+    film = Film(numbers, factors, close, aside, (), (), (), (min(both), max(both)), max(reach["normal_stress"]))
     shown = [panels(series.frame(number), factors, close, aside) for number in numbers]
     return replace(film, windows=tuple(_hull([pair[k].window for pair in shown]) for k in (0, 1)),
                    tops=tuple(max(pair[k].top for pair in shown) for k in (0, 1)),
@@ -111,8 +118,7 @@ def images(series: Series, film: Film, head: str) -> Iterator:
 def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
     """Write the film of a series as the ending of `out` says; one line on it. Missing without what writes it."""
     film = film_of(series, magnify)
-    count = len(film.numbers)
-    write(out, images(series, film, head), head, float(np.clip(LASTS / count, LEAST, MOST)))
+    write(out, images(series, film, head), head, film.seconds)
     first, last = series.times[list(film.numbers)][[0, -1]]
-    return f"{count} frames, {first:.6g} s to {last:.6g} s"
+    return f"{len(film.numbers)} frames, {first:.6g} s to {last:.6g} s"
 

@@ -33,8 +33,8 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
     """
     out = Path(out)
     if out.suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}; histories and loops as .uff, .mat, "
-                            ".csv --histories")
+        raise PatchfemError(f"{out}: fields are exported as {', '.join(ENDINGS)}, the last cycle with a script "
+                            "for ParaView as .py; histories and loops as .uff, .mat, .csv --histories")
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
         raise PatchfemError(f"--frame: {out.suffix} holds the whole series; name a .vtu or .csv for one frame")
     with Series(folder) as series:
@@ -75,9 +75,10 @@ def frames_beside(path: Path) -> Path:
     return path.with_name(path.stem + "_frames")
 
 
-def write_pvd(path: Path, series: Series) -> int:
+def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     """Write the series as a .pvd, which any ParaView opens; returns the number of frames.
 
+    numbers: of the frames written, all unless given; change: makes of a Frame the one that is written.
     In the folder beside it stand a .vtm per frame, which names the blocks, and a .vtu per block.
     Frames left there by a longer series are removed; PatchfemError where the folder holds anything else.
     """
@@ -89,16 +90,18 @@ def write_pvd(path: Path, series: Series) -> int:
                             "name another -o")
     folder.mkdir(exist_ok=True)
     lines, written = [], set()
-    for number, time in enumerate(series.times):
-        names = _write_vtm(folder, f"frame_{number:04d}", series.frame(number))
+    numbers = range(len(series)) if numbers is None else numbers
+    for number in numbers:
+        one = series.frame(number)
+        names = _write_vtm(folder, f"frame_{number:04d}", one if change is None else change(one))
         written.update(names)
-        lines.append(f'<DataSet timestep="{float(time)!r}" group="" part="0" '
+        lines.append(f'<DataSet timestep="{one.time!r}" group="" part="0" '
                      f'file={quoteattr(f"{folder.name}/{names[0]}")}/>')
     _listing(path, "Collection", "0.1", lines)
     for one in old:
         if one.name not in written:
             one.unlink()
-    return len(series)
+    return len(numbers)
 
 
 def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:

@@ -1,0 +1,109 @@
+"""A script for ParaView, run on a stand-in whose filters are VTK's: what it would draw is what pictures draw."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import sys
+import types
+
+import numpy as np
+import pytest
+from command_line import cli
+from exported import write_small
+from paraview_stand_in import Simple, blocks_at, times_and_files
+
+from patchfem.export.drawing.film import film_of
+from patchfem.export.drawing.panels import slide_of
+from patchfem.export.fields.blocks import NAMES
+from patchfem.export.fields.series import Series
+
+
+def played(path, monkeypatch, *words) -> Simple:
+    """The script run as `pvpython PATH WORDS`."""
+    simple = Simple()
+    package = types.ModuleType("paraview")
+    package.simple = simple
+    for name, module in (("paraview", package), ("paraview.simple", simple)):
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr(sys, "argv", [str(path), *words])
+    runpy.run_path(str(path))
+    return simple
+
+
+@pytest.fixture(scope="module")
+def written(bench, tmp_path_factory):
+    """The script of a bench, in a folder whose name needs care."""
+    folder = tmp_path_factory.mktemp("it's a \"run\"")
+    answer = cli("export", bench, "-o", folder / "the 'last'.py")
+    assert answer.code == 0, answer.err
+    assert "the 'last'.pvd and the 'last'_frames beside it" in answer.out
+    return folder / "the 'last'.py"
+
+
+def test_exact_paraview_warps_to_the_places_that_pictures_draw(bench, written, monkeypatch):
+    simple = played(written, monkeypatch)
+    (pieces, _), (interface, _), (clock, _) = simple.shown
+    files = times_and_files(clock.Input)
+    with Series(bench) as series:
+        film = film_of(series)
+        assert [time for time, _ in files] == [series.times[number] for number in film.numbers]
+        for number, (_, file) in list(zip(film.numbers, files))[::4]:
+            frame = series.frame(number)
+            wanted = film.panels(frame)[0].places * 1e-3
+            got = blocks_at(pieces, file) + blocks_at(interface, file)
+            assert len(got) == len(NAMES)
+            assert np.abs(np.concatenate([points[:, :2] for points, *_ in got]) - wanted).max() <= 1e-6 * 12.7e-3
+            for (_, point_data, cell_data), block in zip(got, frame.blocks.values()):
+                assert np.array_equal(point_data["displacement"], block.point_data["displacement"])
+                upper = block is frame.blocks["upper"]
+                assert np.array_equal(np.unique(point_data["slide"][:, 0]), np.float32([upper * slide_of(frame)]))
+                for name, values in block.cell_data.items():
+                    assert np.array_equal(cell_data[name], values)
+
+
+def test_exact_paraview_colours_pressure_and_stress_alike_in_every_frame(bench, written, monkeypatch):
+    simple = played(written, monkeypatch)
+    with Series(bench) as series:
+        film = film_of(series)
+        frames = [series.frame(number) for number in film.numbers]
+    line = frames[0].blocks["interface"]
+    highest = max(one.blocks["interface"].point_data["normal_stress"].max() for one in frames)
+    ends = {"normal_stress": (0.0, highest), "von_mises": (0.0, film.tops[0])}
+    for (source, display), array in zip(simple.shown, (("CELLS", "von_mises"), ("POINTS", "normal_stress"))):
+        assert simple.coloured[id(display)] == array
+        data = blocks_at(source, times_and_files(simple.shown[2][0].Input)[0][1])
+        assert all(array[1] in (at_points if array[0] == "POINTS" else in_cells) for _, at_points, in_cells in data)
+        table = simple.tables[array[1]]
+        assert table.AutomaticRescaleRangeMode == "Never"
+        assert [words for name, *words in table.called if name == "RescaleTransferFunction"] == [list(ends[array[1]])]
+        assert simple.bars[id(table)].ComponentTitle == "[Pa]"
+        assert display.called == [("SetScalarBarVisibility", simple.view, True)]
+    assert len(line.points) == len(blocks_at(simple.shown[1][0], times_and_files(simple.shown[2][0].Input)[0][1])[0][0])
+
+
+def test_exact_paraview_plays_or_writes_the_cycle_from_any_folder(written, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    simple = played(written, monkeypatch)
+    assert simple.scene.PlayMode == "Snap To TimeSteps" and not simple.saved
+    assert [name for name, in simple.scene.called] == ["UpdateAnimationUsingDataTimeSteps", "GoToFirst", *3 * ["Play"]]
+    simple = played(written, monkeypatch, "cycle.png")
+    assert simple.saved == [("cycle.png", 7)] and ("Play",) not in simple.scene.called
+    assert not os.listdir(tmp_path)
+
+
+def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, written, tmp_path, monkeypatch):
+    (tmp_path / "alone.py").write_text(written.read_text("utf-8"), "utf-8")
+    with pytest.raises(SystemExit, match="is not there"):
+        played(tmp_path / "alone.py", monkeypatch)
+    write_small(tmp_path / "still", 1)
+    answer = cli("export", tmp_path / "still", "-o", tmp_path / "a.py")
+    assert answer.code == 2 and "nothing moves" in answer.err
+    answer = cli("export", bench, "-o", tmp_path / "a.py", "--frame", "1")
+    assert answer.code == 2 and "--frame" in answer.err
+    (tmp_path / "lumped").mkdir()
+    answer = cli("export", tmp_path / "lumped", "-o", tmp_path / "a.py")
+    assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
+    answer = cli("export", bench, "-o", tmp_path / "none" / "a.py")
+    assert answer.code == 4 and "cannot be written" in answer.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["alone.py", "lumped", "still"]

@@ -1,0 +1,121 @@
+"""What a script for ParaView asks for, noted down, and its pipeline carried out by VTK's own filters.
+
+Names of proxies and of their properties as ParaView 5.11 has them; anything else is an error.
+"""
+
+from __future__ import annotations
+
+import types
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkFiltersExtraction import vtkExtractBlockUsingDataAssembly
+from vtkmodules.vtkFiltersGeneral import vtkWarpVector
+from vtkmodules.vtkIOXML import vtkXMLMultiBlockDataReader
+
+PROPERTIES = {"PVDReader": {"FileName"}, "WarpByVector": {"Input", "Vectors", "ScaleFactor"},
+              "ExtractBlock": {"Input", "Selectors", "Assembly"}, "AnnotateTimeFilter": {"Input", "Format"},
+              "RenderView": {"InteractionMode", "OrientationAxesVisibility"}, "Display": {"LineWidth"},
+              "ScalarBar": {"Title", "ComponentTitle"}, "Table": {"AutomaticRescaleRangeMode"},
+              "AnimationScene": {"PlayMode"}}
+CALLS = {"Display": {"SetScalarBarVisibility"}, "Table": {"ApplyPreset", "RescaleTransferFunction"},
+         "AnimationScene": {"UpdateAnimationUsingDataTimeSteps", "GoToFirst", "Play"}}
+
+
+class Proxy:
+    """A proxy that knows the properties of its kind and notes what is called on it."""
+
+    def __init__(self, kind: str, **given):
+        self.__dict__.update(kind=kind, called=[])
+        for name, value in given.items():
+            setattr(self, name, value)
+
+    def __setattr__(self, name: str, value) -> None:
+        assert name in PROPERTIES[self.kind], f"{self.kind} has no property {name}"
+        self.__dict__[name] = value
+
+    def __getattr__(self, name: str):
+        if name not in CALLS.get(self.kind, ()):
+            raise AttributeError(f"{self.kind} has no {name}")
+        return lambda *words: self.called.append((name, *words))
+
+
+class Simple(types.ModuleType):
+    """`paraview.simple` that notes what is shown and how."""
+
+    def __init__(self):
+        super().__init__("paraview.simple")
+        self.shown, self.coloured, self.tables, self.saved = [], {}, {}, []
+        self.view, self.scene, self.bars = Proxy("RenderView"), Proxy("AnimationScene"), {}
+        for kind in ("PVDReader", "WarpByVector", "ExtractBlock", "AnnotateTimeFilter"):
+            setattr(self, kind, lambda registrationName, kind=kind, **given: Proxy(kind, **given))
+
+    def GetActiveViewOrCreate(self, kind):
+        assert kind == "RenderView"
+        return self.view
+
+    def Show(self, source, view):
+        self.shown.append((source, Proxy("Display")))
+        return self.shown[-1][1]
+
+    def ColorBy(self, display, array):
+        self.coloured[id(display)] = array
+
+    def GetColorTransferFunction(self, name):
+        return self.tables.setdefault(name, Proxy("Table"))
+
+    def GetScalarBar(self, table, view):
+        return self.bars.setdefault(id(table), Proxy("ScalarBar"))
+
+    def GetAnimationScene(self):
+        return self.scene
+
+    def ResetCamera(self, view):
+        assert view is self.view
+
+    Render = ResetCamera
+
+    def SaveAnimation(self, path, view, FrameRate):
+        self.saved.append((path, FrameRate))
+
+
+def times_and_files(reader: Proxy) -> list:
+    """(Time, file) of the frames of a .pvd."""
+    path = Path(reader.FileName)
+    sets = ElementTree.parse(path).getroot().iter("DataSet")
+    return [(float(one.get("timestep")), path.parent / one.get("file")) for one in sets]
+
+
+def blocks_at(source: Proxy, file: Path) -> list:
+    """The grids that a source gives where its reader reads `file`: (points (n, 3), point data, cell data)."""
+    last = _filter(source, file)
+    last.Update()
+    walk, out = last.GetOutputDataObject(0).NewIterator(), []
+    walk.InitTraversal()
+    while not walk.IsDoneWithTraversal():
+        grid = walk.GetCurrentDataObject()
+        out.append((vtk_to_numpy(grid.GetPoints().GetData()), *(
+            {data.GetArrayName(k): vtk_to_numpy(data.GetArray(k)) for k in range(data.GetNumberOfArrays())}
+            for data in (grid.GetPointData(), grid.GetCellData()))))
+        walk.GoToNextItem()
+    return out
+
+
+def _filter(source: Proxy, file: Path):
+    if source.kind == "PVDReader":
+        made = vtkXMLMultiBlockDataReader()
+        made.SetFileName(str(file))
+        return made
+    before = _filter(source.Input, file)
+    if source.kind == "WarpByVector":
+        made = vtkWarpVector()
+        made.SetInputArrayToProcess(0, 0, 0, ("POINTS", "CELLS").index(source.Vectors[0]), source.Vectors[1])
+        made.SetScaleFactor(source.ScaleFactor)
+    else:
+        made = vtkExtractBlockUsingDataAssembly()
+        made.SetAssemblyName("Hierarchy")
+        for one in source.Selectors:
+            made.AddSelector(one)
+    made.SetInputConnection(before.GetOutputPort())
+    return made
