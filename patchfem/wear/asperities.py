@@ -65,7 +65,8 @@ def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: 
 
 
 class _Pair:
-    """Both surfaces while they wear, and the approach at each place of the stroke: the start of the next search."""
+    """Both surfaces while they wear, and the approach at each place of the stroke and how far it
+    sank there last [m]: the start of the next search."""
 
     def __init__(self, low, up, upper_share: float):
         self.low, self.up = low, up
@@ -92,7 +93,9 @@ class _Pair:
     def overlap(self, place: int, depth: float, out) -> None:
         """Overlap (m, n) [m] with the upper piece at `place` into `out`; its mean is `depth`."""
         _shifted_sum(self.up, self.low, place, self.sum)
-        self.approach[place] = overlap_of(self.sum, depth, self.approach.get(place), out)
+        last, sunk = self.approach.get(place, (None, 0.0))  # the approach sinks as evenly as the pieces wear
+        found = overlap_of(self.sum, depth, None if last is None else last - sunk, out)
+        self.approach[place] = found, 0.0 if last is None else last - found
 
     def take(self, off_lower, off_upper) -> None:
         self.low -= self.shares[0] * off_lower
@@ -106,15 +109,19 @@ def overlap_of(heights: np.ndarray, depth: float, start: float | None, out: np.n
     linear function: from its first step on it comes from below, never passes D, and ends after finitely many steps.
     """
     approach = heights.max() - depth if start is None else start
-    wanted = heights.size * depth
+    wanted, near = heights.size * depth, heights
     while True:
-        np.maximum(heights, approach, out=out)
-        out -= approach
-        over, above = out.sum() - wanted, np.count_nonzero(out)
+        touching = near[near > approach]
+        over = (touching - approach).sum() - wanted
         if abs(over) <= CLOSE * wanted:
-            out *= wanted / (over + wanted)
-            return approach
-        approach = approach + over / above if above else heights.max() - depth
+            break
+        if over > 0:  # D lies above: no other point touches there
+            near = touching
+        approach = approach + over / touching.size if touching.size else heights.max() - depth
+    np.maximum(heights, approach, out=out)
+    out -= approach
+    out *= wanted / (over + wanted)
+    return approach
 
 
 def _shifted_sum(moved, fixed, by: int, out) -> None:

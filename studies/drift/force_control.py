@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.optimize import brentq
 
+from patchfem.friction.bonds.quadrature import Quadrature
+
 
 class OutOfReach(ArithmeticError):
     """No slide of up to 50 bond lengths brings the law to the force."""
@@ -13,12 +15,17 @@ def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float 
 
     dt [s] is the time of the step, length [m] the scale of the search. OutOfReach where the law does not get there.
     """
+    def after(dq):
+        if isinstance(engine, Quadrature):  # the sum over the bonds once, not at every Gauss point of the increment
+            return engine.carried(state, dq, sigma, sigma, dt)
+        return engine.step(state, dq, sigma, sigma, dt).state
+
     def miss(dq):
-        return float(engine.traction(engine.step(state, dq, sigma, sigma, dt).state)[0]) - target
+        return float(engine.traction(after(dq))[0]) - target
 
     now = float(engine.traction(state)[0])
     if abs(now - target) <= 1e-13:
-        return 0.0, engine.step(state, 0.0, sigma, sigma, dt).state
+        return 0.0, after(0.0)
     way, far = (length if target > now else -length), 0.05
     while miss(way * far) * way < 0:
         far *= 1.5
@@ -27,7 +34,7 @@ def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float 
     dq = brentq(miss, 0.0, way * far, xtol=1e-15 * length, rtol=1e-14)
     if abs(miss(dq)) > 1e-6:  # a root of a force is as steep as |u|^p
         raise OutOfReach(f"the law jumps over {target:g} from {now:g}")
-    return dq, engine.step(state, dq, sigma, sigma, dt).state
+    return dq, after(dq)
 
 
 def slides(engine, forces, loads, cycles: int = 12, pieces: int = 1, period: float = 2.0, length: float = 1.0):

@@ -57,7 +57,7 @@ def plain(law, path, points: int = 1) -> float:
     steps = np.diff(path)
     split = len(steps) - max(len(steps) // 50, 20)
     for dq in steps[:split]:
-        state = law._moved(state, dq, sigma, sigma, dt) if isinstance(law, Quadrature) else law.step(
+        state = law.carried(state, dq, sigma, sigma, dt) if isinstance(law, Quadrature) else law.step(
             state, dq, sigma, sigma, dt).state
     begin = process_time()
     for dq in steps[split:]:

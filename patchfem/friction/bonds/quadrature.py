@@ -60,7 +60,7 @@ class Quadrature:
         increment in the stretch reading from the energy, so that no step creates any.
         """
         dq = np.atleast_1d(np.asarray(dq, float))
-        after = self._moved(state, dq, s0, s1, dt)
+        after = self.carried(state, dq, s0, s1, dt)
         gain = self.stored(after) - self.stored(state)
         if not dq.any():
             return Step(self.traction(after), -gain, after)
@@ -73,7 +73,7 @@ class Quadrature:
         else:
             mean, spent = self._along(state, dq, s0, s1, dt)
             # bonds lost at the end of the step leave their energy to nobody: the force holds them until then
-            held = after if (s1 > 0).all() else self._moved(state, dq, s0, np.maximum(s1, np.finfo(float).tiny), dt,
+            held = after if (s1 > 0).all() else self.carried(state, dq, s0, np.maximum(s1, np.finfo(float).tiny), dt,
                                                             forming=(s0 + s1) / 2)
             path, e = direction(dq)
             own = (spent + self.stored(held) - self.stored(state)) / path
@@ -92,7 +92,7 @@ class Quadrature:
         for a, b in pairwise(edges):
             for place, w in zip((a + b + (b - a) * _NODES) / 2, (b - a) / 2 * _WEIGHTS):
                 part = free + (1 - free) * place / length
-                here = self._moved(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2)
+                here = self.carried(state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2)
                 sums = self.law.static * self._sums(here)
                 mean, spent = mean + w / length * sums[:-1], spent + w * sums[-1]
         return mean, spent
@@ -145,9 +145,9 @@ class Quadrature:
         sums[-1] *= 2
         return np.vstack([_summed(state, surviving(state)[:, None]), sums])
 
-    def _moved(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
-        """The bonds after an increment; forming (m,) [Pa]: the pressure of the new ones, the mean of both ends where it
-        is not given."""
+    def carried(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
+        """The bonds after an increment, the state that `step` gives at a tenth of its cost or less, without its means;
+        forming (m,) [Pa]: the pressure of the new ones, the mean of both ends where it is not given."""
         (q, path, damage, growth, mature), law = state.now, self.law
         dq = np.atleast_1d(np.asarray(dq, float))
         distance = direction(dq)[0]

@@ -63,7 +63,7 @@ def settled_at(law, speed, ell):
     engine, one = Quadrature(law, tail=0.0), np.ones(1)
     state = engine.start(one)
     for dq in np.diff(unit * (back[0] - back)):
-        state = engine._moved(state, dq, one, one, dq / speed)  # the means of the steps are not asked for
+        state = engine.carried(state, dq, one, one, dq / speed)  # the means of the steps are not asked for
     return float(engine.traction(state)[0])
 
 
@@ -112,10 +112,10 @@ def test_exact_c8_printed_law_heals_under_load(order):
     engine, one = Quadrature(law, tail=0.0), np.ones(1)
     state, force = engine.start(one), []
     for dq in np.diff(back[0] - back):
-        state = engine._moved(state, dq, one, one, dq * 1e-9)
+        state = engine.carried(state, dq, one, one, dq * 1e-9)
     for _ in range(3):
         force.append(float(engine.traction(state)[0]))
-        state = engine._moved(state, 0.0, one, one, 0.1)
+        state = engine.carried(state, 0.0, one, one, 0.1)
     assert force == pytest.approx([truth(n) for n in range(3)], abs=1e-6)
     assert force == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
 

@@ -77,7 +77,7 @@ def test_exact_circle_of_any_order(reading, order, radius):
         path = circle(radius, 30, legs)
         state = law.start(ONE, 2)
         for dq in np.diff(path, axis=0):
-            state = law._moved(state, dq, ONE, ONE, 1.0)
+            state = law.carried(state, dq, ONE, ONE, 1.0)
         miss.append(against_tangent(law.traction(state)[:, 0], path, radius) - truth)
     assert abs(miss[1]) < (5e-3 if order < 0 else 1e-3)
     assert abs(miss[0] / miss[1]) > 0.87 * 2**min(2, 2 + order)
