@@ -53,9 +53,10 @@ class Propagator:
         a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)
         p = self.parts
         moved = a @ p["z"]
-        rest = np.stack([np.einsum("kj,jl,kl->k", a, p["work"], a), np.einsum("kj,jl,kl->k", a, p["lost"], a),
+        # a quadratic form as a product and a sum: an einsum of three factors takes four times as long
+        rest = np.stack([((a @ p["work"]) * a).sum(axis=1), ((a @ p["lost"]) * a).sum(axis=1),
                          drive.values(start + self.dt)], axis=1)
-        return np.concatenate([moved, a @ p["v"], *(a @ p[key] for key in ("wz", "wv", "wf", "dz", "dv", "df")), rest,
+        return np.concatenate([moved, *(a @ p[key] for key in ("v", "wz", "wv", "wf", "dz", "dv", "df")), rest,
                                moved @ self.rows.T], axis=1)
 
 

@@ -118,6 +118,10 @@ def draw(rows: list, path: Path) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 2 or not Path(sys.argv[1]).is_file():
+        missing = f"{sys.argv[1]} is no file" if len(sys.argv) > 1 else "the record is not part of this project"
+        sys.exit(f"{missing}: get it as a CSV file ({SOURCE}) and run: python studies/damper/damper.py FILE.csv "
+                 "[PICTURE.svg]")
     table = main(sys.argv[1])
     print(f"cycles repeat to {repeat(table[0].fitted.loop)[1]:.0f} N")
     for row in table:

@@ -5,8 +5,8 @@ that stiffens by 2e10 N/m3: the upper branch ends at 147.678 Hz, the lower at 14
 motions (balance to 1e-4; to 1e-3 the folds are up to 11 mHz off). Marches whose frequency sweeps up jump down at
 148.03, 147.84 and 147.75 Hz for 0.4, 0.1 and 0.025 Hz/s, those that sweep down jump up at 146.03, 146.28 and 146.38 Hz:
 always past the fold, late by a delay that goes as the rate to the power 2/3. Drawn back to no rate by it they jump at
-147.685 and 146.445 Hz, 7 mHz from the folds. Before the jump the slowest follow their branches within 3e-4 (upper) and
-6e-3 (lower).
+147.685 and 146.444 Hz, 7 mHz from the folds. Before the jump the slowest follow their branches within 3e-4 (upper) and
+6e-3 (lower). They start just outside the folds, at 146.2 and 148.0 Hz, the others at 145 and 149 Hz.
 
 Run: python studies/steady/fold.py
 """

@@ -10,6 +10,8 @@ from patchfem.scene import scene
 
 HERE = Path(__file__).parent
 LOW, HIGH = 145.0, 149.0  # Hz, ends of the sweeps
+NEAR = 146.2, 148.0  # Hz, of slow ones: just outside the folds, where one motion is left to settle on
+SLOW = 0.05  # Hz/s: a sweep that is slower has settled 0.3 Hz from its start
 STEPS = 400  # per cycle
 
 
@@ -55,6 +57,7 @@ def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> C
 
 def sweep(steady: Curve, up: bool, rate: float, steps: int = STEPS, low: float = LOW, high: float = HIGH) -> Sweep:
     """March up or down from rest at the first frequency; the state is carried through."""
+    low, high = (max(low, NEAR[0]), min(high, NEAR[1])) if rate < SLOW else (low, high)
     first, last = (low, high) if up else (high, low)
     sets = [f"drive.from={first} Hz", f"drive.to={last} Hz", f"drive.rate={rate} Hz/s",
             f"drive.duration={(high - low) / rate} s", "accuracy.method=march", f"accuracy.steps_per_cycle={steps}"]

@@ -1,6 +1,7 @@
 """The measured damper loop: what the docstring of the study says, on the record itself."""
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -33,3 +34,13 @@ def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
     limit = stretch.fitted.found.values[0] * damper.LOAD
     assert np.abs(loop.reading).max() > 2 * limit
     assert 40 < stretch.fitted.found.rows < 90
+
+
+@pytest.mark.parametrize("words", [(), ("nothing_here.csv",)])
+def test_refuses_to_run_without_its_record_in_one_line(words):
+    script = Path(__file__).parents[2] / "studies" / "damper" / "damper.py"
+    done = subprocess.run([sys.executable, str(script), *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and not done.stdout
+    said, = done.stderr.splitlines()
+    assert "ARTS-Laboratory" in said and "run: python studies/damper/damper.py FILE.csv" in said
+    assert said.startswith("nothing_here.csv is no file" if words else "the record is not part")
