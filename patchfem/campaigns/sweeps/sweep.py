@@ -26,14 +26,15 @@ class Work:
     """What every worker needs to answer any case; it is sent to each once.
 
     tell(number, model or error, Answers, place in them): what is made of an answer beside its columns; keep(number,
-    Result): called after each run. Both are functions of a module, or objects that travel. meshes: those that the cases
-    share, made from all of them by `with_meshes`.
+    Result): called after each run. Both are functions of a module, or objects that travel. estimate: False leaves out
+    the errors of cases that run one by one. meshes: those that the cases share, made from all of them by `with_meshes`.
     """
 
     asked: Asked
     cases: Cases
     tell: Callable | None = None
     keep: Callable | None = None
+    estimate: bool = True
     meshes: Shared | None = None
 
 
@@ -59,7 +60,7 @@ def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> t
     """Answers of some cases, and of each what `work.tell` makes of it. This is what a worker does with a chunk."""
     models = [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    found = many.answers(models, keep, say)
+    found = many.answers(models, keep, say, work.estimate)
     told = [] if work.tell is None else [work.tell(number, model, found, case)
                                          for case, (number, model) in enumerate(zip(numbers, models))]
     return found, told

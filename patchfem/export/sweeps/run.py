@@ -70,10 +70,10 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
     return total
 
 
-def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None) -> Answers:
-    """Answers of the cases in memory alone."""
+def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True) -> Answers:
+    """Answers of the cases in memory alone; estimate: False leaves out the errors of cases that run one by one."""
     total = Answers.blank(len(cases))
-    for numbers, found, _ in solved(Work(asked, cases), range(len(cases)), executor, say):
+    for numbers, found, _ in solved(Work(asked, cases, estimate=estimate), range(len(cases)), executor, say):
         _columns_only(found)
         total.place(numbers, found)
     return total

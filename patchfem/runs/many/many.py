@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
+from functools import partial
 from importlib import import_module
 from typing import NamedTuple
 
@@ -45,11 +46,12 @@ def taken(model: Model) -> Batch | None:
 
 
 def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = None,
-            say: Callable | None = None) -> Answers:
+            say: Callable | None = None, estimate: bool = True) -> Answers:
     """Answers of the models in their order; an error in place of a model is the message of its failed case.
 
     keep(case, Result): called after each run; a batch has no Result, so all cases then run one by one. say: called with
-    one line when compiled code has to be made.
+    one line when compiled code has to be made; estimate: False leaves out the coarser runs of all models, and their
+    errors, where they run one by one (a batch has its errors from the same work).
     """
     found, groups = Answers.blank(len(models)), {}
     for case, model in enumerate(models):
@@ -58,7 +60,8 @@ def answers(models: Sequence[Model | PatchfemError], keep: Callable | None = Non
             continue
         groups.setdefault(_place(model) if keep is None else (None, None), []).append(case)
     for (batch, _), cases in groups.items():
-        found.place(cases, _solved(batch, cases, [models[case] for case in cases], keep, say))
+        found.place(cases, _solved(batch, [models[case] for case in cases],
+                                   partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate), say))
     return found
 
 
@@ -71,11 +74,16 @@ def _place(model: Model) -> tuple:
         return None, None
 
 
-def _solved(batch: Batch | None, cases: list, models: list, keep: Callable | None, say: Callable | None) -> Answers:
+def _of(keep: Callable | None, cases: list) -> Callable | None:
+    """`keep` of a part of the cases, by their places in it."""
+    return keep and (lambda case, result: keep(cases[case], result))
+
+
+def _solved(batch: Batch | None, models: list, alone: Callable, say: Callable | None) -> Answers:
     if batch is not None:
         try:
             return batch.solve(models, say)
         except Exception as error:  # the case at fault is named by its own run
             if say is not None:
                 say(f"{len(models)} cases run one by one: {batch.name}: {type(error).__name__}: {error}")
-    return one_by_one.solve(models, say, keep and (lambda case, result: keep(cases[case], result)))
+    return alone(models, say)

@@ -13,17 +13,18 @@ from ..run import run
 from .answers import Answers
 
 
-def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable | None = None) -> Answers:
+def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable | None = None,
+          estimate: bool = True) -> Answers:
     """Answers of single runs of the models.
 
-    keep(case, Result): called after each run. A PatchfemError of one case is its message, and so is any other fault:
-    none stops the rest.
+    keep(case, Result): called after each run; estimate: False leaves out the coarser runs and the errors. A
+    PatchfemError of one case is its message, and so is any other fault: none stops the rest.
     """
     found = Answers.blank(len(models))
     for case, model in enumerate(models):
         begin = perf_counter()
         try:
-            result = run(plan(model), say)
+            result = run(plan(model), say, estimate=estimate)
             if keep is not None:
                 keep(case, result)
         except (PatchfemError, MemoryError) as error:

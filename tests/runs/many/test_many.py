@@ -92,11 +92,20 @@ def test_exact_parts_join_to_the_whole(order):
     assert found.reasons == whole.reasons and found.notes == whole.notes
 
 
+def test_exact_values_without_errors_are_those_with_them():
+    bare, whole = many.answers([pf.build(BENCH)], estimate=False), many.answers([pf.build(BENCH)])
+    assert bare.outcome.tolist() == whole.outcome.tolist() and np.nanmax(whole.errors["loop_area"]) > 0
+    assert all(np.isnan(errors).all() or not errors.any() for errors in bare.errors.values())
+    for name, values in whole.values.items():
+        np.testing.assert_array_equal(bare.values[name], values)
+
+
 def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):
     from patchfem.runs.many import one_by_one
 
     real = one_by_one.run
-    monkeypatch.setattr(one_by_one, "run", lambda what, say: 1 / 0 if what.kind == "bench" else real(what, say))
+    monkeypatch.setattr(one_by_one, "run",
+                        lambda what, say, **more: 1 / 0 if what.kind == "bench" else real(what, say, **more))
     found = many.answers([pf.build(BENCH), pf.build(RIG)])
     assert found.outcome.tolist()[0] == FAILED and "ZeroDivisionError" in found.messages[0]
     same(found, 1, pf.run(RIG))
