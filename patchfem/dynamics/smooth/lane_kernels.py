@@ -229,10 +229,7 @@ def gone_on(many, kept, rows, own, lane, code):
         k.tally[watching.TURNS] += 1
         own[FRESH] = 1.0
         m.now[steps.STEP] = min(m.now[steps.TURNED], m.now[steps.STEP])
-        if count + 1 == k.turns.shape[0]:
-            code, m.now[steps.BEGUN] = FULL, loop.TURNING
-        else:
-            code = GOING
+        code = GOING if count + 1 < k.turns.shape[0] else FULL
     m.now[steps.STOOD] = -1.0  # whoever goes on takes the slopes anew
     return GOING if code == ASTRAY else code
 
@@ -266,12 +263,10 @@ def advance(many, kept, rows, lanes, until, tolerance, codes):
                     if ahead == until.size:
                         own[MODE], rows[H + lane], busy = IDLE, 0.0, busy - 1
                         break
-                    own[MOTION], own[UNTIL] = ahead, until[ahead]
+                    own[MOTION], own[FRESH], own[UNTIL] = ahead, 0.0, until[ahead]
                     rows[ALLOWED + lane] = tolerance[ahead]
                     ahead += 1
                 m, k = one(many, kept, int(own[MOTION]))
-                if code != GOING:
-                    own[FRESH] = loop.went_on(m)
                 laid(m, k, rows, own, lane)
                 code = next_try(rows, own, lane)
                 if code == GOING:

@@ -18,7 +18,6 @@ from . import watch_kernels as watching
 NOTHING, STOP, KINK, KNEE, TRAVEL = range(5)  # what ends a step
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
 SLOWER, FASTER = 0.2, 8.0  # bounds of the change of a step
-TURNING = 2.0  # of now[BEGUN]: the motion was left at a reversal
 FORGET = 3.0  # cycles over which a largest value is forgotten
 
 
@@ -249,23 +248,15 @@ def sampled(m, k):
     k.tally[watching.SAMPLE] = at
 
 
-@njit(error_model="numpy", **INNER)
-def went_on(m):
-    """1 where a motion was left at a reversal, for lack of room, else 0: it goes on as if it had not been left."""
-    fresh = 1.0 if m.now[steps.BEGUN] == TURNING else 0.0
-    m.now[steps.BEGUN] = 1.0
-    return fresh
-
-
 @njit(error_model="numpy", cache=True, **LEAN)
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
 
     tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals is used up.
     """
+    end, fresh = min(until, edge), False
     if m.now[steps.BEGUN] == 0:
         begin(m, k)
-    end, fresh = min(until, edge), went_on(m) > 0
     if m.now[steps.STOOD] != m.now[steps.PIECE]:  # the drive has changed
         steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
         m.now[steps.STOOD] = m.now[steps.PIECE]
@@ -273,7 +264,6 @@ def advance(m, k, until, edge, tolerance, travel):
     limit = k.tally[watching.DONE] + 1e9
     while m.now[steps.TIME] < end:
         if k.tally[watching.TURNS] >= k.turns.shape[0]:
-            m.now[steps.BEGUN] = TURNING if fresh else 1.0
             return FULL
         room = end - m.now[steps.TIME]
         whole = m.now[steps.STEP] >= room * (1 - 1e-9)
