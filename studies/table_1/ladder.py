@@ -6,7 +6,7 @@ with each frequency left out in turn 0.179 (constant 0.298). Grooves that the lo
 with no spring: 0.078, then 0.166. The rigid block scores 1.42 and 1.31, the patch with yaw alone 0.25 and 0.32 at best:
 the data exclude them. They cannot tell spring from groove, nor which reading the accelerometer gave. What is won, the
 displacements win: of accelerations at 143 Hz alone nothing here predicts the others better than the constant (0.111;
-0.121 the best). With each frequency left out the yaw mode in the accelerometer, the best of five, scores 0.097 beside
+0.121 the best). With each frequency left out the yaw mode in the accelerometer, the best of seven, scores 0.097 beside
 0.125 of the constant, yet a power of input and frequency, which explains nothing, scores 0.090, and readings repeat to
 0.086: no model beats that null in acceleration.
 
