@@ -45,8 +45,10 @@ if TYPE_CHECKING:
         SceneError,
         build,
         compare,
+        cost,
         demo,
         load,
+        new,
         plan,
         run,
         run_many,
@@ -55,7 +57,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.4.0"
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "compare", "demo", "load", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "run", "run_many", "sweep"]
 
 
 def __getattr__(name: str):

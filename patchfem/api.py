@@ -1,5 +1,5 @@
-"""The verbs for Python: `load` and `build` a scene, `plan`, `run` and `sweep` it, look at the `Result`;
-`compare` two measured surfaces.
+"""The verbs for Python: `new` for a scene to start from, `load` and `build` one, `plan`, `run`, `sweep` or `cost` it,
+look at the `Result`; `compare` two measured surfaces.
 
     import patchfem as pf
     result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
@@ -28,13 +28,13 @@ from .scene.scene import load as load_file
 from .scene.sets import assignments, texts
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
     from xarray import Dataset
 
     from .runs.many.answers import Answers
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
-           "SceneError", "build", "compare", "demo", "load", "plan", "run", "run_many", "sweep"]
+           "SceneError", "build", "compare", "cost", "demo", "load", "new", "plan", "run", "run_many", "sweep"]
 TEXT = "<text>"  # the name of a scene that came without a file
 
 
@@ -100,6 +100,35 @@ def demo(**sets: Any) -> Result:
     from .scene.starting import shipped
 
     return run(shipped(), **sets)
+
+
+def new(kind: str, /) -> str:
+    """The text of a scene of this kind to start from, which `load` and `run` take: patch, joint, bench, rig, linear,
+    misalignment or wear; PatchfemError for any other word, with those that there are."""
+    from .scene.starting import text_of as starting
+
+    return starting(kind)
+
+
+def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
+         say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
+    """Error against time of a scene: knob -> `runs`, `cheapest` and `sentence`, the dict of `patchfem cost --json`.
+
+    scene and sets as `load` takes them. over: one knob (element_size, steps_per_cycle, shear_modes, jumps) in place of
+    all that the scene has. Of each run `seconds`, and by measure its `values`, the `errors` that it states and its
+    `distances` to the best run, in SI. out: a folder for cost.csv and pictures. say: called with one line per run, on
+    stderr unless given. {} where the answer is exact; PatchfemError for a knob that the scene does not have.
+    """
+    from .campaigns.cost import curve, knobs_of
+    from .export.cost import answer_of, shown, write, write_picture
+
+    model, runs = build(scene, **sets), {}
+    for knob in [over] if over else knobs_of(model):
+        runs[knob] = curve(model, knob, _on_stderr if say is None else say)
+        if out is not None:
+            write(Path(out), runs)
+            write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance, shown(runs[knob]))
+    return {knob: answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
 
 
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
@@ -222,30 +251,31 @@ class Measures(Mapping):
 
 
 class Plots:
-    """The pictures of a run, each a matplotlib Figure: ``result.plot.loop().savefig("loop.png")``.
+    """The pictures of a run, each as matplotlib Axes: ``result.plot.loop().figure.savefig("loop.png")``.
 
-    PatchfemError where the run has nothing to show, with what it lacks.
+    ax: Axes to draw on; without it a new figure is made, whose `axes` may be more than the first one, which is
+    returned. A notebook shows them; PatchfemError where the run has nothing to show, with what it lacks.
     """
 
     def __init__(self, result: Result):
         self._result = result
 
-    def pressure(self) -> Figure:
-        """Normal stress along the interface, and the shear stress where some acts."""
-        return self._drawn(("pressure",), "the scene has no [contact]" if self._result.patch is None else
+    def pressure(self, ax: Axes | None = None) -> Axes:
+        """Normal stress along the interface; beside it, unless on `ax`, the shear stress where some acts."""
+        return self._drawn(ax, ("pressure",), "the scene has no [contact]" if self._result.patch is None else
                            "the pieces do not touch")
 
-    def loop(self) -> Figure:
+    def loop(self, ax: Axes | None = None) -> Axes:
         """Friction force against the slide of the interface."""
-        return self._drawn(("loop",), self._still() or "no friction acted, or nothing slid")
+        return self._drawn(ax, ("loop",), self._still() or "no friction acted, or nothing slid")
 
-    def history(self) -> Figure:
-        """Displacement over the whole run, beside it the last cycles."""
-        return self._drawn(("history",), self._still())
+    def history(self, ax: Axes | None = None) -> Axes:
+        """Displacement over the whole run; beside it, unless on `ax`, the last cycles or the friction force."""
+        return self._drawn(ax, ("history",), self._still())
 
-    def levels(self) -> Figure:
+    def levels(self, ax: Axes | None = None) -> Axes:
         """Amplitude level by level, or along the curve of steady motions over level or frequency."""
-        return self._drawn(("levels", "curve"), self._still() or 'the drive has no levels; take drive.waveform = '
+        return self._drawn(ax, ("levels", "curve"), self._still() or 'the drive has no levels; take drive.waveform = '
                            '"levels", or a sweep with accuracy.method = "harmonic"')
 
     def _still(self) -> str:
@@ -254,10 +284,10 @@ class Plots:
         return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]" \
             if self._result.plan.kind == "patch" else "no motion was computed"
 
-    def _drawn(self, names: tuple, lack: str) -> Figure:
-        from .export.shown import figure
+    def _drawn(self, ax: Axes | None, names: tuple, lack: str) -> Axes:
+        from .export.shown import axes
 
-        found = figure(self._result, names)
+        found = axes(self._result, names, ax)
         if found is not None:
             return found
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")

@@ -255,11 +255,22 @@ PICTURES = {"pressure": {"patch"}, "loop": {"bench", "rig"}, "history": {"bench"
 
 @pytest.mark.parametrize("name", ["patch", "bench", "rig", "linear"])
 @pytest.mark.parametrize("picture", PICTURES)
-def test_exact_a_picture_is_a_figure_or_the_run_lacks_it(picture, name, runs):
+def test_exact_a_picture_is_axes_or_the_run_lacks_it(picture, name, runs):
+    """Drawn on axes of one's own it is the first panel of the new figure, and what stood there stays."""
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     draw = getattr(runs[name].plot, picture)
     if name in PICTURES[picture]:
-        figure = draw()
-        assert figure.axes and figure._repr_svg_().startswith("<svg")
+        new = draw()
+        assert isinstance(new, Axes) and new is new.figure.axes[0] and new._repr_svg_().startswith("<svg")
+        _, mine = Figure().subplots(1, 2)
+        mine.plot([0, 1], [0, 1], label="measured")
+        assert draw(ax=mine) is mine and len(mine.figure.axes) == 2 and mine.lines[0].get_label() == "measured"
+        assert len(mine.lines) == len(new.lines) + 1 and not hasattr(mine, "_repr_svg_")
+        for here, there in zip(mine.lines[1:], new.lines, strict=True):
+            np.testing.assert_array_equal(here.get_xydata(), there.get_xydata())
+        assert (mine.get_xlabel(), mine.get_ylabel()) == (new.get_xlabel(), new.get_ylabel())
     else:
         with pytest.raises(pf.PatchfemError, match=rf"plot\.{picture}: nothing to draw: \w+"):
             draw()
@@ -267,7 +278,11 @@ def test_exact_a_picture_is_a_figure_or_the_run_lacks_it(picture, name, runs):
 
 def test_exact_levels_are_drawn():
     text = RIG.replace('acceleration = "5 g"\n', 'waveform = "levels"\nlevels = ["3 g", "6 g"]\n')
-    assert pf.run(text).plot.levels().axes[0].get_title() == "Level by level"
+    from matplotlib.figure import Figure
+
+    result, mine = pf.run(text), Figure().subplots()
+    assert result.plot.levels().get_title() == "Level by level"
+    assert result.plot.levels(ax=mine) is mine and len(mine.figure.axes) == 1 and mine.get_ylabel()
 
 
 def test_exact_pictures_need_no_window():

@@ -24,10 +24,6 @@ from .shared import (
     word,
 )
 
-MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area",
-        "friction_force_peak", "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness",
-        "tangential_stiffness")
-
 
 def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle, shear_modes or jumps") = "",
          out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
@@ -44,21 +40,17 @@ def cost(scene: Path, /, *, over: word("one knob: element_size, steps_per_cycle,
     knobs = [over] if over else campaign.knobs_of(found)
     if not knobs:
         raise Refused(f"{scene}: no knob changes what this scene computes: its answer is exact")
-    from ..export.cost import write, write_picture
+    from ..export.cost import answer_of, shown, write, write_picture
 
     target, curves, answer = out if out is not None else Path("out") / f"{found.source.path.stem}-cost", {}, {}
     for knob in knobs:
         runs = curves[knob] = campaign.curve(found, knob, None if quiet else say)
-        names = [name for name in MAIN if name in campaign.turned_by(runs)]
+        names = shown(runs)
         table = write(target, curves)
         picture = write_picture(target, knob, runs, found.accuracy.tolerance, names)
-        text = campaign.sentence(runs, found.accuracy.tolerance)
-        answer[knob] = {"runs": [{"label": one.label, "value": one.value, "seconds": one.seconds,
-                                  "timings": one.timings, "values": one.values, "errors": one.errors,
-                                  "distances": one.distances} for one in runs],
-                        "cheapest": campaign.cheapest(runs, found.accuracy.tolerance), "sentence": text}
+        answer[knob] = answer_of(runs, found.accuracy.tolerance)
         if not json_:
-            _print_cost(knob, runs, names, text)
+            _print_cost(knob, runs, names, answer[knob]["sentence"])
             print(f"results: {table} {picture}")
     if json_:
         print(json.dumps(answer))

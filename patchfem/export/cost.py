@@ -3,11 +3,21 @@
 import csv
 from pathlib import Path
 
+from ..campaigns.cost import cheapest, sentence, turned_by
 from .drawing.pictures import drawing, styled
 
 AXES = {"element_size": "element size", "steps_per_cycle": "steps per cycle", "shear_modes": "shear modes",
         "jumps": "jumps over the cycles of wear"}
+MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area",
+        "friction_force_peak", "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness",
+        "tangential_stiffness")  # the measures that pictures and the screen show, of those that a knob turns
 TOUCHING = 0.14  # share of the width within which two labels would touch
+
+
+def shown(runs: list) -> list:
+    """Names of the measures that a picture of a knob shows, in the order of MAIN."""
+    turned = turned_by(runs)
+    return [name for name in MAIN if name in turned]
 
 
 def write(folder: Path, curves: dict) -> Path:
@@ -39,6 +49,18 @@ def write_picture(folder: Path, knob: str, runs: list, tolerance: float, names: 
     return picture
 
 
+def answer_of(runs: list, tolerance: float) -> dict:
+    """What the runs of a knob come to, in plain lists and dicts; SI.
+
+    runs: Costs coarse to fine; tolerance: of the scene. `runs` holds each with its label, value of the knob, seconds,
+    values, errors and distances by measure, `cheapest` the label of the quickest run within the tolerance by measure,
+    `sentence` what all measures cost.
+    """
+    parts = ("label", "value", "seconds", "timings", "values", "errors", "distances")
+    return {"runs": [{name: getattr(one, name) for name in parts} for one in runs],
+            "cheapest": cheapest(runs, tolerance), "sentence": sentence(runs, tolerance)}
+
+
 @styled
 def draw(knob: str, runs: list, tolerance: float, names: list):
     """Relative error of each measure against the seconds of a run, as SVG text.
@@ -61,8 +83,8 @@ def draw(knob: str, runs: list, tolerance: float, names: list):
     axes[0].set_ylabel("relative to the measure")
     stars = "; star: by the scene's tolerance" if any(one.value is None for one in runs) else ""
     figure.suptitle(f"What accuracy costs, by {_axis_of(knob, runs)}{stars}", fontsize=11)
-    shown = [axis.get_legend_handles_labels() for axis in axes]
-    handles = {label: handle for found in shown for handle, label in zip(*found, strict=True)}
+    labelled = [axis.get_legend_handles_labels() for axis in axes]
+    handles = {label: handle for found in labelled for handle, label in zip(*found, strict=True)}
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9)
     return figure
 

@@ -61,8 +61,16 @@ def page_of(result: Result, bodies: dict) -> str:
     return page(report_data(result) | ({"bodies": bodies} if bodies else {}))
 
 
-def figure(result: Result, names: tuple):
-    """The first of the named pictures in which a run has something to show, as a matplotlib Figure; None without."""
+def axes(result: Result, names: tuple, onto=None):
+    """The first of the named pictures in which a run has something to show, as matplotlib Axes; None without.
+
+    onto: Axes to draw the first panel on; without them the Axes are the first of a new figure with all panels.
+    """
     data = report_data(result)
-    shown = (picture(name, data) for name in names)
-    return next((one.draw.figure(*one.values) for one in shown if one is not None), None)
+    shown = next((one for one in (picture(name, data) for name in names) if one is not None), None)
+    if shown is None:
+        return None
+    if onto is None:
+        return shown.draw.figure(*shown.values).axes[0]
+    shown.draw.figure(*shown.values, onto=onto)
+    return onto

@@ -7,6 +7,7 @@ import pytest
 from command_line import cli
 from scene_texts import PIECE
 
+import patchfem as pf
 from patchfem.campaigns import knobs
 from patchfem.campaigns.cost import Cost, cheapest, curve, sentence
 from patchfem.export.cost import draw
@@ -98,3 +99,20 @@ def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = cli("cost", scene, *words)
     assert answer.code == 2 and said in answer.err
+
+
+def test_exact_python_has_the_answer_and_the_files_of_the_command(tmp_path, monkeypatch, capfd):
+    scene = tmp_path / "a.toml"
+    scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
+    runs = [made("coarse", 0.1, 0.3, 0.2, 2.0), made("middle", 0.2, 0.03, 0.02), made("fine", 0.9, 0.01, value=0.5)]
+    monkeypatch.setattr("patchfem.campaigns.cost.curve", lambda model, knob, say: say(f"{knob}: 1 s") or runs)
+    monkeypatch.setattr("patchfem.export.cost.MAIN", ("a", "b"))
+    said = cli("cost", scene, "-o", tmp_path / "there", "--json")
+    assert pf.cost(scene, out=tmp_path / "here") == json.loads(said.out)
+    assert capfd.readouterr().err == "element_size: 1 s\n"
+    for name in ("cost.csv", "cost_element_size.svg"):
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+    assert pf.cost(scene, over="element_size", say=[].append)["element_size"]["cheapest"] == {"a": "middle"}
+    monkeypatch.undo()
+    with pytest.raises(pf.PatchfemError, match="this scene has the knobs element_size"):
+        pf.cost(scene, over="shear_modes")

@@ -20,7 +20,7 @@ from patchfem.scene.starting import KINDS, shipped, text_of
 
 def test_exact_new_writes_what_it_prints(tmp_path):
     path = tmp_path / "mine.toml"
-    assert cli("new", "joint").out == text_of("joint")
+    assert cli("new", "joint").out == text_of("joint") == pf.new("joint")
     answer = cli("new", "joint", "-o", path)
     assert answer.code == 0 and path.read_text("utf-8") == text_of("joint") and f"patchfem run {path}" in answer.out
     assert "patchfem sweep" in cli("new", "misalignment", "-o", tmp_path / "tilts.toml").out
@@ -33,6 +33,8 @@ def test_exact_new_names_its_kinds():
     assert [line.split()[0] for line in cli("new").out.splitlines()] == list(KINDS)
     said = f"joitn: no kind of scene; did you mean 'joint'? one of {', '.join(KINDS)}\n"
     assert cli("new", "joitn")[::2] == (2, said)
+    with pytest.raises(pf.PatchfemError, match="did you mean 'joint'"):
+        pf.new("joitn")
 
 
 def test_exact_the_demo_is_the_rig_of_the_report(tmp_path):

@@ -50,16 +50,16 @@ def caption(found: dict) -> str:
 
 
 @styled
-def curve(found: dict):
+def curve(found: dict, onto=None):
     """Draw the amplitude of the steady motion over frequency or level.
 
     The regime is shown by colour and line: stable motions whole, unstable ones broken; folds are marked. Where the
-    curve has accelerations the largest one and its first harmonic stand beside it.
+    curve has accelerations the largest one and its first harmonic stand beside it, but not onto Axes.
     """
     along, what, unit = axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
     value = np.asarray(found["amplitude"]) * scale
-    figure, (axis, *beside) = drawing(2 if "acceleration_peak" in found else 1, 3.8)
+    figure, (axis, *beside) = drawing(2 if "acceleration_peak" in found else 1, 3.8, onto)
     parts = spans(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     for regime, first, last in parts:
@@ -94,7 +94,7 @@ def _gaps(axis, along, value) -> None:
 
 
 @styled
-def levels(rows: list):
+def levels(rows: list, onto=None):
     """Draw the amplitude after every level, in the order of the test, with arrows upwards and downwards.
 
     rows: dicts with drive [m s-2], or [N] where "unit" says so, stuck, values and errors by name, as in result.nc.
@@ -105,7 +105,7 @@ def levels(rows: list):
     name, scale = axis_unit(amplitude, "m")
     error = np.array([row["errors"].get("relative_displacement_amplitude", 0.0) for row in rows]) * scale
     held = np.array([row["stuck"] for row in rows])
-    figure, (axis,) = drawing(1, 3.6)
+    figure, (axis,) = drawing(1, 3.6, onto)
     y, seen = amplitude * scale, set()
     for k in range(len(rows) - 1):
         up = drive[k + 1] >= drive[k]

@@ -44,11 +44,13 @@ def whole_from(time, period: float, window_start: float) -> float:
     return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
 
 
-def drawing(columns: int = 1, height: float = 3.2, **layout):
+def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):
     """An empty Figure of the page's width with `columns` axes side by side: (figure, axes).
 
-    height [inch]; layout: passed on to matplotlib's `subplots`.
+    height [inch]; onto: matplotlib Axes that stand in place of all of them; layout: passed on to `subplots`.
     """
+    if onto is not None:
+        return onto.figure, [onto]
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -75,7 +77,7 @@ def _svg(figure) -> str:
 def styled(draw):
     """Turn a function that draws a Figure into one that answers with its SVG text.
 
-    Its `figure` gives the Figure itself, which a notebook shows as the same SVG.
+    Its `figure` gives the Figure itself, which a notebook shows, as each of its axes, as the same SVG.
     """
     @wraps(draw)
     def figure(*args, **kwargs):
@@ -83,7 +85,9 @@ def styled(draw):
 
         with matplotlib.rc_context(STYLE):
             drawn = draw(*args, **kwargs)
-        drawn._repr_svg_ = partial(_svg, drawn)
+        if kwargs.get("onto") is None:  # else the picture is its owner's
+            for shown in (drawn, *drawn.axes):
+                shown._repr_svg_ = partial(_svg, drawn)
         return drawn
 
     @wraps(draw)
@@ -104,12 +108,12 @@ def part_in_contact(x, sigma) -> tuple | None:
 
 
 @styled
-def interface(x, fields: dict):
+def interface(x, fields: dict, onto=None):
     """Draw sigma_n(x) of the pressed state and, where some shear acts, tau(x) with the frame of the largest
-    resultant."""
+    resultant; onto Axes the first alone."""
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
-    both = tau is not None and bool(np.any(tau))
-    figure, axes = drawing(2 if both else 1, 3.2)
+    both = onto is None and tau is not None and bool(np.any(tau))
+    figure, axes = drawing(2 if both else 1, 3.2, onto)
     part = part_in_contact(x, sigma) or (x[0], x[-1])
     along, mm = axis_unit(part, "m")
     unit, scale = axis_unit(sigma, "Pa")
@@ -185,9 +189,9 @@ def bodies(x, depths, mises, sigma):
 
 
 @styled
-def loop(slide, force, title: str):
+def loop(slide, force, title: str, onto=None):
     """Draw the friction force (k,) [N] against the slide (k,) [m], with a title."""
-    figure, (axis,) = drawing(1, 3.6)
+    figure, (axis,) = drawing(1, 3.6, onto)
     along, um = axis_unit(slide, "m")
     up, scale = axis_unit(force, "N")
     axis.plot(slide * um, force * scale, color=BLUE, lw=1.0)
@@ -196,14 +200,14 @@ def loop(slide, force, title: str):
 
 
 @styled
-def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles"):
-    """The whole run beside its last cycles (a rig) or beside its friction force (a bench).
+def histories(history: dict, window: dict | None, period: float | None, title: str = "Last cycles", onto=None):
+    """The whole run beside its last cycles (a rig) or beside its friction force (a bench); onto Axes the first alone.
 
     history: time, displacement, force; window: the last cycles alone, with base and block acceleration;
     period [s] of the drive, None where every sample was kept.
     """
-    forced = window is None and bool(np.any(history["force"]))
-    figure, axes = drawing(2 if window or forced else 1, 3.6)
+    forced = onto is None and window is None and bool(np.any(history["force"]))
+    figure, axes = drawing(2 if window or forced else 1, 3.6, onto)
     name, per = axis_unit(history["time"], "s")
     start = window["time"][0] if window else 0.0
     _whole_run(axes[0], history, period, per, start)
@@ -212,7 +216,7 @@ def histories(history: dict, window: dict | None, period: float | None, title: s
         up, scale = axis_unit(history["force"], "N")
         axes[1].plot(history["time"] * per, history["force"] * scale, color=ORANGE, lw=1.0)
         axes[1].set(xlabel=f"time [{name}]", ylabel=f"friction force [{up}]", title="Friction force")
-    if window:
+    if window and onto is None:
         _last_cycles(axes[1], window, title)
     return figure
 
