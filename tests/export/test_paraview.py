@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import runpy
+import shutil
+import subprocess
 import sys
 import types
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from command_line import cli
@@ -107,3 +110,29 @@ def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, wri
     answer = cli("export", bench, "-o", tmp_path / "none" / "a.py")
     assert answer.code == 4 and "cannot be written" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["alone.py", "lumped", "still"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("pvpython") is None or not ("DISPLAY" in os.environ or shutil.which("xvfb-run")),
+                    reason="no ParaView here, or nothing that it could draw on")
+def test_always_paraview_itself_draws_every_frame_of_the_cycle(bench, tmp_path):
+    """A picture per frame: background, both colour scales, and pieces that move; .vtu and .pvd open with every time."""
+    answer = cli("export", bench, "-o", tmp_path / "cycle.py")
+    assert answer.code == 0 and cli("export", bench, "-o", tmp_path / "all.pvd").code == 0
+    screen = [] if "DISPLAY" in os.environ else ["xvfb-run", "-a"]
+    subprocess.run([*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300)
+    with Series(bench) as series:
+        count, every = len(film_of(series).numbers), len(series)
+    drawn = [plt.imread(path)[..., :3] for path in sorted(tmp_path.glob("cycle.*.png"))]
+    assert len(drawn) == count and all(one.shape == (800, 1280, 3) for one in drawn)
+    ground = drawn[0][700, 100]
+    inside = [np.abs(one - ground).max(axis=-1) > 0.05 for one in drawn]
+    assert all(0.1 < one[:, 200:1100].mean() < 0.8 for one in inside)
+    assert all(one[:300, 1150:].any() and one[500:, 1150:].any() for one in inside)  # the scales of both colours
+    assert max((one != inside[0]).sum() for one in inside) > 1000
+    asked = "from paraview import simple; r = simple.PVDReader(FileName='all.pvd'); r.UpdatePipeline(); " \
+        "print(len(r.TimestepValues), r.GetDataInformation().GetNumberOfCells())"
+    said = subprocess.run([*screen, "pvpython", "-c", asked], cwd=tmp_path, check=True, timeout=300,
+                          capture_output=True, text=True).stdout.split()
+    with Series(bench) as series:
+        assert said == [str(every), str(len(series.frame(0).types))]

@@ -16,7 +16,8 @@ from vtkmodules.vtkIOXML import vtkXMLMultiBlockDataReader
 
 PROPERTIES = {"PVDReader": {"FileName"}, "WarpByVector": {"Input", "Vectors", "ScaleFactor"},
               "ExtractBlock": {"Input", "Selectors", "Assembly"}, "AnnotateTimeFilter": {"Input", "Format"},
-              "RenderView": {"InteractionMode", "OrientationAxesVisibility"}, "Display": {"LineWidth"},
+              "RenderView": {"InteractionMode", "OrientationAxesVisibility", "ViewSize"},
+              "Display": {"LineWidth"},
               "ScalarBar": {"Title", "ComponentTitle"}, "Table": {"AutomaticRescaleRangeMode"},
               "AnimationScene": {"PlayMode"}}
 CALLS = {"Display": {"SetScalarBarVisibility"}, "Table": {"ApplyPreset", "RescaleTransferFunction"},

@@ -54,6 +54,7 @@ pieces.Selectors = ["//lower", "//upper"]
 interface = simple.ExtractBlock(registrationName="interface", Input=slid)
 interface.Selectors = ["//interface"]
 clock = simple.AnnotateTimeFilter(registrationName="time", Input=reader)
+clock.Format = "time {{time:.6f}} s"
 
 view = simple.GetActiveViewOrCreate("RenderView")
 view.InteractionMode = "2D"
@@ -85,6 +86,8 @@ scene.GoToFirst()
 simple.ResetCamera(view)
 simple.Render(view)
 films = [word for word in sys.argv[1:] if word.endswith((".png", ".avi", ".ogv"))]
+if films:
+    view.ViewSize = [1280, 800]  # so wide that the scales stand beside the pieces
 for film in films:
     simple.SaveAnimation(film, view, FrameRate=PACE)
 if not films:
