@@ -24,7 +24,8 @@ Read the package in this order. A module imports its own entry of the list and t
 20. `campaigns`   many runs: fits, error against cost, sweeps
 21. `export`      summary, netCDF, VTK, report
 22. `api`         load, build, plan and run from Python
-23. `commands`    the verbs of the command line
+23. `torture`     seeded attacks on the command line
+24. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used.
 """

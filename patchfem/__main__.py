@@ -29,6 +29,7 @@ from .commands.shared import Ended, Refused, say  # noqa: E402
 from .commands.start import cite, demo, doctor, new, schema  # noqa: E402
 from .commands.study import cost, fit  # noqa: E402
 from .commands.sweep import sweep  # noqa: E402
+from .commands.torture import torture_of  # noqa: E402
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -40,6 +41,7 @@ app = App(name="patchfem", version=__version__, help_format="plaintext", suppres
                "for a scene of your own: patchfem new.")
 for verb in VERBS:
     app.command(verb, name=verb.__name__.rstrip("_"))
+app.command(torture_of(lambda words: _guarded(words)), name="torture", show=False)
 app.register_install_completion_command(help="Complete commands and options in this shell (bash, zsh, fish).")
 
 

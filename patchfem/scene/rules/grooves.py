@@ -61,8 +61,9 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
     elif not carries(law, "grooves"):
         draft.say("friction.law", f"{named(law)} {beside}: {refusal('grooves')}")
-    if has(law.law, "bonds") and draft.tables.accuracy.quadrature not in (None, "auto", "recursion"):
-        draft.say("accuracy.quadrature", unbuilt(f"'{draft.tables.accuracy.quadrature}' {beside}",
+    accuracy = draft.tables.accuracy  # None where [accuracy] could not be read
+    if has(law.law, "bonds") and accuracy is not None and accuracy.quadrature not in (None, "auto", "recursion"):
+        draft.say("accuracy.quadrature", unbuilt(f"'{accuracy.quadrature}' {beside}",
                                                  "use 'recursion' or 'auto'"))
     if contact is not None and contact.gives_way:
         if has(law.law, "memoryless"):

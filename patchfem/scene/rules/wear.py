@@ -26,7 +26,8 @@ def check_wear(draft: Draft, kind: str) -> None:
 
 def _beside(tables, kind: str):
     """Tables and values that wear does not go with, each with what to do."""
-    contact, structure, drive, method = tables.contact, tables.structure, tables.drive, tables.accuracy.method
+    contact, structure, drive = tables.contact, tables.structure, tables.drive
+    method = tables.accuracy and tables.accuracy.method  # None where [accuracy] could not be read
     grooves = grooves_of(tables)
     if grooves is not None and tables.normal is not None and grooves[1].amplitude:
         yield f"[{grooves[0]}]", "a point has no area from which the wear lowers the grooves: use [contact]"

@@ -1,0 +1,109 @@
+"""All campaigns: how large each is, what makes its trials, the loop that runs them and the table that sums them up."""
+
+import gc
+import shutil
+import tempfile
+import zlib
+from collections.abc import Callable
+from importlib import import_module
+from itertools import count
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from .trial import Trial, alone, captured, emptied
+
+
+class Campaign(NamedTuple):
+    """size: trials of the whole; made: module and function of one trial; clock: seconds after which one is killed."""
+
+    size: int
+    made: str
+    about: str
+    clock: float = 600.0
+
+
+CAMPAIGNS = {
+    "grammar": Campaign(7000, "scenes.by_grammar", "scenes with wrong keys and values"),
+    "bytes": Campaign(3000, "scenes.by_bytes", "scenes with wrong bytes"),
+}
+WARM = (  # scenes that load what most trials need, so that a forked trial finds it
+    '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'
+    'moving_mass = "1 kg"\n[[structure.mode]]\nname = "m"\nfrequency = "143 Hz"\ndamping = 0.01\nslide = 1.0\n[drive]\n'
+    'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 3\n[accuracy]\ntolerance = 1e-2\n',
+    '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "26 lbf"\nelement_size = "1 mm"\n'
+    'substrate = "Ti-8Al-1Mo-1V"\n',
+)
+
+
+class Row(NamedTuple):
+    """What one campaign came to; faults: (index, what went wrong)."""
+
+    name: str
+    tried: int
+    faults: list
+    seconds: float
+
+
+def torture(command: Callable, share: float, names: list, seed: int, only: int | None, say: Callable) -> list:
+    """Run campaigns; a Row for each.
+
+    command: words -> exit code in this process; share: of every campaign's trials, at least one; names: of campaigns;
+    only: the index of the one trial to run, None for all; say: called with each fault as it is found.
+    """
+    out = []
+    with tempfile.TemporaryDirectory(prefix="torture") as place:
+        warm(command, Path(place))
+        for name in names:
+            begin, faults = perf_counter(), []
+            numbers = [only] if only is not None else range(max(1, round(share * CAMPAIGNS[name].size)))
+            for index in numbers:
+                text = tried(command, name, seed, index, Path(place))
+                if text:
+                    faults.append((index, text))
+                    say(f"{name} {index}: {text}\n"
+                        f"  again: patchfem torture --campaign {name} --seed {seed} --only {index}")
+            out.append(Row(name, len(numbers), faults, perf_counter() - begin))
+    return out
+
+
+def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> str:
+    """What went wrong in one trial, empty where nothing did. What looks like a hang gets the time that compiling may
+    take, after which the compiled code is kept, and then the usual time once more."""
+    campaign = CAMPAIGNS[name]
+    module, function = campaign.made.split(".")
+    work = getattr(import_module(f"{__package__}.{module}"), function)
+
+    def attempt(patience: float) -> str:
+        def trial(tell):
+            r = np.random.default_rng([seed, index, zlib.crc32(name.encode())])
+            return Trial(r, emptied(place / name), command, tell, patience)
+        return alone(work, trial, campaign.clock * patience)
+
+    text = attempt(1.0)
+    if text.startswith("hang") and not attempt(20.0).startswith("hang"):
+        text = attempt(1.0)
+    return text
+
+
+def warm(command: Callable, place: Path) -> None:
+    """Import in this process, before any fork, what most trials would import each by itself."""
+    import h5py  # noqa: F401
+
+    for number, text in zip(count(), WARM):
+        scene = place / f"warm{number}.toml"
+        scene.write_text(text, "utf-8")
+        captured(command, ["run", str(scene), "-o", str(place / f"warm{number}"), "--no-page"])
+        shutil.rmtree(place / f"warm{number}", ignore_errors=True)
+    gc.collect()
+    gc.freeze()
+
+
+def table(rows: list) -> str:
+    """The campaigns as lines: name, tried, failed, seconds."""
+    width = max(len(row.name) for row in rows)
+    lines = [f"{'campaign':<{width}}  {'tried':>6}  {'failed':>6}  {'seconds':>8}"]
+    lines += [f"{row.name:<{width}}  {row.tried:>6}  {len(row.faults):>6}  {row.seconds:>8.1f}" for row in rows]
+    return "\n".join(lines)

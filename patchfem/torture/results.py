@@ -1,0 +1,64 @@
+"""What a run left on the disk, judged: whole, finite, and no claim that its own books deny."""
+
+from pathlib import Path
+
+import numpy as np
+
+from .trial import Trial, Wrong, strict
+
+BALANCE = 1e-8  # share of the work beyond which no run may end as settled
+
+
+def whole(folder: Path) -> dict:
+    """The summary of a results folder; Wrong where a file lacks, a number is not finite or a claim cannot be true."""
+    if not (folder / "summary.json").is_file():
+        raise Wrong(f"no {folder.name}/summary.json")
+    summary = strict((folder / "summary.json").read_text("utf-8"))
+    for name, measure in summary["measures"].items():
+        if measure["value"] is None and not measure.get("reason"):
+            raise Wrong(f"{name} is null without a reason")
+    finite(folder / "result.nc")
+    books = summary["measures"].get("energy_balance", {"value": None})
+    closes = max(BALANCE, books.get("error") or 0.0)  # a series of harmonics says how much it leaves out
+    if books["value"] is not None and books["value"] > closes and summary["outcome"] in ("steady", "stuck"):
+        raise Wrong(f"{summary['outcome']} with an energy balance of {books['value']:.3g} ± {closes:.3g}")
+    if summary["outcome"] == "not_converged" and not summary["warnings"]:
+        raise Wrong("not_converged without a warning")
+    return summary
+
+
+def finite(path: Path) -> None:
+    """Wrong for a netCDF file with a number that is not finite."""
+    import h5py
+
+    def look(name, item):
+        if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and item.size and not np.isfinite(item[()]).all():
+            raise Wrong(f"{path.name}: {name} holds {np.size(item[()]) - np.isfinite(item[()]).sum()} of "
+                        f"{np.size(item[()])} values that are not finite")
+
+    if path.is_file():
+        with h5py.File(path) as file:
+            file.visititems(look)
+
+
+def left_over(folder: Path) -> None:
+    """Wrong for anything unfinished that a command left beside its results."""
+    rest = [one.name for one in folder.iterdir() if one.name.startswith(".") or one.name.endswith(".partial")]
+    if rest:
+        raise Wrong(f"left behind: {', '.join(sorted(rest))}")
+
+
+def ran(trial: Trial, file, *words, most: float = 3.0) -> dict | None:
+    """Check, plan and run a scene, judged against one another; the summary, None where it was refused, or announced
+    to take more than `most` seconds."""
+    checked = trial.run("check", file, *words)
+    seconds = trial.announced(file, *words)
+    if (checked.code == 0) != (seconds is not None):
+        raise Wrong(f"check ends with {checked.code}, plan " + ("refuses" if seconds is None else "does not refuse"))
+    if seconds is None or seconds > most:
+        return None
+    ended = trial.run("run", file, "-o", "result", "--no-page", *words, seconds=seconds)
+    left_over(trial.folder)
+    if ended.code not in (0, 3):
+        return None
+    return whole(trial.folder / "result")

@@ -1,0 +1,94 @@
+"""Scenes as nested dicts: written as TOML, taken apart into places, and the keys that the schema knows."""
+
+from functools import cache
+
+from ..scene.keys.tables import Tables
+from ..scene.keys.types import keys, kind_of, model_of
+
+
+def text_of(tables: dict) -> str:
+    """The scene as TOML: values first, tables after them, lists of dicts as arrays of tables."""
+    return "".join(_lines(tables, ""))
+
+
+def _lines(table: dict, at: str):
+    for key, value in table.items():
+        if not _is_table(value):
+            yield f"{word(key)} = {value_of(value)}\n"
+    for key, value in table.items():
+        name = f"{at}.{word(key)}" if at else word(key)
+        if isinstance(value, dict):
+            yield f"[{name}]\n"
+            yield from _lines(value, name)
+        elif _is_table(value):
+            for one in value:
+                yield f"[[{name}]]\n"
+                yield from _lines(one, name)
+
+
+def _is_table(value) -> bool:
+    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and all(isinstance(v, dict)
+                                                                                        for v in value))
+
+
+def word(key: str) -> str:
+    """A key as TOML writes it, quoted where it must be."""
+    return key if key and all(c.isascii() and (c.isalnum() or c in "_-") for c in key) else value_of(key)
+
+
+def value_of(value) -> str:
+    """A value as TOML writes it; what is `Raw` stands as it is."""
+    if isinstance(value, Raw):
+        return str(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value).replace("inf", "inf") if value == value else "nan"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(value_of, value)) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{word(k)} = {value_of(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, str):
+        return '"' + "".join(_letter(c) for c in value) + '"'
+    return str(value)
+
+
+def _letter(c: str) -> str:
+    return f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else "\\" + c if c in '"\\' else c
+
+
+class Raw(str):
+    """A text that stands in the scene as it is, without quotes."""
+
+
+def places(table: dict, at: tuple = ()) -> list:
+    """The path of every key and table below, as tuples of keys and numbers."""
+    out = []
+    for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+        out.append((*at, key))
+        if isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict)):
+            out += places(value, (*at, key))
+    return out
+
+
+def parent(tables: dict, path: tuple):
+    """The table or list that holds the last key of a path."""
+    for key in path[:-1]:
+        tables = tables[key]
+    return tables
+
+
+@cache
+def known() -> tuple:
+    """(path, kind of quantity or None, model of the table or None) of every key of a scene, arrays at place 0."""
+    return tuple(_known(Tables, ()))
+
+
+def _known(model, at: tuple):
+    for key, name in keys(model).items():
+        inner = model_of(model, name)
+        many = inner is not None and "tuple" in str(model.model_fields[name].annotation)
+        path = (*at, key, 0) if many else (*at, key)
+        yield path, kind_of(model, name), inner
+        if inner is not None and len(at) < 6:
+            yield from _known(inner, path)

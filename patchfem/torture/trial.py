@@ -1,0 +1,237 @@
+"""One trial: commands run and judged in a process of their own, so that no crash, hang or leak reaches the next one."""
+
+import contextlib
+import io
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+CODES = (0, 2, 3, 4, 130)
+PATIENCE = 10.0  # [s] of CPU beyond what was announced
+LONGEST = 2000  # characters of a line that a person still reads
+RAW = re.compile(r"Traceback \(most recent|internal fault|\b\w*Warning: |warnings\.warn\(|HDF5-DIAG|Segmentation fault")
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+
+
+class Wrong(Exception):
+    """What the program did that it must never do."""
+
+
+class Ended(NamedTuple):
+    """How a command ended: exit code (below zero: the signal that ended it), stdout, stderr."""
+
+    code: int
+    out: str
+    err: str
+
+
+class Trial:
+    """What a campaign's trial is given: its numbers at random, its folder, and commands that are judged as they end.
+
+    r: random numbers of this trial alone; folder: empty, the working folder; command: words -> exit code, in this
+    process; tell: called with what is being done, so that a crash can be named; patience: factor on every limit.
+    """
+
+    def __init__(self, r: np.random.Generator, folder: Path, command: Callable, tell: Callable, patience: float = 1.0):
+        self.r, self.folder, self.command, self.tell, self.patience = r, folder, command, tell, patience
+
+    def run(self, *words, seconds: float = 0.0) -> Ended:
+        """A command in this process, judged; seconds: what it announced. More CPU than that and PATIENCE ends it."""
+        words = [str(word) for word in words]
+        self.tell("patchfem " + " ".join(words))
+        self.limit(seconds + PATIENCE)
+        ended = judged(captured(self.command, words))
+        self.limit(0.0)
+        return ended
+
+    def limit(self, seconds: float) -> None:
+        """End this process after so many seconds of CPU, or twenty times as many on the clock; 0: never."""
+        signal.setitimer(signal.ITIMER_PROF, seconds * self.patience)
+        signal.setitimer(signal.ITIMER_REAL, 20 * seconds * self.patience)
+
+    def spawn(self, *words, seconds: float = 120.0, allowed=CODES, **options) -> Ended:
+        """A command in a fresh interpreter, judged; options: those of subprocess.run (env is added to this one's)."""
+        words = [str(word) for word in words]
+        self.tell("patchfem " + " ".join(words))
+        options["env"] = {**os.environ, **options.get("env", {})}
+        try:
+            done = subprocess.run(process(*words), capture_output=True, timeout=seconds * self.patience, **options)
+        except subprocess.TimeoutExpired:
+            raise Wrong(f"no end within {seconds:.0f} s") from None
+        ended = Ended(done.returncode, done.stdout.decode("utf-8", "replace"), done.stderr.decode("utf-8", "replace"))
+        return judged(ended, allowed)
+
+    def announced(self, file, *words) -> float | None:
+        """Seconds that `plan` announces for a scene; None where it is refused."""
+        ended = self.run("plan", file, "--json", *words)
+        return float(strict(ended.out)["seconds"]) if ended.code == 0 else None
+
+    def draw(self, *choices):
+        """One of the choices at random, as it is."""
+        return choices[int(self.r.integers(len(choices)))]
+
+    def chance(self, share: float) -> bool:
+        """True in this share of all draws."""
+        return bool(self.r.random() < share)
+
+    def wide(self, low: float, high: float) -> float:
+        """A number between low and high > 0 whose logarithm is evenly spread, to four digits."""
+        return float(f"{math.exp(self.r.uniform(math.log(low), math.log(high))):.4g}")
+
+
+def process(*words) -> list:
+    """The command line that runs these words in a fresh interpreter."""
+    return [sys.executable, "-m", __name__.partition(".")[0], *map(str, words)]
+
+
+def captured(command: Callable, words: list) -> Ended:
+    """A command with both streams kept, also what libraries write past Python."""
+    kept = [os.dup(1), os.dup(2)]
+    with open("/dev/null", "rb") as nothing, contextlib.ExitStack() as stack:
+        files = [stack.enter_context(open(os.memfd_create(name) if hasattr(os, "memfd_create") else
+                                          os.open(name, os.O_RDWR | os.O_CREAT), "w+b")) for name in ("out", "err")]
+        os.dup2(nothing.fileno(), 0)
+        for number, file in enumerate(files, 1):
+            os.dup2(file.fileno(), number)
+        streams = [io.TextIOWrapper(io.FileIO(number, "w", closefd=False), "utf-8", "surrogateescape",
+                                    write_through=True) for number in (1, 2)]
+        try:
+            with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
+                code = _code(command, words)
+        finally:
+            for number, one in enumerate(kept, 1):
+                os.dup2(one, number)
+                os.close(one)
+        texts = []
+        for file in files:
+            file.seek(0)
+            texts.append(file.read().decode("utf-8", "replace"))
+    return Ended(code, *texts)
+
+
+def _code(command: Callable, words: list) -> int:
+    try:
+        return command(words)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 1 if end.code else 0
+    except BaseException as error:
+        print(f"Traceback (most recent call last): {type(error).__name__}: {error}", file=sys.stderr)
+        return 1
+
+
+def judged(ended: Ended, allowed=CODES) -> Ended:
+    """The same; Wrong for a code, a stream or a lack of words that no command may end with."""
+    lines = [line for line in ended.err.splitlines() if line.strip()]
+    last = lines[-1][:300] if lines else "no word on stderr"
+    if ended.code not in allowed:
+        raise Wrong(f"exit code {ended.code}: {last}")
+    for stream in (ended.out, ended.err):
+        if found := RAW.search(stream):
+            place = stream.rfind("\n", 0, found.start()) + 1
+            raise Wrong(f"exit code {ended.code}, raw words: {stream[place:place + 300].splitlines()[0]}")
+        if found := CONTROL.search(stream):
+            raise Wrong(f"a control character {found[0]!r} on the screen: "
+                        f"{stream[max(0, found.start() - 60):found.end()]!r}")
+        if (longest := max(map(len, stream.splitlines()), default=0)) > LONGEST and not stream.startswith(("{", "[")):
+            raise Wrong(f"a line of {longest} characters: {last}")
+    if ended.code in (2, 3, 4, 130) and not any(len(line) > 12 for line in lines):
+        raise Wrong(f"exit code {ended.code} without a helpful line: {last}")
+    return ended
+
+
+def strict(text: str) -> dict:
+    """JSON without NaN and infinity; Wrong for text that is not."""
+    def refuse(name):
+        raise Wrong(f"{name} in JSON")
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except ValueError as error:
+        raise Wrong(f"not JSON: {error}: {text[:80]!r}") from None
+
+
+def alone(work: Callable, trial: Callable, clock: float) -> str:
+    """Run `work(trial)` in a forked process; what went wrong, empty where nothing did.
+
+    work: the campaign's trial; trial: tell -> Trial, made in the child; clock: seconds after which the child is killed
+    whatever its timers say.
+    """
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        _child(work, trial, writing)
+    os.close(writing)
+    said = _heard(child, reading, clock)
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(child, signal.SIGKILL)  # what the trial started and left
+    _, status = os.waitpid(child, 0)
+    doing = next((line[1:] for line in reversed(said) if line.startswith(">")), "")
+    if said and said[-1].startswith("="):
+        text = said[-1][1:]
+        return text and f"{text} [{doing}]"
+    number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+    how = "hang" if number in (signal.SIGPROF, signal.SIGALRM, signal.SIGKILL) else f"crash by signal {number}"
+    return f"{how} [{doing}]"
+
+
+def _child(work: Callable, trial: Callable, writing: int) -> None:
+    """The forked side: never returns."""
+    def tell(text: str, mark: str = ">") -> None:
+        os.write(writing, (mark + " ".join(text.split())[:3000] + "\n").encode("utf-8", "replace"))
+
+    try:
+        os.setpgid(0, 0)
+        for number in (signal.SIGPROF, signal.SIGALRM):
+            signal.signal(number, signal.SIG_DFL)
+        given = trial(tell)
+        os.chdir(given.folder)
+        work(given)
+        given.limit(0.0)
+        tell("", "=")
+    except Wrong as wrong:
+        tell(str(wrong), "=")
+    except BaseException as error:
+        place = error.__traceback__
+        while place.tb_next is not None:
+            place = place.tb_next
+        tell(f"the trial itself failed: {type(error).__name__}: {error} at {place.tb_frame.f_code.co_filename}:"
+             f"{place.tb_lineno}", "=")
+    finally:
+        os._exit(0)
+
+
+def _heard(child: int, reading: int, clock: float) -> list:
+    """Lines of the child until it closes its end; the child is killed when the clock runs out."""
+    import select
+    from time import monotonic
+
+    end, text = monotonic() + clock, b""
+    while True:
+        ready, _, _ = select.select([reading], [], [], max(0.0, end - monotonic()))
+        part = os.read(reading, 65536) if ready else b""
+        if not part:
+            break
+        text += part
+        if text.rpartition(b"\n")[0].rpartition(b"\n")[2].startswith(b"=") and text.endswith(b"\n"):
+            break  # what the trial started may hold the pipe open
+    if not ready:
+        os.kill(child, signal.SIGKILL)
+    os.close(reading)
+    return text.decode("utf-8", "replace").splitlines()
+
+
+def emptied(folder: Path) -> Path:
+    """The folder, there and empty."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
