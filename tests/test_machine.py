@@ -1,6 +1,8 @@
 """Machine code in files of its own: the same bits as through numba, and nothing for what could not run without it."""
 
 import json
+import subprocess
+import sys
 from math import exp, tan
 from typing import NamedTuple
 
@@ -210,3 +212,30 @@ def test_exact_a_function_is_one_of_its_module():
     assert isinstance(kernels.batch, Entry) and kernels.batch.py_func is kernels.module().batch.py_func
     with pytest.raises(AttributeError, match="no_such"):
         kernels.no_such  # noqa: B018
+
+
+MOTIONS = """
+import json, sys
+import patchfem as pf
+rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE\\n' \\
+    '[structure]\\nmoving_mass = "1 kg"\\n' \\
+    '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\
+    '[drive]\\nkind = "base"\\nfrequency = "90 Hz"\\nacceleration = "5 g"\\ncycles = 3\\n'
+out = []
+for law, more in (("coulomb", ""), ("elastic-plastic", 'bond_length = "2 um"'), ("nonlocal", 'bond_length = "5 um"')):
+    found = pf.run(rig.replace("LAW", law).replace("MORE", more))
+    out.append([found.measures[name].value for name in ("slip_amplitude", "friction_work")])
+print(json.dumps([out, "numba" in sys.modules]))
+"""
+
+
+def test_exact_without_compiled_code_the_same_motions(monkeypatch):
+    """Numba's own switch makes every kernel the Python that it is written in, and no index leaves its array."""
+    answers = []
+    for switch in "0", "1":
+        monkeypatch.setenv("NUMBA_DISABLE_JIT", switch)
+        done = subprocess.run([sys.executable, "-c", MOTIONS], capture_output=True, text=True, timeout=300, check=True)
+        answers.append(json.loads(done.stdout))
+    (compiled, _), (plain, numba) = answers
+    assert numba and all(np.ravel(compiled))
+    np.testing.assert_allclose(plain, compiled, rtol=1e-9)

@@ -4,6 +4,9 @@ Numba's own cache notices only a change of the file that holds the function, not
 is handed another one as an argument is never cached at all, so a loop that should run with any law is a text of its own
 per law: `instance` writes it beside the compiled code, with the import of the law exchanged.
 
+Numba's own switches are obeyed: NUMBA_DISABLE_JIT=1 runs every kernel as the Python that it is written in (a debugger
+or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew and checks every index.
+
 `inner` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
 and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`).
 """
@@ -29,6 +32,7 @@ from . import machine
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
 TUPLES = "plant.py", "contacts/arrays.py", "smooth/arrays.py", "piecewise/plant.py", "piecewise/elements.py"
+PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
 UNKEPT = set()  # functions called here whose machine code cannot be kept: every process brings up numba for them
 ARITHMETIC = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv, ast.Pow: pow, ast.USub: neg, ast.UAdd: pos}
 
@@ -40,7 +44,8 @@ def kernel_key() -> str:
     for source in (HERE / "compiled" / "inner.py", *sorted(HERE.rglob("*kernels.py")),
                    *(HERE / "dynamics" / name for name in TUPLES)):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
-    made_by = f"{version('numba')} {version('llvmlite')} {sys.version_info[:2]}"
+    checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
+    made_by = f"{version('numba')} {version('llvmlite')} {sys.version_info[:2]} {checked}"
     digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())
     return digest.hexdigest()[:16]
 
@@ -123,6 +128,8 @@ class Entry:
     def held(self, *arguments) -> tuple:
         """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `held_call`:
         their words are made once. What is in their arrays may change."""
+        if PLAIN:
+            return None, b"", arguments
         try:
             kinds, words = zip(*map(self.words.of, arguments))
         except machine.Unfit:
@@ -139,6 +146,8 @@ class Entry:
         return code(b"".join(mine) + words) if code else self(*first, *last)
 
     def __call__(self, *arguments):
+        if PLAIN:
+            return self.function()(*arguments)
         try:
             kinds, words = zip(*map(self.words.of, arguments))
         except machine.Unfit:
@@ -291,5 +300,5 @@ def _folder() -> Path:
 
 @cache
 def _told(say) -> None:
-    if not any(_folder().rglob("*.nbi")):
+    if not PLAIN and not any(_folder().rglob("*.nbi")):
         say("compiling the time loop for this machine, once (10 to 30 s)")

@@ -27,6 +27,8 @@ def njit(cache: bool = False, **options):
 
     options: those of numba.njit. Where numba's compiler is not the one this was written for, it is numba.njit.
     """
+    if numba.config.DISABLE_JIT:
+        return lambda function: function
     if cache or not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
         return numba.njit(cache=cache, **NO_C, **options)
     return lambda function: Inner(function, {}, {"nopython": True, "boundscheck": None, **options}, Inside)

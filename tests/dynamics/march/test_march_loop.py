@@ -283,7 +283,7 @@ def release(basis, model, start, steps_per_cycle, count):
     state = np.zeros((2, basis.omega.size))
     state[0] = start
     plant, table = plant_of(basis, prop), prop.tables(drive, 0, 1)
-    ledger, rows = np.zeros(9), np.zeros((2, 2 * basis.omega.size + 6))
+    ledger, rows = np.zeros(9), np.zeros((2, 2 * basis.omega.size + 7))
 
     def energy():
         out = 0.5 * basis.mass * np.sum(state[1]**2 + (basis.omega * state[0])**2)

@@ -193,7 +193,7 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
 # ---- C15: ringing while stuck
 
 def free_rows(basis, model, start, per_cycle, count):
-    """Rows (count + 1, 2 n + 6) of a free march from a modal displacement, and its ledger."""
+    """Rows (count + 1, 2 n + 7) of a free march from a modal displacement, and its ledger."""
     hub = load_kernels()
     drive = BaseSine(0.0, basis.omega[0])
     prop = propagator(basis, drive, per_cycle)
@@ -202,7 +202,7 @@ def free_rows(basis, model, start, per_cycle, count):
     state = np.zeros((2, n))
     state[0] = start
     plant, table = plant_of(basis, prop), prop.tables(drive, 0, 1)
-    ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 6))
+    ledger, rows = np.zeros(9), np.zeros((count + 1, 2 * n + 7))
     done = hub.march(model.kind, 0, count, state, plant, table, contact, 1e-3 * GOAL * model.limit, np.inf, ledger,
                      rows)
     assert done == (count, 0)
