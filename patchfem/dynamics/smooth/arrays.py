@@ -13,8 +13,8 @@ class Moving(NamedTuple):
     of the 16 stages, extension of the step (8), sizes of the law's states, state after a step. now (14,): time [s],
     length of the next step and of the first after a reversal [s], slide at the start of the motion in this direction
     [m], energy lost to friction till then [J], largest coordinate [m] and rate [m/s] of late, rate of the fastest mode
-    [1/s], 1 once it has begun, piece of the drive for which the first slopes stand, mass [kg], kind of the drive, its
-    piece now, 1 where it moves the base.
+    [1/s], 1 once it has begun and 2 where it was left at a reversal, piece of the drive for which the first slopes
+    stand, mass [kg], kind of the drive, its piece now, 1 where it moves the base.
     """
 
     rows: np.ndarray

@@ -82,6 +82,8 @@ def put_back(m, k, rows, own, lane):
 @njit(error_model="numpy", **INNER)
 def first_zero(a, p, b, r):
     """Share of a step at which a cubic from a >= 0 to b < 0 passes zero; p, r: its slopes at the ends over the step."""
+    if a == 0:
+        return loop.back_of(p, b, r)
     low, high, s = 0.0, 1.0, a / (a - b)
     for _ in range(60):
         rest = 1 - s
@@ -152,8 +154,9 @@ def accepted(rows, own, lane, cycles):
     own[DONE] += 1
     at_end = h == room
     own[NEXT] = max(own[WANTED], own[NEXT]) if own[FIRST] == room else own[WANTED]
-    if own[FRESH] > 0:
-        own[TURNED], own[FRESH] = own[WANTED], 0.0
+    if own[FRESH] == loop.STANDS:
+        own[TURNED] = own[WANTED]
+    own[FRESH] = 0
     for of in range(5):
         rows[Z + of * at.LANES + lane] = rows[Z1 + of * at.LANES + lane]
     rows[T + lane] = own[UNTIL] if at_end else time + h
@@ -178,8 +181,8 @@ def judged(rows, own, lane, cycles):
         accepted(rows, own, lane, cycles)
         return next_try(rows, own, lane)
     share = first_zero(max(begin, 0.0), gain, end, after)
-    if own[FRESH] > 0 and share * h < 1e-13 * own[PERIOD]:
-        return ASTRAY
+    if own[FRESH] > 0 and share * h < loop.INSTANT * own[PERIOD]:
+        return ASTRAY if own[FRESH] == loop.STANDS else ENDLESS
     own[MODE], own[LOW], own[HIGH], own[TRIES] = LOCATE, 0.0, h, 0
     rows[H + lane] = max(share, 1e-12) * h
     return GOING
@@ -218,20 +221,17 @@ def gone_on(many, kept, rows, own, lane, code):
     """What a motion does at a reversal, or at a start the other way, before it goes on: GOING, or how it ends."""
     m, k = one(many, kept, int(own[MOTION]))
     put_back(m, k, rows, own, lane)
-    if code == TURNS:
-        loop.leave(m, k)
-    if code == TURNS or code == ASTRAY:
+    if code == ASTRAY:
         loop.enter(m, -m.turn[0])
-        own[FRESH] = 0.0
-    if code == TURNS:
-        count = int(k.tally[watching.TURNS])
-        watching.write(m, m.now[steps.TIME], m.y, k.turns[count])
-        k.tally[watching.TURNS] += 1
-        own[FRESH] = 1.0
+        own[FRESH], code = loop.FLIPPED, GOING
+    elif code == TURNS:
+        loop.pass_end(m, k, loop.STOP)
+        own[FRESH], code = loop.STANDS, GOING
         m.now[steps.STEP] = min(m.now[steps.TURNED], m.now[steps.STEP])
-        code = GOING if count + 1 < k.turns.shape[0] else FULL
+        if k.tally[watching.TURNS] == k.turns.shape[0]:
+            code, m.now[steps.BEGUN] = FULL, loop.TURNING
     m.now[steps.STOOD] = -1.0  # whoever goes on takes the slopes anew
-    return GOING if code == ASTRAY else code
+    return code
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **LEAN)
@@ -263,10 +263,12 @@ def advance(many, kept, rows, lanes, until, tolerance, codes):
                     if ahead == until.size:
                         own[MODE], rows[H + lane], busy = IDLE, 0.0, busy - 1
                         break
-                    own[MOTION], own[FRESH], own[UNTIL] = ahead, 0.0, until[ahead]
+                    own[MOTION], own[UNTIL] = ahead, until[ahead]
                     rows[ALLOWED + lane] = tolerance[ahead]
                     ahead += 1
                 m, k = one(many, kept, int(own[MOTION]))
+                if code != GOING:
+                    own[FRESH] = loop.went_on(m)
                 laid(m, k, rows, own, lane)
                 code = next_try(rows, own, lane)
                 if code == GOING:

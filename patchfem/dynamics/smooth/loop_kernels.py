@@ -18,7 +18,10 @@ from . import watch_kernels as watching
 NOTHING, STOP, KINK, KNEE, TRAVEL = range(5)  # what ends a step
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS = range(5)  # how a call ends
 SLOWER, FASTER = 0.2, 8.0  # bounds of the change of a step
+TURNING = 2.0  # of now[BEGUN]: the motion was left at a reversal
 FORGET = 3.0  # cycles over which a largest value is forgotten
+INSTANT = 1e-13  # of a period: what lies nearer together happens at once
+STANDS, FLIPPED = 1, 2  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
 
 
 @njit(error_model="numpy", **INNER)
@@ -65,7 +68,9 @@ def first_end(m, h, travel, skip):
         a, rate_a, _ = left(m, what, m.y, m.work[0], travel)
         a, low, high = max(a, 0.0), 0.0, 1.0
         p, r = rate_a * h, rate_b * h
-        for _ in range(40):
+        if a == 0:
+            low = high = back_of(p, b, r)
+        for _ in range(40 if a > 0 else 0):
             s = 0.5 * (low + high)
             rest = 1 - s
             value = rest * rest * (a * (1 + 2 * s) + p * s) + s * s * (b * (3 - 2 * s) - r * rest)
@@ -76,6 +81,22 @@ def first_end(m, h, travel, skip):
         if found == NOTHING or high < where:
             found, where = what, high
     return found, where
+
+
+@njit(error_model="numpy", **INNER)
+def back_of(p, b, r):
+    """Share of a step at which a cubic from 0 to b < 0 comes back to zero from above; 0 where it is nowhere above.
+
+    p, r: its slopes at the ends over the step. Less the zero at the start it is p + mid s + big s^2; of the two
+    zeros of that it is the one where it falls.
+    """
+    mid, big = 3 * b - 2 * p - r, p + r - 2 * b
+    root = mid * mid - 4 * big * p
+    if root < 0:
+        return 0.0
+    root = sqrt(root)
+    s = -(mid + root) / (2 * big) if mid > 0 else 2 * p / (root - mid) if root > mid else 0.0
+    return s if 0 < s < 1 else 0.0
 
 
 @njit(error_model="numpy", **INNER)
@@ -98,7 +119,8 @@ def located(m, h, what, share, travel):
 
 @njit(error_model="numpy", **INNER)
 def dips(m, h):
-    """Share [1] of the step of h [s] at which the speed, > 0 at both ends, has a least value below zero; 0 for none."""
+    """Share [1] of the step of h [s] at which the speed, > 0 at both ends, may have a least value below zero; 0 for
+    none."""
     a, p, _ = left(m, STOP, m.y, m.work[0], np.inf)
     b, r, _ = left(m, STOP, m.work[steps.TRIAL], m.work[12], np.inf)
     return dip_of(a, p * h, b, r * h)
@@ -106,9 +128,10 @@ def dips(m, h):
 
 @njit(error_model="numpy", **INNER)
 def dip_of(a, p, b, r):
-    """Share of a step at which a cubic from a to b, both > 0, has a least value below zero; 0 for none.
+    """Share of a step at which a cubic from a to b, both > 0, has a least value below zero or so near to it that the
+    speed it stands for may have one; 0 for none.
 
-    p, r: its slopes at the ends over the step.
+    p, r: its slopes at the ends over the step. What it errs by is s^2 (1 - s)^2 of the fourth derivative/24.
     """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
@@ -119,7 +142,8 @@ def dip_of(a, p, b, r):
     s = -p / (mid + sqrt(root)) if mid + sqrt(root) != 0 else 0.0
     if s <= 0 or s >= 1:
         return 0.0
-    return s if a + s * (p + s * (mid + s * big)) < 0 else 0.0
+    near = (s * (1 - s))**2 * (0.25 * abs(big) + 0.1 * abs(mid))
+    return s if a + s * (p + s * (mid + s * big)) < near else 0.0
 
 
 @njit(error_model="numpy", **INNER)
@@ -171,6 +195,29 @@ def heading(m):
 
 
 @njit(error_model="numpy", **INNER)
+def turns_around(m, period):
+    """Begin the motion after a stop: whether it turns, else it goes on as before.
+
+    Where speed and acceleration vanish together the next derivative decides: the motion has the direction of its speed
+    an INSTANT of the period [s] after the stop, v + a t + j t^2/2. What is opposed to that ends within the instant.
+    """
+    n, t, way = m.rows.shape[1], m.now[steps.TIME], -m.turn[0]
+    enter(m, way)
+    ahead, near, gain, later = INSTANT * period, 1e-3 * m.now[steps.STEP], 0.0, 0.0
+    for c in range(m.y.size):
+        m.work[steps.TRIAL, c] = m.y[c] + near * m.work[0, c]
+    steps.slope(m, t + near, m.work[steps.TRIAL], m.work[1])
+    for i in range(n):
+        gain += m.rows[steps.SLIDE, i] * m.work[0, n + i]
+        later += m.rows[steps.SLIDE, i] * m.work[1, n + i]
+    v, jerk = steps.slide_of(m, m.y)[1], (later - gain) / near
+    if way * (v + ahead * (gain + 0.5 * ahead * jerk)) >= 0:
+        return True
+    enter(m, -way)
+    return False
+
+
+@njit(error_model="numpy", **INNER)
 def accept(m, h, k):
     """Move on by the step of h [s] that stands in m.work[steps.TRIAL]."""
     n = m.rows.shape[1]
@@ -212,11 +259,9 @@ def pass_end(m, k, what):
         if n == 1:
             m.y[1] = 0.0  # to the last digit
         leave(m, k)
-        rows = int(k.tally[watching.TURNS])
-        way = -m.turn[0]
-        enter(m, way)
-        watching.write(m, m.now[steps.TIME], m.y, k.turns[rows])
-        k.tally[watching.TURNS] += 1
+        if turns_around(m, k.tally[watching.PERIOD]):
+            watching.write(m, m.now[steps.TIME], m.y, k.turns[int(k.tally[watching.TURNS])])
+            k.tally[watching.TURNS] += 1
     elif what == KINK:
         leave(m, k)
         enter(m, m.turn[0])
@@ -248,15 +293,23 @@ def sampled(m, k):
     k.tally[watching.SAMPLE] = at
 
 
+@njit(error_model="numpy", **INNER)
+def went_on(m):
+    """STANDS where a motion was left at a reversal, for lack of room, else 0: it goes on as if it had not been left."""
+    fresh = STANDS if m.now[steps.BEGUN] == TURNING else 0
+    m.now[steps.BEGUN] = 1.0
+    return fresh
+
+
 @njit(error_model="numpy", cache=True, **LEAN)
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
 
     tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals is used up.
     """
-    end, fresh = min(until, edge), False
     if m.now[steps.BEGUN] == 0:
         begin(m, k)
+    end, fresh = min(until, edge), went_on(m)
     if m.now[steps.STOOD] != m.now[steps.PIECE]:  # the drive has changed
         steps.slope(m, m.now[steps.TIME], m.y, m.work[0])
         m.now[steps.STOOD] = m.now[steps.PIECE]
@@ -264,6 +317,7 @@ def advance(m, k, until, edge, tolerance, travel):
     limit = k.tally[watching.DONE] + 1e9
     while m.now[steps.TIME] < end:
         if k.tally[watching.TURNS] >= k.turns.shape[0]:
+            m.now[steps.BEGUN] = TURNING if fresh > 0 else 1.0
             return FULL
         room = end - m.now[steps.TIME]
         whole = m.now[steps.STEP] >= room * (1 - 1e-9)
@@ -272,10 +326,11 @@ def advance(m, k, until, edge, tolerance, travel):
             return ENDLESS
         taken = h
         what, share = first_end(m, h, travel, NOTHING)
-        if what == STOP and fresh and share * h < 1e-13 * k.tally[watching.PERIOD]:
-            m.turn[0] = -m.turn[0]  # it started the other way
-            enter(m, m.turn[0])
-            fresh = False
+        if what == STOP and fresh > 0 and share * h < INSTANT * k.tally[watching.PERIOD]:
+            if fresh == FLIPPED:  # neither way: no motion of a law that is smooth does so
+                return ENDLESS
+            enter(m, -m.turn[0])
+            fresh = FLIPPED
             continue
         while what != NOTHING:
             taken = located(m, taken, what, share, travel)
@@ -294,17 +349,17 @@ def advance(m, k, until, edge, tolerance, travel):
         if whole and taken == room:
             m.now[steps.TIME] = end
         m.now[steps.STEP] = max(wanted, m.now[steps.STEP]) if whole and h == room else wanted
-        if fresh:
+        if fresh == STANDS:
             m.now[steps.TURNED] = wanted
-            fresh = False
+        fresh = 0
         if not np.isfinite(m.y[0]):
             return WILD
         if what == TRAVEL:
             return TRAVELLED
         if what != NOTHING:
             pass_end(m, k, what)
-            fresh = what == STOP
-            if fresh:
+            if what == STOP:
+                fresh = STANDS
                 m.now[steps.STEP] = min(m.now[steps.TURNED], m.now[steps.STEP])
     sampled(m, k)
     return FINISHED

@@ -10,6 +10,8 @@ from .run import (
     BEGIN,
     CLOSER,
     END,
+    FINISHED,
+    FULL,
     HELD,
     POWER,
     SAMPLE,
@@ -55,7 +57,7 @@ def together(cases, cycles: int, window: int, tolerances) -> Motions:
     kept = _stacked(Kept, [pair[1] for pair in pairs], (*OF_KEPT, "turns"), len(tolerances))
     period = np.array([drive.period for _, drive, _, _ in cases] * len(tolerances))
     number, tolerance = period.size, np.ravel(tolerances)
-    kept = kept._replace(turns=np.zeros((number, TURNING * cycles + AT_REST, 9)))
+    kept = kept._replace(turns=np.zeros((number, int(TURNING * cycles) + AT_REST, 9)))
     kept.cycles[:, 2:, ~asked(cycles, window)] = np.nan
     loops, begun, stored, lost = loops_of(law), np.zeros(number), np.zeros(number), np.zeros(number, bool)
     for j in range(count):
@@ -66,7 +68,11 @@ def together(cases, cycles: int, window: int, tolerances) -> Motions:
     begun[:] = kept.tally[:, STORED]
     until = cycles * period
     first = until - window * period
-    lost |= advance(law, moving, kept, first, tolerance) != 0
+    codes = advance(law, moving, kept, first, tolerance)
+    while (codes == FULL).any():
+        kept = _wider(kept)
+        codes = advance(law, moving, kept, first, tolerance)
+    lost |= codes != FINISHED
     begin = _ends(moving)
     times = np.linspace(moving.now[:, 0], until, window * SAMPLES + 1, axis=1)
     samples = np.zeros((*times.shape, 9))
@@ -77,10 +83,20 @@ def together(cases, cycles: int, window: int, tolerances) -> Motions:
     end, row = np.zeros((number, 4)), np.zeros(9)
     for j in range(number):
         m, k = _one(moving, kept, j, samples[j])
-        lost[j] |= loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf) != 0
+        code = loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf)
+        while code == FULL:
+            kept = _wider(kept)
+            m, k = _one(moving, kept, j, samples[j])
+            code = loops.advance(m, k, until[j], np.inf, CLOSER * tolerance[j], np.inf)
+        lost[j] |= code != FINISHED
         end[j] = _ends(moving, slice(j, j + 1))
         stored[j] = loops.settled(m, k, row)
     return Motions(moving, kept._replace(samples=samples), begin, end, begun, stored, lost)
+
+
+def _wider(kept: Kept) -> Kept:
+    """Kept of motions with twice the room for reversals."""
+    return kept._replace(turns=np.concatenate([kept.turns, np.zeros_like(kept.turns)], axis=1))
 
 
 def _stacked(kind, parts, shared, times: int):

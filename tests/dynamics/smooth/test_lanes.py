@@ -7,10 +7,11 @@ from test_smooth import LOAD, MASS, ONE, SINE, THREE, element, numpy_step
 
 from patchfem import compiled
 from patchfem.core import BaseSine, Start
-from patchfem.dynamics.smooth import lane_step, lanes
+from patchfem.dynamics.smooth import lane_step, lanes, many
 from patchfem.dynamics.smooth.arrays import Kept, Moving
-from patchfem.dynamics.smooth.run import Run
+from patchfem.dynamics.smooth.run import TURNS, Run
 from patchfem.friction.bonds.parameters import Bonds
+from patchfem.friction.laws.stretch import points_element
 from patchfem.friction.laws.tanh import Rate
 
 LAWS = {"bonds": Bonds(0.3, 5e-6), "fresh": Bonds(0.3, 5e-5, initial=0.3), "tanh": Rate(0.3, 1e-2),
@@ -111,29 +112,48 @@ def test_exact_one_of_many_moves_as_alone_to_the_last_bit(name):
         return [Run(ONE, BaseSine(10.0 + 3 * k, OMEGA * (0.7 + 0.03 * k)), one, 20, 1e-9) for k, one in enumerate(made)]
 
     def lanes_element(law, load):
-        from patchfem.friction.laws.stretch import points_element
-
         return points_element(law, [1.0], [load])
 
     alone, group = runs(), runs()
     until = np.array([(3 + k % 5) * 1.1 / 143 for k in range(19)])
-    many, kept = together(group)
-    codes = lanes.advance(group[0].element.kernels, many, kept, until, np.full(19, 1e-9))
+    all_of, kept = together(group)
+    codes = lanes.advance(group[0].element.kernels, all_of, kept, until, np.full(19, 1e-9))
     assert not codes.any()
     for k, run in enumerate(alone):
         run.until(until[k])
-        assert np.array_equal(run.moving.y, many.y[k]) and np.array_equal(run.moving.now, many.now[k])
-        assert np.array_equal(run.kept.cycles, kept.cycles[k]) and np.array_equal(run.moving.mem, many.mem[k])
+        assert np.array_equal(run.moving.y, all_of.y[k]) and np.array_equal(run.moving.now, all_of.now[k])
+        assert np.array_equal(run.kept.cycles, kept.cycles[k]) and np.array_equal(run.moving.mem, all_of.mem[k])
 
 
-def test_exact_a_call_without_room_for_turns_goes_on_where_it_ended():
+@pytest.mark.parametrize("peaks", [False, True])
+def test_exact_a_call_without_room_for_turns_goes_on_where_it_ended(peaks):
+    """In the lanes, and in the loop that reads inside its steps: the same motion to the last bit."""
     whole, parts = (Run(ONE, SINE, element(LAWS["bonds"]), 9, 1e-9) for _ in range(2))
     parts.kept = parts.kept._replace(turns=np.zeros((3, 9)))
     for run in (whole, parts):
-        run.until(8 * PERIOD)
+        run.until(8 * PERIOD, peaks=peaks)
     one, other = np.concatenate(parts.turns), np.concatenate(whole.turns)
-    assert one == pytest.approx(other, abs=1e-8 * abs(other).max(axis=0).max()) and len(parts.turns) > 4
-    assert one[:, 1] == pytest.approx(other[:, 1], rel=1e-7)
+    np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(parts.moving.y, whole.moving.y)
+    assert len(parts.turns) > 4
+
+
+@pytest.mark.parametrize("turning", [0, 1.5])
+def test_exact_many_that_turn_more_often_than_there_is_room_for(turning, monkeypatch):
+    """Bonds that hold ring: they turn six times a cycle. Room that is made on the way changes no bit."""
+    law = points_element(Bonds(0.3, 1e-6), [1.0], [92.0])
+    cases = [(ONE, BaseSine(push, OMEGA), law, None) for push in (30.0, 60.0)]
+    wide = many.together(cases, 60, 10, [[1e-9, 1e-9]])
+    monkeypatch.setattr(many, "TURNING", turning / 60)
+    monkeypatch.setattr(many, "AT_REST", 4)
+    narrow = many.together(cases, 60, 10, [[1e-9, 1e-9]])
+    assert not wide.lost.any() and not narrow.lost.any()
+    count = int(wide.kept.tally[:, TURNS].max())
+    assert count > 200 and narrow.kept.turns.shape[1] < 2 * count
+    np.testing.assert_array_equal(narrow.moving.y, wide.moving.y)
+    np.testing.assert_array_equal(narrow.kept.samples, wide.kept.samples)
+    np.testing.assert_array_equal(narrow.kept.tally, wide.kept.tally)
+    np.testing.assert_array_equal(narrow.kept.turns[:, :count], wide.kept.turns[:, :count])
 
 
 @pytest.mark.parametrize("modes, law, drive, travel", [
